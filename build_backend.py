@@ -4,9 +4,13 @@ import contextlib
 import sys
 
 if sys.version_info < (3, 11):  # noqa: UP036 (any Python may read this)
-    sys.exit(f"planarfriction needs Python 3.11 or later: {sys.executable} is {sys.version.split()[0]}")
+    sys.exit(
+        f"planarfriction needs Python 3.11 or later: {sys.executable} is {sys.version.split()[0]}"
+    )
 
-with contextlib.suppress(ImportError):  # an installer asks what to install before it builds
+with contextlib.suppress(
+    ImportError
+):  # an installer asks what to install before it builds
     from setuptools.build_meta import *  # noqa: F403
 
 
@@ -15,7 +19,9 @@ def get_requires_for_build_wheel(config_settings=None):
     return ["setuptools>=77"]
 
 
-get_requires_for_build_editable = get_requires_for_build_sdist = get_requires_for_build_wheel
+get_requires_for_build_editable = get_requires_for_build_sdist = (
+    get_requires_for_build_wheel
+)
 
 
 def build_editable(*arguments, **options):

@@ -11,7 +11,9 @@ from hypothesis.internal.conjecture import providers
 
 from planarfriction import families
 
-os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")  # most of what its tests take is compilation
+os.environ.setdefault(
+    "JAX_DISABLE_MOST_OPTIMIZATIONS", "1"
+)  # most of what its tests take is compilation
 
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("random", derandomize=False)
@@ -19,11 +21,15 @@ settings.register_profile("random", derandomize=False)
 
 def pytest_configure(config) -> None:
     """A run that decides on a change must not fail for another reason; slow tests may draw new examples."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a shell starts in the background
+    signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # ignored in what a shell starts in the background
     if config.getoption("--hypothesis-profile") is None:
         slow = "slow" in config.getoption("markexpr").replace("not slow", "")
         settings.load_profile("random" if slow else "repeatable")
-    if settings.get_current_profile_name() == "repeatable" and hasattr(providers, "_get_local_constants"):
+    if settings.get_current_profile_name() == "repeatable" and hasattr(
+        providers, "_get_local_constants"
+    ):
         # Hypothesis draws numbers that it reads in the project's modules: those that earlier tests happened to import.
         # No setting of Hypothesis turns this off, nor does `derandomize`; a backend of our own would be as private.
         providers._get_local_constants = lambda: providers._local_constants

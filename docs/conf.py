@@ -40,7 +40,13 @@ extensions = [
     "mathml",
     "repository_links",
 ]
-exclude_patterns = ["extensions", "gallery/**.ipynb", "gallery/**.py", "notebooks/**.ipynb", "notebooks/**.py"]
+exclude_patterns = [
+    "extensions",
+    "gallery/**.ipynb",
+    "gallery/**.py",
+    "notebooks/**.ipynb",
+    "notebooks/**.py",
+]
 suppress_warnings = [
     "config.cache",  # sphinx-gallery keeps functions in its settings
 ]
@@ -49,9 +55,18 @@ smartquotes = False  # options of commands have two hyphens
 
 # -- pages in Markdown: colon fences, so that the Python of a page stays easy to find for the tests
 
-myst_enable_extensions = ["amsmath", "attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = [
+    "amsmath",
+    "attrs_block",
+    "attrs_inline",
+    "colon_fence",
+    "deflist",
+    "dollarmath",
+]
 myst_heading_anchors = 4
-html_math_renderer = "mathml"  # by docutils: nothing is loaded from elsewhere when a page is read
+html_math_renderer = (
+    "mathml"  # by docutils: nothing is loaded from elsewhere when a page is read
+)
 
 # -- API from docstrings, whose `code` is in single backticks
 
@@ -59,10 +74,14 @@ default_role = "literal"
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
-autodoc_type_aliases = {"ArrayLike": "ArrayLike"}  # by its name, not as the union that it is
+autodoc_type_aliases = {
+    "ArrayLike": "ArrayLike"
+}  # by its name, not as the union that it is
 python_maximum_signature_line_length = 90
 autodoc_default_options = {"members": True}
-napoleon_google_docstring = napoleon_numpy_docstring = False  # `api_pages` applies it where there are sections
+napoleon_google_docstring = napoleon_numpy_docstring = (
+    False  # `api_pages` applies it where there are sections
+)
 napoleon_use_rtype = False
 OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco_warp", "pydrake")
 MISSING = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
@@ -73,14 +92,19 @@ nitpick_ignore_regex = [
     # Types in signatures, the only references that no one writes: of other libraries, since no inventory of theirs is
     # downloaded for a link, and of ours where they are no one's to make, and so stand in no `__all__`.
     (r"py:class", r".*"),
-    (r"py:.*", r"(np|numpy|xr|xarray|matplotlib|scipy|torch|jax|jaxlib|warp|wp|numba|mujoco\w*|mjw|pydrake)\..*"),
+    (
+        r"py:.*",
+        r"(np|numpy|xr|xarray|matplotlib|scipy|torch|jax|jaxlib|warp|wp|numba|mujoco\w*|mjw|pydrake)\..*",
+    ),
 ]
 
 # -- the gallery: every script is run, and again when it has changed
 
 ENDS = {"torch": "torch", "jax": "jax", "mujoco": "mujoco", "plotly": "interactive"}
 """Package -> how the names of scripts end that need it: without it they are left out."""
-WITHOUT = "|".join(f"_{end}" for name, end in ENDS.items() if importlib.util.find_spec(name) is None)
+WITHOUT = "|".join(
+    f"_{end}" for name, end in ENDS.items() if importlib.util.find_spec(name) is None
+)
 THEMES = ("patches", "laws", "limit_surfaces", "motion", "derivatives", "hosts")
 sphinx_gallery_conf = {
     "examples_dirs": ["../examples/gallery", "../examples/notebooks"],
@@ -106,8 +130,12 @@ sphinx_gallery_conf = {
 html_theme = "furo"
 html_title = f"planarfriction {version}"
 html_static_path = ["static"]
-if plotly := importlib.util.find_spec("plotly"):  # for figures that turn: nothing is loaded from elsewhere
-    html_static_path.append(str(Path(plotly.origin or "").parent / "package_data" / "plotly.min.js"))
+if plotly := importlib.util.find_spec(
+    "plotly"
+):  # for figures that turn: nothing is loaded from elsewhere
+    html_static_path.append(
+        str(Path(plotly.origin or "").parent / "package_data" / "plotly.min.js")
+    )
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False
@@ -117,7 +145,9 @@ copybutton_prompt_text = "$ "
 def count(app, failed):
     """Say how much there is to read."""
     pages = [page.read_text(encoding="utf-8").split() for page in HERE.glob("*.md")]
-    logging.getLogger("planarfriction").info("%d pages of %d words", len(pages), sum(map(len, pages)))
+    logging.getLogger("planarfriction").info(
+        "%d pages of %d words", len(pages), sum(map(len, pages))
+    )
 
 
 def setup(app):

@@ -25,7 +25,15 @@ MODELS: dict[str, Callable[[pf.ContactPatch], Any]] = {
 }
 """Models by name, each as a function of its patch."""
 
-SHAPES = ("Circle", "Square", "Line", "LineGrad", "LineGradX", "NonConvex1", "NonConvex2")
+SHAPES = (
+    "Circle",
+    "Square",
+    "Line",
+    "LineGrad",
+    "LineGradX",
+    "NonConvex1",
+    "NonConvex2",
+)
 FACTORS = (0.5, 1.0, 1.5)
 """Tolerances, as shares of the default ones: a result that hangs on luck does not stand this."""
 
@@ -56,14 +64,23 @@ def end_errors(scene: pf.Scene, factors: tuple[float, ...] = FACTORS) -> np.ndar
 def largest_errors(shape: str, kind: str) -> np.ndarray:
     """Largest distance [m] and angle [rad] of the four runs of a shape at all factors."""
     model = MODELS[kind](PUBLISHED_PATCHES[shape]())
-    return np.max([end_errors(scene).max(axis=0) for scene in scenes(shape, model)], axis=0)
+    return np.max(
+        [end_errors(scene).max(axis=0) for scene in scenes(shape, model)], axis=0
+    )
 
 
 def motion_errors(scene: pf.Scene, rtol: float) -> tuple[float, float, int]:
     """Largest distance [m] and angle [rad] from the converged motion, and the number of steps."""
     runs = [pf.simulate(scene, rtol=each) for each in (rtol, CONVERGED)]
-    x, y, theta = (runs[0].histories[n].values - runs[1].histories[n].values for n in ("x", "y", "theta"))
-    return float(np.hypot(x, y).max()), float(np.abs(theta).max()), runs[0].statistics.steps
+    x, y, theta = (
+        runs[0].histories[n].values - runs[1].histories[n].values
+        for n in ("x", "y", "theta")
+    )
+    return (
+        float(np.hypot(x, y).max()),
+        float(np.abs(theta).max()),
+        runs[0].statistics.steps,
+    )
 
 
 def _row(cells: list[str]) -> str:
@@ -79,13 +96,38 @@ def main() -> None:
     print(_row(["", *MODELS]) + "\n" + _row(["---"] * (len(MODELS) + 1)))
     for shape in SHAPES:
         errors = [largest_errors(shape, kind) for kind in MODELS]
-        print(_row([IN_WORDS[shape], *(f"{1e6 * m:.1f} µm, {1e6 * rad:.0f} µrad" for m, rad in errors)]))
+        print(
+            _row(
+                [
+                    IN_WORDS[shape],
+                    *(f"{1e6 * m:.1f} µm, {1e6 * rad:.0f} µrad" for m, rad in errors),
+                ]
+            )
+        )
     kinds = ("distributed", "reduced", "published")
-    print("\n" + _row(["rtol", *(f"{kind}: position, angle | steps" for kind in kinds)]) + "\n" + _row(["---"] * 7))
-    disc = {kind: next(scenes("Circle", MODELS[kind](PUBLISHED_PATCHES["Circle"]()))) for kind in kinds}
+    print(
+        "\n"
+        + _row(["rtol", *(f"{kind}: position, angle | steps" for kind in kinds)])
+        + "\n"
+        + _row(["---"] * 7)
+    )
+    disc = {
+        kind: next(scenes("Circle", MODELS[kind](PUBLISHED_PATCHES["Circle"]())))
+        for kind in kinds
+    }
     for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
         found = [motion_errors(disc[kind], rtol) for kind in kinds]
-        print(_row([f"{rtol:.0e}", *(f"{_length(m)}, {rad:.1e} rad | {steps}" for m, rad, steps in found)]))
+        print(
+            _row(
+                [
+                    f"{rtol:.0e}",
+                    *(
+                        f"{_length(m)}, {rad:.1e} rad | {steps}"
+                        for m, rad, steps in found
+                    ),
+                ]
+            )
+        )
 
 
 if __name__ == "__main__":

@@ -26,7 +26,9 @@ FPS, SLOW, DPI = 20.0, 2.0, 84.0
 DT = 2e-3
 WAYS = {"MuJoCo, noslip solver": Native(noslip=10), "MuJoCo with patches": None}
 LOADS: tuple[Literal[1, 2], ...] = (1, 2)
-CORNERS = 1e3 * np.array([(-0.075, -0.04), (0.075, -0.04), (0.075, 0.04), (-0.075, 0.04)])
+CORNERS = 1e3 * np.array(
+    [(-0.075, -0.04), (0.075, -0.04), (0.075, 0.04), (-0.075, 0.04)]
+)
 MOST = 3.0  # normal force at the end of the scale [N]
 
 
@@ -34,7 +36,9 @@ def truth(load: Literal[1, 2]) -> np.ndarray:
     """Return x, y [m] and the angle [rad] of the plate, by bristles on a fine grid."""
     law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
     model = pf.DistributedModel(pf.ContactPatch.disc(0.01).refined(3), law)
-    data = pf.simulate(in_hand(model, normal_force=in_hand_load(load)), save_every=DT).data
+    data = pf.simulate(
+        in_hand(model, normal_force=in_hand_load(load)), save_every=DT
+    ).data
     return np.stack([data[name] for name in ("x", "y", "theta")], axis=1)
 
 
@@ -47,29 +51,50 @@ def in_mujoco(load: Literal[1, 2], way: Native | None) -> np.ndarray:
 
 def outline(pose: np.ndarray) -> np.ndarray:
     """Return the corners of the plate [mm]."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
+    c = np.cos(pose[2])
+    s = np.sin(pose[2])
     return 1e3 * pose[:2] + CORNERS @ [[c, s], [-s, c]]
 
 
-def draw(axes: Axes, pose: np.ndarray, true: np.ndarray, force: float, colour: str) -> None:
+def draw(
+    axes: Axes, pose: np.ndarray, true: np.ndarray, force: float, colour: str
+) -> None:
     """Draw the plate, the true one as a dashed outline, the pads, the grip and the error."""
     axes.add_patch(Polygon(outline(pose), fc=colour, ec=colour, alpha=0.45))
     axes.add_patch(Polygon(outline(true), fill=False, ec="k", ls="--", lw=1.2))
     axes.add_patch(Circle((0.0, 0.0), 10.0, fc=style.PAD_COLOUR, ec="k", alpha=0.8))
-    axes.annotate("", (88.0, 22.0), (88.0, 44.0), arrowprops={"arrowstyle": "-|>", "color": "0.4"})
+    axes.annotate(
+        "", (88.0, 22.0), (88.0, 44.0), arrowprops={"arrowstyle": "-|>", "color": "0.4"}
+    )
     axes.text(85.0, 33.0, "g", color="0.4", ha="right", va="center")
-    axes.plot([-90.0, -90.0 + 60.0], [-96.0, -96.0], color="0.85", lw=7, solid_capstyle="butt")
-    axes.plot([-90.0, -90.0 + 60.0 * force / MOST], [-96.0, -96.0], color=style.PAD_COLOUR, lw=7, solid_capstyle="butt")
+    axes.plot(
+        [-90.0, -90.0 + 60.0], [-96.0, -96.0], color="0.85", lw=7, solid_capstyle="butt"
+    )
+    axes.plot(
+        [-90.0, -90.0 + 60.0 * force / MOST],
+        [-96.0, -96.0],
+        color=style.PAD_COLOUR,
+        lw=7,
+        solid_capstyle="butt",
+    )
     axes.text(-26.0, -96.0, f"grip {force:.1f} N", va="center", fontsize="small")
     error = 1e3 * float(np.hypot(*(pose - true)[:2]))
-    axes.text(92.0, -96.0, f"off by {error:.1f} mm", ha="right", va="center", weight="bold")
-    axes.set(xlim=(-95.0, 95.0), ylim=(-106.0, 50.0), aspect="equal", xticks=[], yticks=[])
+    axes.text(
+        92.0, -96.0, f"off by {error:.1f} mm", ha="right", va="center", weight="bold"
+    )
+    axes.set(
+        xlim=(-95.0, 95.0), ylim=(-106.0, 50.0), aspect="equal", xticks=[], yticks=[]
+    )
 
 
 def main(folder: Path) -> None:
     """Write the picture; say how far the plates are off in the end, and how large the file is."""
     true = {load: truth(load) for load in LOADS}
-    runs = {(load, name): in_mujoco(load, way) for load in LOADS for name, way in WAYS.items()}
+    runs = {
+        (load, name): in_mujoco(load, way)
+        for load in LOADS
+        for name, way in WAYS.items()
+    }
     rows = np.arange(0, len(true[1]), round(1.0 / (FPS * SLOW * DT)))
     colours = dict(zip(WAYS, (style.OTHER, style.FEW), strict=True))
 
@@ -96,7 +121,9 @@ def main(folder: Path) -> None:
         write_frames(path, file, frame, len(rows), FPS)
     for (load, name), run in runs.items():
         off = (run - true[load])[-1]
-        print(f"load {load}, {name}: {1e3 * np.hypot(*off[:2]):.1f} mm, {np.degrees(off[2]):.2f} degrees")
+        print(
+            f"load {load}, {name}: {1e3 * np.hypot(*off[:2]):.1f} mm, {np.degrees(off[2]):.2f} degrees"
+        )
     check_size(path)
 
 

@@ -50,8 +50,12 @@ MODELS: dict[str, tuple[Callable[[pf.ContactPatch], Any], str]] = {
 }
 """Models by the words of the tables: how they are made, and their colour."""
 
-PRICED: dict[str, Callable[[pf.ContactPatch], Any]] = {name: make for name, (make, _) in MODELS.items()}
-PRICED |= {f"{n} discs": discs(n) for n in COUNTS} | {"a disc a cell": lambda patch: discs(patch.cells)(patch)}
+PRICED: dict[str, Callable[[pf.ContactPatch], Any]] = {
+    name: make for name, (make, _) in MODELS.items()
+}
+PRICED |= {f"{n} discs": discs(n) for n in COUNTS} | {
+    "a disc a cell": lambda patch: discs(patch.cells)(patch)
+}
 """Models whose steps are timed."""
 
 SEEDS = 10
@@ -73,13 +77,25 @@ def _beside(x: float, y: float) -> float:
 
 SHAPES: dict[str, Callable[[], pf.ContactPatch]] = {
     "disc": lambda: pf.ContactPatch.disc(0.01),
-    "soft fingertip": lambda: pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=0.0)),
+    "soft fingertip": lambda: pf.ContactPatch.disc(
+        0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=0.0)
+    ),
     "edge load": lambda: pf.ContactPatch.disc(0.01, pressure=_beside),
-    "T": lambda: _masked(" ".join(["#" * 20] * 4 + ["." * 8 + "#" * 4 + "." * 8] * 16), 1e-3, "T"),
-    "L": lambda: _masked(" ".join(["#" * 4 + "." * 16] * 16 + ["#" * 20] * 4), 1e-3, "L"),
+    "T": lambda: _masked(
+        " ".join(["#" * 20] * 4 + ["." * 8 + "#" * 4 + "." * 8] * 16), 1e-3, "T"
+    ),
+    "L": lambda: _masked(
+        " ".join(["#" * 4 + "." * 16] * 16 + ["#" * 20] * 4), 1e-3, "L"
+    ),
     "line": lambda: pf.ContactPatch.line(0.02, 41),
-    "narrow pads": lambda: _masked(" ".join(["##" + "." * 26 + "##"] * 10), 1e-3, "narrow pads"),
-    "unequal pads": lambda: _masked(" ".join(["#" * 6 + "." * 16 + "##"] * 2 + ["#" * 6 + "." * 18] * 4), 1e-3, "pads"),
+    "narrow pads": lambda: _masked(
+        " ".join(["##" + "." * 26 + "##"] * 10), 1e-3, "narrow pads"
+    ),
+    "unequal pads": lambda: _masked(
+        " ".join(["#" * 6 + "." * 16 + "##"] * 2 + ["#" * 6 + "." * 18] * 4),
+        1e-3,
+        "pads",
+    ),
 }
 
 RAMPS, TOP, SLIPPED = (0.01, 0.1, 1.0), 1.35, 1e-5
@@ -95,22 +111,34 @@ SHAKEN = ("disc", "T", "L", "line", "narrow pads")
 
 def wrench_at_limit(patch: pf.ContactPatch, rng: np.random.Generator) -> np.ndarray:
     """Draw a load `[3]` about the centre of pressure on the limit surface of mu_s."""
-    height, angle = rng.uniform(-0.9, 0.9), rng.uniform(0.0, 2.0 * np.pi)
-    flat, centre = math.sqrt(1.0 - height**2), patch.centre_of_pressure()
-    vx, vy, omega = flat * math.cos(angle), flat * math.sin(angle), height / patch.contact_radius()
-    fx, fy, tau = -pf.LimitSurfaceCells(patch).wrench((vx + omega * centre[1], vy - omega * centre[0], omega))
+    height = rng.uniform(-0.9, 0.9)
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    flat = math.sqrt(1.0 - height**2)
+    centre = patch.centre_of_pressure()
+    vx = flat * math.cos(angle)
+    vy = flat * math.sin(angle)
+    omega = height / patch.contact_radius()
+    fx, fy, tau = -pf.LimitSurfaceCells(patch).wrench(
+        (vx + omega * centre[1], vy - omega * centre[0], omega)
+    )
     return LAW.mu_s * LOAD * np.array([fx, fy, tau - centre[0] * fy + centre[1] * fx])
 
 
-def moved(model: Any, body: pf.Body, times: np.ndarray, wrenches: np.ndarray, **options: Any) -> Any:
+def moved(
+    model: Any, body: pf.Body, times: np.ndarray, wrenches: np.ndarray, **options: Any
+) -> Any:
     """Simulate a body whose centre of mass is the centre of pressure under wrenches `[T, 3]`; its motion."""
     centre = model.patch.centre_of_pressure()
     contact = pf.Contact(model, LOAD, position=tuple(-centre))
     force = pf.Signal.sampled(times, wrenches, "linear")
-    return pf.simulate(pf.Scene(body, [contact], times[-1], force=force), **options).data
+    return pf.simulate(
+        pf.Scene(body, [contact], times[-1], force=force), **options
+    ).data
 
 
-def load_of_slip(model: Any, patch: pf.ContactPatch, wrench: np.ndarray, ramp: float) -> float:
+def load_of_slip(
+    model: Any, patch: pf.ContactPatch, wrench: np.ndarray, ramp: float
+) -> float:
     """Return the share of `wrench` at which the patch slips while it grows within `ramp` [s]."""
     gyration = patch.second_moment()
     body = pf.Body(0.1, 0.4 * gyration, gravity=(0.0, 0.0))
@@ -118,17 +146,24 @@ def load_of_slip(model: Any, patch: pf.ContactPatch, wrench: np.ndarray, ramp: f
                  rtol=1e-6, atol=1e-9, save_every=ramp / 4000)  # fmt: skip
     share = TOP * data.time.values / ramp
     bent = np.outer(share, wrench / [1.0, 1.0, gyration]) / (LAW.sigma_0 * LOAD)
-    x, y, theta = (data[name].values - data[name].values[0] for name in ("x", "y", "theta"))
-    off = np.hypot(x - bent[:, 0], y - bent[:, 1]) + math.sqrt(gyration) * np.abs(theta - bent[:, 2])
+    x, y, theta = (
+        data[name].values - data[name].values[0] for name in ("x", "y", "theta")
+    )
+    off = np.hypot(x - bent[:, 0], y - bent[:, 1]) + math.sqrt(gyration) * np.abs(
+        theta - bent[:, 2]
+    )
     first = int(np.argmax(off > SLIPPED))
     if off[first] <= SLIPPED:
         raise ValueError(f"no slip of {patch.name} in {ramp} s")
-    return float(np.interp(SLIPPED, off[first - 1 : first + 1], share[first - 1 : first + 1]))
+    return float(
+        np.interp(SLIPPED, off[first - 1 : first + 1], share[first - 1 : first + 1])
+    )
 
 
 def breakaway(shape: str) -> dict[str, list[float]]:
     """Return by model the load of slip over that of finer cells, less one, for two loads and all ramps."""
-    patch, rng = SHAPES[shape](), np.random.default_rng([25, *shape.encode()])
+    patch = SHAPES[shape]()
+    rng = np.random.default_rng([25, *shape.encode()])
     fine = patch.refined(3) if (patch.cell_extents() > 0.0).any() else patch
     models = {name: make(patch) for name, (make, _) in MODELS.items()}
     found: dict[str, list[float]] = {name: [] for name in models}
@@ -136,25 +171,40 @@ def breakaway(shape: str) -> dict[str, list[float]]:
         for ramp in RAMPS:
             truth = load_of_slip(pf.DistributedModel(fine, LAW), patch, wrench, ramp)
             for name, model in models.items():
-                found[name].append(load_of_slip(model, patch, wrench, ramp) / truth - 1.0)
+                found[name].append(
+                    load_of_slip(model, patch, wrench, ramp) / truth - 1.0
+                )
     return found
 
 
 def two_pads(name: str) -> dict[str, float]:
     """Return the least grips of two pads over their `holding_load`, and the slip [m] at 1.02 of it."""
     patch = PUBLISHED_PATCHES["NonConvex1"]()
-    centre, model, mass, beside = patch.centre_of_pressure(), MODELS[name][0](patch), 0.1, 0.025
+    centre = patch.centre_of_pressure()
+    model = MODELS[name][0](patch)
+    mass = 0.1
+    beside = 0.025
     load = (0.0, -9.81 * mass, -9.81 * mass * (beside + centre[0]))
     slow = pf.planning.holding_load(load, patch, LAW.mu_s)
     inertia = mass * ((0.15**2 + 0.08**2) / 12.0 + (beside + centre[0]) ** 2)
     least = {
-        f"{1e3 * ramp:g} ms": pf.planning.dynamic_holding_load(load, model, ramp=ramp, mass=mass, inertia=inertia)
+        f"{1e3 * ramp:g} ms": pf.planning.dynamic_holding_load(
+            load, model, ramp=ramp, mass=mass, inertia=inertia
+        )
         / slow
         for ramp in (0.0, 0.01, 0.1)
     }
-    grip = pf.Signal.sampled([0.0, 0.31, 0.50], np.array([1.38, 1.0, 1.38]) * 1.02 * slow)
-    data = pf.simulate(pf.scenes.in_hand(model, centre_of_mass=(beside + centre[0], centre[1]), normal_force=grip)).data
-    return least | {"slip": float(np.hypot(data.x[-1] - data.x[0], data.y[-1] - data.y[0]))}
+    grip = pf.Signal.sampled(
+        [0.0, 0.31, 0.50], np.array([1.38, 1.0, 1.38]) * 1.02 * slow
+    )
+    data = pf.simulate(
+        pf.scenes.in_hand(
+            model, centre_of_mass=(beside + centre[0], centre[1]), normal_force=grip
+        )
+    ).data
+    return least | {
+        "slip": float(np.hypot(data.x[-1] - data.x[0], data.y[-1] - data.y[0]))
+    }
 
 
 def driven(shape: str) -> dict[str, list[list[float]]]:
@@ -164,20 +214,31 @@ def driven(shape: str) -> dict[str, list[list[float]]]:
     models |= {"a disc a cell": discs(patch.cells)(patch), "all cells": pf.DistributedModel(patch, LAW),
                "published": pf.ReducedModelPublished(patch, LAW)}  # fmt: skip
     found = few.driven(patch, models, few.stopping, SEEDS)
-    return {name: [[float(each[0]), float(each[2])] for each in errors] for name, errors in found.items()}
+    return {
+        name: [[float(each[0]), float(each[2])] for each in errors]
+        for name, errors in found.items()
+    }
 
 
 def prices(steps: int = 20_000, rounds: int = 9) -> dict[str, dict[str, float]]:
     """Return by model its states, and the times of a rollout and of its gradient over the published model's."""
-    twists, loads = mixed_twists(steps), np.full(steps, 2.0)
-    models = {name: make(PUBLISHED_PATCHES["Circle"]()) for name, make in PRICED.items()}
+    twists = mixed_twists(steps)
+    loads = np.full(steps, 2.0)
+    models = {
+        name: make(PUBLISHED_PATCHES["Circle"]()) for name, make in PRICED.items()
+    }
 
     def gradient(model: Any) -> None:
         _, wrenches, states = rollout_states(model, model.rest(), twists, loads, 1e-4)
         rollout_vjp(model, model.rest(), twists, loads, 1e-4, wrenches, states=states)
 
-    works = {"step": lambda model: rollout(model, model.rest(), twists, loads, 1e-4), "gradient": gradient}
-    times: dict[str, dict[str, list[float]]] = {name: {work: [] for work in works} for name in models}
+    works = {
+        "step": lambda model: rollout(model, model.rest(), twists, loads, 1e-4),
+        "gradient": gradient,
+    }
+    times: dict[str, dict[str, list[float]]] = {
+        name: {work: [] for work in works} for name in models
+    }
     for turn in range(-1, rounds):  # the first compiles
         for name, model in models.items():
             for work, done in works.items():
@@ -187,7 +248,10 @@ def prices(steps: int = 20_000, rounds: int = 9) -> dict[str, dict[str, float]]:
                     times[name][work].append(time.process_time() - begin)
     return {
         name: {"states": float(np.prod(models[name].state_shape))}
-        | {work: float(np.median(np.divide(own[work], times["published"][work]))) for work in works}
+        | {
+            work: float(np.median(np.divide(own[work], times["published"][work])))
+            for work in works
+        }
         | {"ns": float(np.median(own["step"])) / steps * 1e9}
         for name, own in times.items()
     }
@@ -197,8 +261,12 @@ def shaken(shape: str, level: float) -> dict[str, float]:
     """Return by model the creep per cycle [m] over the last ten seconds of a contact that is shaken and holds."""
     patch = SHAPES[shape]()
     t = np.arange(0.0, T_END + 0.0025, 0.005)
-    grown, phase, r = np.minimum(t / 0.3, 1.0), 2.0 * np.pi * t / CYCLE, patch.contact_radius()
-    fx, fy, spin = 0.43 + 0.32 * np.sin(phase), 0.27 * np.cos(phase), 0.27 + 0.32 * np.cos(phase + 0.6)
+    grown = np.minimum(t / 0.3, 1.0)
+    phase = 2.0 * np.pi * t / CYCLE
+    r = patch.contact_radius()
+    fx = 0.43 + 0.32 * np.sin(phase)
+    fy = 0.27 * np.cos(phase)
+    spin = 0.27 + 0.32 * np.cos(phase + 0.6)
     wrenches = LOAD * grown[:, None] * np.stack([fx, fy, r * spin], axis=1)
     wrenches *= level / highest_level(patch, wrenches[100:300])
     makes = {name: make for name, (make, _) in MODELS.items()}
@@ -206,8 +274,11 @@ def shaken(shape: str, level: float) -> dict[str, float]:
     found = {}
     for name, make in makes.items():
         body = pf.Body(1.0, 12.5 * patch.second_moment() * 2.0, gravity=(0.0, 0.0))
-        data = moved(make(patch), body, t, wrenches, rtol=1e-6, atol=1e-7, save_every=CYCLE)
-        times, own = data.time.values, np.stack([data.x.values, data.y.values, r * data.theta.values])
+        data = moved(
+            make(patch), body, t, wrenches, rtol=1e-6, atol=1e-7, save_every=CYCLE
+        )
+        times = data.time.values
+        own = np.stack([data.x.values, data.y.values, r * data.theta.values])
         for first, last in ((LAST - 10.0, LAST), (LAST, T_END)):
             span = (times > first) & (times <= last)
             speeds = [np.polyfit(times[span], each[span], 1)[0] for each in own]
@@ -217,8 +288,11 @@ def shaken(shape: str, level: float) -> dict[str, float]:
 
 def highest_level(patch: pf.ContactPatch, wrenches: np.ndarray) -> float:
     """Return the largest share of wrenches about the centre of pressure in the limit surface of mu_s."""
-    surface, (x, y) = pf.LimitSurfaceTable(patch), patch.centre_of_pressure()
-    about = wrenches + np.outer(wrenches[:, 1] * x - wrenches[:, 0] * y, [0.0, 0.0, 1.0])
+    surface = pf.LimitSurfaceTable(patch)
+    (x, y) = patch.centre_of_pressure()
+    about = wrenches + np.outer(
+        wrenches[:, 1] * x - wrenches[:, 0] * y, [0.0, 0.0, 1.0]
+    )
     twists = [surface.twist(-wrench) for wrench in about]
     return max(
         float(wrench @ twist / (surface.dissipation(twist) * LAW.mu_s * LOAD))
@@ -233,12 +307,37 @@ Rows = list[list[str]]
 
 def table_of_models(kept: dict[str, Any]) -> Rows:
     """Rows: states, prices, errors of the load of slip over shapes and ramps, and the slip of two pads, by model."""
-    rows = [["model", "states", "step", "gradient", "load of slip: median error", "largest error", "slip of two pads"]]
+    rows = [
+        [
+            "model",
+            "states",
+            "step",
+            "gradient",
+            "load of slip: median error",
+            "largest error",
+            "slip of two pads",
+        ]
+    ]
     for name in MODELS:
-        price, slip = kept["prices"][name], 1e3 * kept[f"two pads {name}"]["slip"]
-        errors = 100 * np.abs(np.concatenate([kept[f"breakaway {shape}"][name] for shape in SHAPES]))
-        cost = (f"{price['states']:.0f}", f"{price['step']:.1f}", f"{price['gradient']:.1f}")
-        rows.append([name, *cost, f"{np.median(errors):.3f} %", f"{errors.max():.2f} %", f"{slip:.1f} mm"])
+        price = kept["prices"][name]
+        slip = 1e3 * kept[f"two pads {name}"]["slip"]
+        errors = 100 * np.abs(
+            np.concatenate([kept[f"breakaway {shape}"][name] for shape in SHAPES])
+        )
+        cost = (
+            f"{price['states']:.0f}",
+            f"{price['step']:.1f}",
+            f"{price['gradient']:.1f}",
+        )
+        rows.append(
+            [
+                name,
+                *cost,
+                f"{np.median(errors):.3f} %",
+                f"{errors.max():.2f} %",
+                f"{slip:.1f} mm",
+            ]
+        )
     return rows
 
 
@@ -257,12 +356,29 @@ def table_of_creep(kept: dict[str, Any]) -> Rows:
 
 def table_of_cells(kept: dict[str, Any]) -> Rows:
     """Rows: states, price and errors of driven motions, by number of discs."""
-    rows = [["discs", "states", "step", "largest error of the force: median run", "worst run", "rms, median run"]]
+    rows = [
+        [
+            "discs",
+            "states",
+            "step",
+            "largest error of the force: median run",
+            "worst run",
+            "rms, median run",
+        ]
+    ]
     for name in (*map(str, COUNTS), "a disc a cell", "all cells", "published"):
         price = kept["prices"].get(name) or kept["prices"][f"{name} discs"]
-        runs = [np.array(kept[f"driven {shape}"][name]) for shape in few.SHAPES if name in kept[f"driven {shape}"]]
+        runs = [
+            np.array(kept[f"driven {shape}"][name])
+            for shape in few.SHAPES
+            if name in kept[f"driven {shape}"]
+        ]
         largest, rms = 100 * np.concatenate(runs).T
-        words = {str(DEFAULT): f"**{DEFAULT}**", "all cells": "none: a point a cell", "published": "none: published"}
+        words = {
+            str(DEFAULT): f"**{DEFAULT}**",
+            "all cells": "none: a point a cell",
+            "published": "none: published",
+        }
         rows.append([words.get(name, name), f"{price['states']:.0f}", f"{price['step']:.2g}",
                      f"{np.median(largest):.2g} %", f"{largest.max():.2g} %", f"{np.median(rms):.2g} %"])  # fmt: skip
     return rows
@@ -278,31 +394,59 @@ def draw(kept: dict[str, Any]) -> style.PlotFigure:
     for k, (name, (_, colour)) in enumerate(MODELS.items()):
         errors = [100 * np.abs(kept[f"breakaway {shape}"][name]) for shape in SHAPES]
         places = np.repeat(np.arange(len(SHAPES)) + 0.15 * (k - 2.0), len(errors[0]))
-        left.plot(places, np.maximum(np.concatenate(errors), 1e-3), "o", color=colour, ms=3.5, alpha=0.7, label=name)
-        price, worst = kept["prices"][name]["step"], max(each.max() for each in errors)
+        left.plot(
+            places,
+            np.maximum(np.concatenate(errors), 1e-3),
+            "o",
+            color=colour,
+            ms=3.5,
+            alpha=0.7,
+            label=name,
+        )
+        price = kept["prices"][name]["step"]
+        worst = max(each.max() for each in errors)
         right.plot(price, worst, "o", color=colour, ms=8)
     left.set_xticks(range(len(SHAPES)), [shape.replace(" ", "\n") for shape in SHAPES])
     left.set(yscale="log", ylabel="error of the load of slip [%]")
     right.set(xscale="log", xlabel="time of a step / published model's")
     right.set_title("largest of all", fontsize="medium", loc="left")
     right.annotate(
-        "better", (0.06, 0.06), (0.2, 0.16), xycoords="axes fraction", color="0.4", arrowprops={"arrowstyle": "->"}
+        "better",
+        (0.06, 0.06),
+        (0.2, 0.16),
+        xycoords="axes fraction",
+        color="0.4",
+        arrowprops={"arrowstyle": "->"},
     )
     for axes in (left, right):
         style.tidy(axes)
-    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=len(MODELS), frameon=False)
+    figure.legend(
+        *left.get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=len(MODELS),
+        frameon=False,
+    )
     return figure
 
 
 def measures() -> Iterator[tuple[str, Callable[[], Any]]]:
     """Yield each measurement by the key under which it is kept."""
-    yield from ((f"breakaway {shape}", lambda shape=shape: breakaway(shape)) for shape in SHAPES)
-    yield from ((f"two pads {name}", lambda name=name: two_pads(name)) for name in MODELS)
+    yield from (
+        (f"breakaway {shape}", lambda shape=shape: breakaway(shape)) for shape in SHAPES
+    )
+    yield from (
+        (f"two pads {name}", lambda name=name: two_pads(name)) for name in MODELS
+    )
     yield "prices", prices
-    yield from ((f"driven {shape}", lambda shape=shape: driven(shape)) for shape in few.SHAPES)
+    yield from (
+        (f"driven {shape}", lambda shape=shape: driven(shape)) for shape in few.SHAPES
+    )
     for level in LEVELS:
         for shape in SHAKEN:
-            yield f"shaken {shape} {level}", lambda shape=shape, level=level: shaken(shape, level)
+            yield (
+                f"shaken {shape} {level}",
+                lambda shape=shape, level=level: shaken(shape, level),
+            )
 
 
 def with_tables(page: str, kept: dict[str, Any]) -> str:
@@ -311,7 +455,11 @@ def with_tables(page: str, kept: dict[str, Any]) -> str:
     def written(found: re.Match[str]) -> str:
         rows = TABLES[found["name"]](kept)
         lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
-        return f"<!-- breakaway: {found['name']} -->\n\n" + "".join(f"| {' | '.join(row)} |\n" for row in lines) + "\n"
+        return (
+            f"<!-- breakaway: {found['name']} -->\n\n"
+            + "".join(f"| {' | '.join(row)} |\n" for row in lines)
+            + "\n"
+        )
 
     return MARK.sub(written, page)
 

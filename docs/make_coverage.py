@@ -19,7 +19,16 @@ from planarfriction.identify import FitOptions, Log, identify_lugre
 PAGE = Path(__file__).parent / "identification.md"
 MARK = re.compile(r"<!-- coverage -->\n\n(?:\|.*\n)+")
 
-NAMES = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
+NAMES = (
+    "mu_c",
+    "mu_s",
+    "v_s",
+    "gamma",
+    "sigma_0",
+    "sigma_1",
+    "sigma_2",
+    "contact_radius",
+)
 
 LAW = pf.LuGre(
     mu_c=0.5,
@@ -58,7 +67,9 @@ ROWS = {
     "bias": Row("offset of 3 % on each wrench channel", "reduced-published", bias=0.03),
     "twist": Row("1 % noise on the twist", "reduced-published", twist_noise=0.01),
     "distributed": Row("distributed model, same disc", "distributed"),
-    "rim": Row("pressure at the rim, a uniform disc is fitted", "distributed", rim_heavy=True),
+    "rim": Row(
+        "pressure at the rim, a uniform disc is fitted", "distributed", rim_heavy=True
+    ),
 }
 
 
@@ -78,16 +89,38 @@ def truth(row: Row) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, float
     time = np.arange(round(DURATION * RATE) * FINER) / (RATE * FINER)
     grown = np.minimum(1.0, 1.2 * np.exp(3.5 * (time / time[-1] - 1.0)))
     vx = 0.03 * grown * np.sin(2 * np.pi * 2.3 * time)
-    vy = 0.02 * grown * np.sin(2 * np.pi * 1.7 * time + 1.0) * np.minimum(1.0, 5.0 * time)
+    vy = (
+        0.02
+        * grown
+        * np.sin(2 * np.pi * 1.7 * time + 1.0)
+        * np.minimum(1.0, 5.0 * time)
+    )
     twist = np.stack([vx, vy, 2.0 * grown * np.sin(2 * np.pi * 3.1 * time)], -1)
     patch = DISC
     if row.rim_heavy:
-        patch = pf.ContactPatch(DISC.positions, DISC.areas, 0.2 + (np.linalg.norm(DISC.positions, axis=1) / 0.01) ** 4)
-    model = pf.DistributedModel(patch, LAW) if row.model == "distributed" else pf.ReducedModelPublished(patch, LAW)
+        patch = pf.ContactPatch(
+            DISC.positions,
+            DISC.areas,
+            0.2 + (np.linalg.norm(DISC.positions, axis=1) / 0.01) ** 4,
+        )
+    model = (
+        pf.DistributedModel(patch, LAW)
+        if row.model == "distributed"
+        else pf.ReducedModelPublished(patch, LAW)
+    )
     steps = pf.rollout(model, None, 0.5 * (twist[1:] + twist[:-1]), LOAD, time[1])
     values = {name: getattr(LAW, name) for name in NAMES[:-1]}
-    radius = model.surface.contact_radius if isinstance(model, pf.ReducedModelPublished) else patch.contact_radius()
-    return time, twist, np.vstack([np.zeros(3), steps.wrenches]), {**values, "contact_radius": float(radius)}
+    radius = (
+        model.surface.contact_radius
+        if isinstance(model, pf.ReducedModelPublished)
+        else patch.contact_radius()
+    )
+    return (
+        time,
+        twist,
+        np.vstack([np.zeros(3), steps.wrenches]),
+        {**values, "contact_radius": float(radius)},
+    )
 
 
 def observed(row: Row, made: tuple, seed: int) -> Log:
@@ -95,8 +128,11 @@ def observed(row: Row, made: tuple, seed: int) -> Log:
     time, twist, wrench, _ = made
     random = np.random.default_rng(seed)
     late = round(row.delay / time[1])
-    wrench = np.vstack([np.repeat(wrench[:1], late, axis=0), wrench[: len(wrench) - late]])[::FINER]
-    time, twist = time[::FINER], twist[::FINER]
+    wrench = np.vstack(
+        [np.repeat(wrench[:1], late, axis=0), wrench[: len(wrench) - late]]
+    )[::FINER]
+    time = time[::FINER]
+    twist = twist[::FINER]
     size = np.sqrt(np.mean(wrench**2, axis=0))
     wrench = wrench + SHARE * size * random.standard_normal(wrench.shape)
     wrench = wrench + row.bias * size * random.choice([-1.0, 1.0], 3)
@@ -107,11 +143,14 @@ def observed(row: Row, made: tuple, seed: int) -> Log:
 
 def counted(row: Row, made: tuple, seed: int, count: Count) -> None:
     """Fit one log and count."""
-    found = identify_lugre(observed(row, made, seed), DISC, model=row.model, options=FitOptions(starts=1))
+    found = identify_lugre(
+        observed(row, made, seed), DISC, model=row.model, options=FitOptions(starts=1)
+    )
     count.seeds += 1
     count.rejected += found.scores[0].rejected
     for name, (low, high) in found.intervals().items():
-        inside, told = low <= made[3][name] <= high, found.identifiable(name)
+        inside = low <= made[3][name] <= high
+        told = found.identifiable(name)
         count.inside[name] += inside
         count.told[name] += told
         count.inside_told[name] += inside and told
@@ -119,11 +158,21 @@ def counted(row: Row, made: tuple, seed: int, count: Count) -> None:
 
 def table(counts: dict[str, Count]) -> str:
     """Rows of the page: one for each kind of data."""
-    lines = ["| data | fitted model | intervals that contain the truth | rejected |", "|---|---|---|---|"]
+    lines = [
+        "| data | fitted model | intervals that contain the truth | rejected |",
+        "|---|---|---|---|",
+    ]
     for name, count in counts.items():
-        row, told = ROWS[name], sum(count.told.values())
-        share = f"{sum(count.inside_told.values())} of {told}" if told else "none identifiable"
-        lines.append(f"| {row.words} | {row.model} | {share} | {count.rejected} of {count.seeds} |")
+        row = ROWS[name]
+        told = sum(count.told.values())
+        share = (
+            f"{sum(count.inside_told.values())} of {told}"
+            if told
+            else "none identifiable"
+        )
+        lines.append(
+            f"| {row.words} | {row.model} | {share} | {count.rejected} of {count.seeds} |"
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -136,7 +185,8 @@ def main() -> None:
     options = parser.parse_args()
     kept = json.loads(options.kept.read_text()) if options.kept.exists() else {}
     for name in options.rows.split(","):
-        count, made = Count(**kept.get(name, {})), truth(ROWS[name])
+        count = Count(**kept.get(name, {}))
+        made = truth(ROWS[name])
         while count.seeds < options.seeds:
             counted(ROWS[name], made, count.seeds, count)
             kept[name] = vars(count)
@@ -144,7 +194,10 @@ def main() -> None:
         print(name, count.rejected, count.told, count.inside, flush=True)
     counts = {name: Count(**kept[name]) for name in ROWS if name in kept}
     text = PAGE.read_text(encoding="utf-8")
-    PAGE.write_text(MARK.sub(lambda found: f"<!-- coverage -->\n\n{table(counts)}", text), encoding="utf-8")
+    PAGE.write_text(
+        MARK.sub(lambda found: f"<!-- coverage -->\n\n{table(counts)}", text),
+        encoding="utf-8",
+    )
 
 
 if __name__ == "__main__":

@@ -59,11 +59,20 @@ WATCH = """() => {
 def opened(width: int = 1280, height: int = 960) -> Iterator[Page]:
     """The page of an explorer in a browser without a window."""
     command = [sys.executable, "-c", COMMAND, "explore", "--no-browser"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server, sync_playwright() as driver:
+    with (
+        subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server,
+        sync_playwright() as driver,
+    ):
         try:
             assert server.stderr is not None
-            address = next(found[0] for line in server.stderr if (found := re.search(r"http://localhost:\d+", line)))
-            browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=GRAPHICS)
+            address = next(
+                found[0]
+                for line in server.stderr
+                if (found := re.search(r"http://localhost:\d+", line))
+            )
+            browser = driver.chromium.launch(
+                executable_path=shutil.which("chromium"), args=GRAPHICS
+            )
             page = browser.new_page(viewport={"width": width, "height": height})
             page.goto(address)
             page.locator("#answer").wait_for(timeout=60_000)
@@ -108,9 +117,13 @@ def times() -> None:
             page.wait_for_timeout(3000)
             page.evaluate(WATCH)
             taken, server = drag(page)
-        assert len(taken) > 0.9 * MOVES, f"only {len(taken)} of {MOVES} moves were answered"
+        assert len(taken) > 0.9 * MOVES, (
+            f"only {len(taken)} of {MOVES} moves were answered"
+        )
         shares.append(np.percentile(taken, (50, 95)))
-        print(f"{name}: pointer to numbers {shares[-1].round()}, server {np.percentile(server, (50, 95)).round()} ms")
+        print(
+            f"{name}: pointer to numbers {shares[-1].round()}, server {np.percentile(server, (50, 95)).round()} ms"
+        )
     median, most = np.max(shares, axis=0)
     words = (
         f"The numbers follow the pointer after {median:.0f} ms (median; 95 % within {most:.0f} ms),\n"
@@ -124,12 +137,15 @@ def times() -> None:
 
 def drag(page: Page) -> tuple[list[float], list[float]]:
     """Times [ms] from pointer to numbers, and those in which the server found them, in one drag of `MOVES` moves."""
-    taken, server = [], []
+    taken = []
+    server = []
     angles = 2.0 * np.pi * np.arange(MOVES) / 40
     page.mouse.move(*place(page, 5.0, 0.0))
     page.mouse.down()
     for radius, angle in zip(np.linspace(2.0, 8.0, MOVES), angles, strict=True):
-        there = place(page, float(radius * np.cos(angle)), float(radius * np.sin(angle)))
+        there = place(
+            page, float(radius * np.cos(angle)), float(radius * np.sin(angle))
+        )
         page.evaluate("begin()")
         page.mouse.move(*there)
         found = page.evaluate("taken()")

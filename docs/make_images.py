@@ -27,15 +27,23 @@ LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 def fingertip() -> pf.ContactPatch:
     """A made-up measured pressure map: a fingertip that presses harder with one side, 24 x 16 cells of 1 mm."""
     y, x = np.mgrid[0:16, 0:24] - np.array([7.5, 11.5])[:, None, None]
-    pressure = np.clip(1.0 - (x / 11.0) ** 2 - (y / 7.0) ** 2, 0.0, None) ** 0.5 * (1.0 + 0.045 * x - 0.04 * y)
+    pressure = np.clip(1.0 - (x / 11.0) ** 2 - (y / 7.0) ** 2, 0.0, None) ** 0.5 * (
+        1.0 + 0.045 * x - 0.04 * y
+    )
     return pf.ContactPatch.from_pressure(pressure, cell_size=1e-3, name="fingertip")
 
 
 def figures() -> dict[str, plots.style.PlotFigure]:
     """The figures by the names of their files."""
-    circle, pads = PUBLISHED_PATCHES["Circle"](), replace(PUBLISHED_PATCHES["NonConvex1"](), name="two pads")
-    models = {"distributed": pf.DistributedModel(circle, LAW), "reduced": pf.ReducedModel(circle, LAW)}
-    in_hand = {name: pf.simulate(pf.scenes.in_hand(model)) for name, model in models.items()}
+    circle = PUBLISHED_PATCHES["Circle"]()
+    pads = replace(PUBLISHED_PATCHES["NonConvex1"](), name="two pads")
+    models = {
+        "distributed": pf.DistributedModel(circle, LAW),
+        "reduced": pf.ReducedModel(circle, LAW),
+    }
+    in_hand = {
+        name: pf.simulate(pf.scenes.in_hand(model)) for name, model in models.items()
+    }
     return {
         "in-hand-motion": plots.plot_motion(in_hand["distributed"]),
         "in-hand-histories": plots.plot_histories(in_hand),
@@ -54,14 +62,28 @@ def discs() -> plots.style.PlotFigure:
     figure = plots.style.new_figure(9.0, 3.3)
     circle, tee = (PUBLISHED_PATCHES[name]() for name in ("Circle", "NonConvex2"))
     patches = {"a disc": circle, "a T": tee, "a fingertip": fingertip()}
-    for axes, (words, patch) in zip(figure.subplots(1, 3), patches.items(), strict=True):
+    for axes, (words, patch) in zip(
+        figure.subplots(1, 3), patches.items(), strict=True
+    ):
         few = patch.discs(pf.ReducedModel.cells)
         axes.plot(*1e3 * patch.positions.T, ".", color="0.6", ms=1.5)
         shares = few.weights() / few.weights().max()
-        for centre, radius, share in zip(1e3 * few.positions, 1e3 * few.radii, shares, strict=True):
-            axes.add_patch(Circle(centre, radius, color=plots.style.OF_MODEL["reduced"], alpha=0.6 * share, lw=0.0))
+        for centre, radius, share in zip(
+            1e3 * few.positions, 1e3 * few.radii, shares, strict=True
+        ):
+            axes.add_patch(
+                Circle(
+                    centre,
+                    radius,
+                    color=plots.style.OF_MODEL["reduced"],
+                    alpha=0.6 * share,
+                    lw=0.0,
+                )
+            )
             axes.add_patch(Circle(centre, radius, fill=False, color="0.3", lw=0.6))
-        axes.set_title(f"{words}: {few.cells} discs for {patch.cells} cells", fontsize="medium")
+        axes.set_title(
+            f"{words}: {few.cells} discs for {patch.cells} cells", fontsize="medium"
+        )
         axes.set(aspect="equal", xticks=(), yticks=(), xlim=(-12, 12), ylim=(-12, 12))
         axes.spines[:].set_visible(False)
     return figure
@@ -71,16 +93,35 @@ def motions() -> plots.style.PlotFigure:
     """A pad that slides, turns about a point inside and spins: friction of each cell, and all of it together."""
     pad = pf.ContactPatch.rectangle(0.03, 0.02, cells=12)
     figure = plots.style.new_figure(9.0, 2.7)
-    twists = {"it slides": (1.0, 0.0, 0.0), "it turns about the cross": (0.008, 0.0, 1.0), "it spins": (0.0, 0.0, 1.0)}
-    for axes, (words, (vx, _, omega)) in zip(figure.subplots(1, 3), twists.items(), strict=True):
+    twists = {
+        "it slides": (1.0, 0.0, 0.0),
+        "it turns about the cross": (0.008, 0.0, 1.0),
+        "it spins": (0.0, 0.0, 1.0),
+    }
+    for axes, (words, (vx, _, omega)) in zip(
+        figure.subplots(1, 3), twists.items(), strict=True
+    ):
         x, y = 1e3 * pad.positions.T
         velocity = np.stack([vx - 1e-3 * omega * y, 1e-3 * omega * x])
         away = -velocity / np.linalg.norm(velocity, axis=0)
-        axes.quiver(x, y, *away, color=plots.style.DISTRIBUTED, scale=17, width=0.006, pivot="mid")
+        axes.quiver(
+            x,
+            y,
+            *away,
+            color=plots.style.DISTRIBUTED,
+            scale=17,
+            width=0.006,
+            pivot="mid",
+        )
         fx, _, tau = pf.LimitSurfaceExact(pad).wrench((vx, 0.0, omega))
-        axes.set_title(f"{words}\nforce {abs(fx):.0%}, torque {abs(tau) / pad.contact_radius():.0%}", fontsize="medium")
+        axes.set_title(
+            f"{words}\nforce {abs(fx):.0%}, torque {abs(tau) / pad.contact_radius():.0%}",
+            fontsize="medium",
+        )
         if omega:
-            axes.plot(0.0, 1e3 * vx / omega, "x", color=plots.style.PUBLISHED, ms=9, mew=2.5)
+            axes.plot(
+                0.0, 1e3 * vx / omega, "x", color=plots.style.PUBLISHED, ms=9, mew=2.5
+            )
         axes.set(aspect="equal", xticks=(), yticks=(), xlim=(-18, 18), ylim=(-11, 11))
         axes.add_patch(Rectangle((-15, -10), 30, 20, fill=False, color="0.6"))
         axes.spines[:].set_visible(False)
@@ -89,7 +130,15 @@ def motions() -> plots.style.PlotFigure:
 
 def bristle() -> plots.style.PlotFigure:
     """Friction of a pad that is pushed from rest until it slides, over its displacement."""
-    law = pf.LuGre(mu_c=0.6, mu_s=0.75, sigma_0=2e4, v_s=5e-3, sigma_1=5.0, sigma_2=0.0, elasto_plastic=0.9)
+    law = pf.LuGre(
+        mu_c=0.6,
+        mu_s=0.75,
+        sigma_0=2e4,
+        v_s=5e-3,
+        sigma_1=5.0,
+        sigma_2=0.0,
+        elasto_plastic=0.9,
+    )
     model = pf.ReducedModel(pf.ContactPatch.disc(0.01), law)
     speeds = 2e-2 * np.linspace(0.0, 1.0, 800) ** 2
     twists = np.stack([speeds, 0.0 * speeds, 0.0 * speeds], axis=-1)
@@ -104,20 +153,38 @@ def bristle() -> plots.style.PlotFigure:
         ("slides: less friction, the faster it is", (120.0, 0.63), (75.0, 0.5)),
     ):
         axes.annotate(words, at, text, arrowprops={"arrowstyle": "->"})
-    axes.set(xlabel="displacement [µm]", ylabel="friction / load", xlim=(0.0, 200.0), ylim=(0.0, 0.85))
+    axes.set(
+        xlabel="displacement [µm]",
+        ylabel="friction / load",
+        xlim=(0.0, 200.0),
+        ylim=(0.0, 0.85),
+    )
     plots.style.tidy(axes)
     return figure
 
 
-def small_cycles(model: pf.ReducedModel | pf.ReducedModelPublished, cycles: int = 20) -> tuple[np.ndarray, np.ndarray]:
+def small_cycles(
+    model: pf.ReducedModel | pf.ReducedModelPublished, cycles: int = 20
+) -> tuple[np.ndarray, np.ndarray]:
     """Force `fx` [N] before each cycle and energy that friction has taken by then [J].
 
     A cycle is a push by 0.1 um, a turn by as much at the contact radius, and the straight way back, at 1 N.
     """
-    leg, steps, dt = 1e-7, 50, 1e-3
-    push, turn = np.array([leg, 0.0, 0.0]), np.array([0.0, 0.0, leg / model.patch.contact_radius()])
-    twists = np.tile(np.repeat(np.array([push, turn, -(push + turn)]) / (steps * dt), steps, axis=0), (cycles, 1))
-    wrenches = np.concatenate([np.zeros((1, 3)), pf.derivatives.rollout(model, None, twists, 1.0, dt).wrenches])
+    leg = 1e-7
+    steps = 50
+    dt = 1e-3
+    push = np.array([leg, 0.0, 0.0])
+    turn = np.array([0.0, 0.0, leg / model.patch.contact_radius()])
+    twists = np.tile(
+        np.repeat(np.array([push, turn, -(push + turn)]) / (steps * dt), steps, axis=0),
+        (cycles, 1),
+    )
+    wrenches = np.concatenate(
+        [
+            np.zeros((1, 3)),
+            pf.derivatives.rollout(model, None, twists, 1.0, dt).wrenches,
+        ]
+    )
     work = -0.5 * np.einsum("ti,ti->t", wrenches[1:] + wrenches[:-1], twists) * dt
     taken = np.concatenate([[0.0], work.cumsum()])
     return wrenches[:: 3 * steps, 0], taken[:: 3 * steps]
@@ -131,7 +198,11 @@ def pre_sliding_cycles() -> plots.style.PlotFigure:
     for kind, mark in ((pf.ReducedModelPublished, ".-"), (pf.ReducedModel, "x-")):
         model = kind(PUBLISHED_PATCHES["Circle"](), law)
         fx, taken = small_cycles(model)
-        look = {"color": plots.style.model_colour(model), "label": kind.__name__, "markersize": 5}
+        look = {
+            "color": plots.style.model_colour(model),
+            "label": kind.__name__,
+            "markersize": 5,
+        }
         force.plot(fx, mark, **look)
         energy.plot(1e9 * taken, mark, **look)
     force.set(xlabel="cycles", ylabel="force left over, fx [N]")
@@ -145,7 +216,9 @@ def pre_sliding_cycles() -> plots.style.PlotFigure:
 def grip_plan() -> plots.style.PlotFigure:
     """The plan of docs/grip-planning.md."""
     model = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01), LAW)
-    plate = pf.scenes.in_hand(model, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=1.0)
+    plate = pf.scenes.in_hand(
+        model, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=1.0
+    )
     return pf.planning.plan_grip(plate, {"angle": np.radians(-30.0)}).plot()
 
 

@@ -35,7 +35,10 @@ MODEL = """<mujoco><option timestep="{dt}" gravity="0 0 0" integrator="implicitf
 
 WAYS = {
     "MuJoCo, frictionloss": (f'frictionloss="{COULOMB}"', ""),
-    "MuJoCo, dcmotor lugre": ("", f'<dcmotor joint="j" motorconst="1" resistance="1e9" lugre="{LUGRE}"/>'),
+    "MuJoCo, dcmotor lugre": (
+        "",
+        f'<dcmotor joint="j" motorconst="1" resistance="1e9" lugre="{LUGRE}"/>',
+    ),
 }
 """Attributes of the joint, and its motor."""
 
@@ -49,8 +52,11 @@ def load(t: float) -> float:
 
 def in_mujoco(joint: str, motor: str) -> np.ndarray:
     """Return the angle [rad] after each step in MuJoCo."""
-    model = mujoco.MjModel.from_xml_string(MODEL.format(dt=DT, inertia=INERTIA, joint=joint, motor=motor))
-    data, angle = mujoco.MjData(model), np.empty(round(T_END / DT))
+    model = mujoco.MjModel.from_xml_string(
+        MODEL.format(dt=DT, inertia=INERTIA, joint=joint, motor=motor)
+    )
+    data = mujoco.MjData(model)
+    angle = np.empty(round(T_END / DT))
     for i in range(len(angle)):
         data.ctrl[-1] = load(data.time)
         mujoco.mj_step(model, data)
@@ -62,8 +68,12 @@ def elasto_plastic() -> np.ndarray:
     """Return the angle [rad] after each step of one elasto-plastic bristle in N m and rad, under the load 1."""
     stiffness, damping, mu_c, mu_s, v_s = map(float, LUGRE.split())
     law = pf.LuGre(mu_c, mu_s, v_s, stiffness, damping, 0.0, elasto_plastic=0.9)
-    body = pf.SlidingBody(INERTIA, 1.0, pf.DistributedModel(pf.ContactPatch.points([[0.0, 0.0]]), law))
-    state, twist, angle = body.rest(), np.zeros(3), np.zeros(round(T_END / DT) + 1)
+    body = pf.SlidingBody(
+        INERTIA, 1.0, pf.DistributedModel(pf.ContactPatch.points([[0.0, 0.0]]), law)
+    )
+    state = body.rest()
+    twist = np.zeros(3)
+    angle = np.zeros(round(T_END / DT) + 1)
     for i in range(len(angle) - 1):
         state, twist, _ = body.step(state, twist, 1.0, DT, (load(i * DT), 0.0, 0.0))
         angle[i + 1] = angle[i] + DT * twist[0]
@@ -72,15 +82,23 @@ def elasto_plastic() -> np.ndarray:
 
 def holds() -> style.PlotFigure:
     """Draw the three angles over time, and print their rates."""
-    runs = {name: in_mujoco(*way) for name, way in WAYS.items()} | {OURS: elasto_plastic()}
+    runs = {name: in_mujoco(*way) for name, way in WAYS.items()} | {
+        OURS: elasto_plastic()
+    }
     each = round(1.0 / (FREQUENCY * DT))
     figure = style.new_figure(6.4, 3.9)
     axes = figure.subplots()
-    colours = dict(zip(runs, (style.PUBLISHED, style.OTHER, style.DISTRIBUTED), strict=True))
+    colours = dict(
+        zip(runs, (style.PUBLISHED, style.OTHER, style.DISTRIBUTED), strict=True)
+    )
     for (name, run), line in zip(runs.items(), style.LINE_STYLES, strict=False):
         swings = run[each - 1 :: each]
         rate = (swings[-1] - swings[len(swings) // 2]) / (T_END / 2.0)
-        words = f"{1e3 * rate:.1f} mrad/s" if rate > 1e-5 else f"below {1e6 * max(abs(rate), 1e-6):.0f} µrad/s"
+        words = (
+            f"{1e3 * rate:.1f} mrad/s"
+            if rate > 1e-5
+            else f"below {1e6 * max(abs(rate), 1e-6):.0f} µrad/s"
+        )
         print(f"{name}: {rate:.3g} rad/s")
         axes.plot(DT * each * np.arange(1, len(swings) + 1), 1e3 * swings, ls=line, color=colours[name], lw=2.2,
                   label=f"{name}: {words}")  # fmt: skip
@@ -96,12 +114,20 @@ def from_torque() -> style.PlotFigure:
     """Draw the fit of a noisy torque with six numbers of LuGre, the example of the page."""
     t = 1e-3 * np.arange(12_000)
     fast = np.clip((t - 8.0) / 2.0, 0.0, 1.0)
-    q = 0.08 * np.sin(1.57 * t) + 0.006 * np.sin(14.5 * t) + 0.8 * fast * np.sin(3.14 * t)
-    true = JointFriction(mu_c=0.8, mu_s=1.2, v_s=0.05, sigma_0=400.0, sigma_1=2.0, sigma_2=0.3)
+    q = (
+        0.08 * np.sin(1.57 * t)
+        + 0.006 * np.sin(14.5 * t)
+        + 0.8 * fast * np.sin(3.14 * t)
+    )
+    true = JointFriction(
+        mu_c=0.8, mu_s=1.2, v_s=0.05, sigma_0=400.0, sigma_1=2.0, sigma_2=0.3
+    )
     speed = np.gradient(q, t)
     torque = 0.05 * np.gradient(speed, t) + true.along(t, speed)
     torque += np.random.default_rng(0).normal(0.0, 0.01, len(t))
-    return identify_joint(JointLog(t, q, torque=torque, name="ripples"), Plant(inertia=0.05)).plot()
+    return identify_joint(
+        JointLog(t, q, torque=torque, name="ripples"), Plant(inertia=0.05)
+    ).plot()
 
 
 def main(folder: Path) -> None:
@@ -109,7 +135,11 @@ def main(folder: Path) -> None:
     from planarfriction_studies.measured.joints import fit_joints
 
     folder.mkdir(parents=True, exist_ok=True)
-    figures = {"joint-torque": from_torque(), "joint-holds": holds(), "joint": fit_joints(progress=print).plot()}
+    figures = {
+        "joint-torque": from_torque(),
+        "joint-holds": holds(),
+        "joint": fit_joints(progress=print).plot(),
+    }
     for name, figure in figures.items():
         figure.savefig(path := folder / f"{name}.png")
         check_size(path)

@@ -26,7 +26,9 @@ def scores(task: str, stored: Mapping[str, Any]) -> list[list[str]]:
 
     A star marks a model whose difference from the reference on the same cases has an interval without zero.
     """
-    measures, rows, minus = TASKS[task].measures, [], stored["minus"]["models"]
+    measures = TASKS[task].measures
+    rows = []
+    minus = stored["minus"]["models"]
     for name, model in stored["models"].items():
         cells = []
         for key in (measure.key for measure in measures):
@@ -38,7 +40,9 @@ def scores(task: str, stored: Mapping[str, Any]) -> list[list[str]]:
             cells.append(f"{found['value']:.2f}{star} [{low:.2f}, {high:.2f}]")
         rows.append([name, *cells])
     for name, means in stored.get("published", {}).items():
-        rows.append([name, *(f"{means[m.key]:.2f}" if m.key in means else "" for m in measures)])
+        rows.append(
+            [name, *(f"{means[m.key]:.2f}" if m.key in means else "" for m in measures)]
+        )
     return [["model", *(measure.heading for measure in measures)], *rows]
 
 
@@ -50,7 +54,10 @@ def differs(difference: list[float]) -> bool:
 
 def markdown(rows: list[list[str]]) -> str:
     """Rows as lines of a page, the first as headings."""
-    return "".join(f"| {' | '.join(row)} |\n" for row in [rows[0], ["---"] * len(rows[0]), *rows[1:]])
+    return "".join(
+        f"| {' | '.join(row)} |\n"
+        for row in [rows[0], ["---"] * len(rows[0]), *rows[1:]]
+    )
 
 
 def with_tables(page: str, tasks: Mapping[str, Any]) -> str:
@@ -65,7 +72,9 @@ def with_tables(page: str, tasks: Mapping[str, Any]) -> str:
 
 def main(folder: Path) -> None:
     """Rewrite the pages and the pictures, and say which."""
-    if not (folder / "measured.json").exists() and planarfriction(["measured", "--out", str(folder)]):
+    if not (folder / "measured.json").exists() and planarfriction(
+        ["measured", "--out", str(folder)]
+    ):
         sys.exit(1)
     tasks = json.loads((folder / "measured.json").read_text(encoding="utf-8"))["tasks"]
     pages = Path(__file__).parent

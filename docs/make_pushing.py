@@ -15,20 +15,34 @@ from planarfriction_studies.measured.scores import drawings, interval, mean
 
 PAGE = Path(__file__).parent / "pushing.md"
 MARK = re.compile(r"<!-- followed pushes -->\n\n(?:\|.*\n)+")
-SURFACES = {"exact surface": pf.LimitSurfaceExact, "ellipsoid": pf.LimitSurfaceEllipsoid}
-BOARDS = {"hardboard": "feet on hardboard", "plywood": "feet on plywood", "flat": "flat face", "in time": "in time"}
+SURFACES = {
+    "exact surface": pf.LimitSurfaceExact,
+    "ellipsoid": pf.LimitSurfaceEllipsoid,
+}
+BOARDS = {
+    "hardboard": "feet on hardboard",
+    "plywood": "feet on plywood",
+    "flat": "flat face",
+    "in time": "in time",
+}
 
 
 def cell(values: np.ndarray) -> str:
     """Mean with its 95 % interval."""
-    low, high = interval(mean(values, drawings([str(i) for i in range(len(values))], 0)))
+    low, high = interval(
+        mean(values, drawings([str(i) for i in range(len(values))], 0))
+    )
     return f"{values.mean():.2f} [{low:.2f}, {high:.2f}]"
 
 
 def table(measured: list[replayed_pushes.ReplayedPush]) -> str:
     """Rows of the page: one for each kind of push."""
     units = "[mm]", "[deg]"
-    headings = ["pushes", "number", *(f"{name} {unit}" for unit in units for name in (*SURFACES, "no motion"))]
+    headings = [
+        "pushes",
+        "number",
+        *(f"{name} {unit}" for unit in units for name in (*SURFACES, "no motion")),
+    ]
     lines = [f"| {' | '.join(headings)} |", "|---" * len(headings) + "|"]
     for board, words in BOARDS.items():
         some = [each for each in measured if each.board == board]
@@ -44,9 +58,15 @@ def table(measured: list[replayed_pushes.ReplayedPush]) -> str:
 
 def picture(measured: list[replayed_pushes.ReplayedPush]) -> None:
     """A planned push, and a measured one with where it ends."""
-    square = np.array([[-0.045, -0.045], [0.045, -0.045], [0.045, 0.045], [-0.045, 0.045]])
-    slider = pf.planning.Slider(pf.LimitSurfaceExact(pf.ContactPatch.rectangle(0.09)), square)
-    plan = pf.planning.plan_push(slider, pf.planning.Pusher(0.4), (0.25, 0.08, 0.6), edges=[3])
+    square = np.array(
+        [[-0.045, -0.045], [0.045, -0.045], [0.045, 0.045], [-0.045, 0.045]]
+    )
+    slider = pf.planning.Slider(
+        pf.LimitSurfaceExact(pf.ContactPatch.rectangle(0.09)), square
+    )
+    plan = pf.planning.plan_push(
+        slider, pf.planning.Pusher(0.4), (0.25, 0.08, 0.6), edges=[3]
+    )
     figure = style.new_figure(9.6, 4.2)
     left, right = figure.subplots(1, 2)
     draw_push(left, plan.push)
@@ -59,7 +79,9 @@ def picture(measured: list[replayed_pushes.ReplayedPush]) -> None:
         (one.by(pf.LimitSurfaceEllipsoid).end, style.ELLIPSOID, "end by the ellipsoid"),
     ):
         corners = pose[:2] + pf.geometry.rotate(closed, pose[2])
-        right.plot(*(1e3 * corners.T), "--", color=colour, linewidth=1.2, zorder=6, label=words)
+        right.plot(
+            *(1e3 * corners.T), "--", color=colour, linewidth=1.2, zorder=6, label=words
+        )
     right.legend(fontsize="small")
     right.set_title("A measured push, followed from its start", fontsize="medium")
     figure.savefig(Path(__file__).parent / "images" / "pushing.png", dpi=110)
@@ -70,7 +92,10 @@ def main() -> None:
     measured = replayed_pushes.single_pushes() + replayed_pushes.pushes_in_time()
     picture(measured)
     text = PAGE.read_text(encoding="utf-8")
-    PAGE.write_text(MARK.sub(lambda _: f"<!-- followed pushes -->\n\n{table(measured)}", text), encoding="utf-8")
+    PAGE.write_text(
+        MARK.sub(lambda _: f"<!-- followed pushes -->\n\n{table(measured)}", text),
+        encoding="utf-8",
+    )
 
 
 if __name__ == "__main__":

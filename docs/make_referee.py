@@ -18,17 +18,30 @@ from planarfriction_studies.referee.report import shown, table
 from planarfriction_studies.referee.run import Verdict
 
 DOCS = Path(__file__).parent
-KEPT, PAGES = DOCS / "referee.json", [DOCS.parent / "README.md", DOCS / "index.md", DOCS / "referee.md"]
-MARK = re.compile(r"<!-- referee: (?P<name>[\w ]+) -->\n\n(?:(?:(?:\||Run on |Not in ).*\n)+\n)?")
+KEPT, PAGES = (
+    DOCS / "referee.json",
+    [DOCS.parent / "README.md", DOCS / "index.md", DOCS / "referee.md"],
+)
+MARK = re.compile(
+    r"<!-- referee: (?P<name>[\w ]+) -->\n\n(?:(?:(?:\||Run on |Not in ).*\n)+\n)?"
+)
 
 MISSING = "Not in this run.\n"
 
 ROWS = {
-    "in_hand": ("turn of a [plate that slips 23 mm in a gripper](docs/referee.md)", "°", 1),
+    "in_hand": (
+        "turn of a [plate that slips 23 mm in a gripper](docs/referee.md)",
+        "°",
+        1,
+    ),
     "disc": ("turn of [discs that slide and spin to rest](docs/referee.md)", "°", 1),
     "push": ("turn of a [box pushed beside its middle](docs/referee.md)", "°", 1),
     "anisotropic": ("path of a [box on grooves](docs/referee.md)", " mm", 1),
-    "torsion": ("time at which a [twisted block starts to turn](docs/referee.md) between pads", " ms", 0),
+    "torsion": (
+        "time at which a [twisted block starts to turn](docs/referee.md) between pads",
+        " ms",
+        0,
+    ),
 }
 """Case -> its row of README and first page, the unit of the row, and digits behind the point."""
 
@@ -75,7 +88,9 @@ def tables(stored: dict[str, Any]) -> dict[str, str]:
         ]
         for engine, settings in stored["settings"].items()
     ]
-    versions = ", ".join(f"{name} {version}" for name, version in stored["versions"].items())
+    versions = ", ".join(
+        f"{name} {version}" for name, version in stored["versions"].items()
+    )
     return {
         "run": f"Run on {stored['date']}: {stored['machine']}; {versions}.\n",
         "engines": markdown(["engine", "version", "settings", *COUNTS], passed),
@@ -93,9 +108,15 @@ def brief(settings: str) -> str:
 def errors(verdicts: Sequence[Verdict]) -> list[list[str]]:
     """Return a row for each case: its words, and the errors of the engines on the page, bold beyond what is allowed."""
     found = {(each.case, each.engine): each for each in verdicts}
-    cells = {key: f"**{shown(each)}**" if each.mark in ("off", "fails") else shown(each) for key, each in found.items()}
+    cells = {
+        key: f"**{shown(each)}**" if each.mark in ("off", "fails") else shown(each)
+        for key, each in found.items()
+    }
     return [
-        [f"`{case.name}`: {case.title}", *(cells.get((case.name, engine), "") for engine in SHOWN)]
+        [
+            f"`{case.name}`: {case.title}",
+            *(cells.get((case.name, engine), "") for engine in SHOWN),
+        ]
         for case in all_cases().values()
     ]
 
@@ -109,14 +130,28 @@ def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def filled(page: str, stored: dict[str, Any]) -> str:
     """Return the page with the tables and the rows of a stored run."""
     found = tables(stored)
-    verdicts = {(row["case"], row["engine"]): Verdict(**row) for row in stored["verdicts"]}
+    verdicts = {
+        (row["case"], row["engine"]): Verdict(**row) for row in stored["verdicts"]
+    }
     for case, (words, unit, digits) in ROWS.items():
-        values = (SCALES[unit] * (verdicts[case, engine].error or 0.0) for engine in IN_README)
+        values = (
+            SCALES[unit] * (verdicts[case, engine].error or 0.0) for engine in IN_README
+        )
         cells = " | ".join(f"{value:.{digits}f}{unit}" for value in values)
         for begin in (f"| {words} |", f"| {words.replace('docs/', '')} |"):
             row = f"{begin} {cells} |"
-            page = re.sub(rf"^{re.escape(begin)}.*$", lambda _, row=row: row, page, flags=re.MULTILINE)
-    return MARK.sub(lambda match: f"<!-- referee: {match['name']} -->\n\n{found.get(match['name'], MISSING)}\n", page)
+            page = re.sub(
+                rf"^{re.escape(begin)}.*$",
+                lambda _, row=row: row,
+                page,
+                flags=re.MULTILINE,
+            )
+    return MARK.sub(
+        lambda match: (
+            f"<!-- referee: {match['name']} -->\n\n{found.get(match['name'], MISSING)}\n"
+        ),
+        page,
+    )
 
 
 def main(folders: Sequence[str]) -> None:
@@ -127,7 +162,10 @@ def main(folders: Sequence[str]) -> None:
             row.pop("path")  # films are on the page that the referee writes
         KEPT.write_text(json.dumps(stored, indent=1) + "\n")
     for page in PAGES:
-        page.write_text(filled(page.read_text(encoding="utf-8"), json.loads(KEPT.read_text())), encoding="utf-8")
+        page.write_text(
+            filled(page.read_text(encoding="utf-8"), json.loads(KEPT.read_text())),
+            encoding="utf-8",
+        )
 
 
 if __name__ == "__main__":

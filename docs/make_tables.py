@@ -19,7 +19,9 @@ from typing import Any
 
 from PIL import Image
 
-MARK = re.compile(r"<!-- table: (?P<title>.+?)(?P<selection>; selection)? -->\n\n(?:(?:\|.*\n)+\n)?")
+MARK = re.compile(
+    r"<!-- table: (?P<title>.+?)(?P<selection>; selection)? -->\n\n(?:(?:\|.*\n)+\n)?"
+)
 VERDICT = re.compile(r"<!-- verdict: (?P<name>.+?) -->\n\n(?:(?:[^\n#<!].*\n)+\n)?")
 
 SHRUNK = 0.6
@@ -53,7 +55,8 @@ def markdown(table: Mapping[str, Any]) -> str:
     rows = [list(compress(row, kept)) for row in (table["headings"], *table["rows"])]
     rows.insert(1, ["---"] * sum(kept))
     return "".join(
-        f"| {' | '.join(each if isinstance(each, str) else rounded(each) for each in row)} |\n" for row in rows
+        f"| {' | '.join(each if isinstance(each, str) else rounded(each) for each in row)} |\n"
+        for row in rows
     )
 
 
@@ -68,17 +71,27 @@ def with_tables(page: str, tables: Mapping[str, Mapping[str, Any]]) -> str:
     def replaced(found: re.Match[str]) -> str:
         title = found["title"]
         if title == "Cost" and title in tables:
-            return f"<!-- table: {title} -->\n\n{_with_costs(found[0], tables[title])}\n"
+            return (
+                f"<!-- table: {title} -->\n\n{_with_costs(found[0], tables[title])}\n"
+            )
         if title in tables and found["selection"]:
             return f"<!-- table: {title}; selection -->\n\n{markdown(_selected(found[0], tables[title]))}\n"
-        return f"<!-- table: {title} -->\n\n{markdown(tables[title])}\n" if title in tables else found[0]
+        return (
+            f"<!-- table: {title} -->\n\n{markdown(tables[title])}\n"
+            if title in tables
+            else found[0]
+        )
 
     return MARK.sub(replaced, page)
 
 
 def _selected(before: str, table: Mapping[str, Any]) -> dict[str, Any]:
     """Rows and columns of a table that the page shows, by the first column and by the headings."""
-    lines = [line.strip("| ").split(" | ") for line in before.splitlines() if line.startswith("|")]
+    lines = [
+        line.strip("| ").split(" | ")
+        for line in before.splitlines()
+        if line.startswith("|")
+    ]
     columns = [k for k, heading in enumerate(table["headings"]) if heading in lines[0]]
     rows = [row for row in table["rows"] if row[0] in [line[0] for line in lines[2:]]]
     return {
@@ -89,10 +102,20 @@ def _selected(before: str, table: Mapping[str, Any]) -> dict[str, Any]:
 
 def _with_costs(before: str, table: Mapping[str, Any]) -> str:
     """Lines of the table of costs, each the new one or else the one that the page has."""
-    lines = {name: line for name in COST for line in before.splitlines() if line.endswith(f"| `{name}` |")}
+    lines = {
+        name: line
+        for name in COST
+        for line in before.splitlines()
+        if line.endswith(f"| `{name}` |")
+    }
     head, ruler, *new = markdown(table).splitlines()
-    lines |= {name: line for name in COST for line in new if line.endswith(f"| `{name}` |")}
-    return "\n".join([head, ruler, *(lines[name] for name in COST if name in lines)]) + "\n"
+    lines |= {
+        name: line for name in COST for line in new if line.endswith(f"| `{name}` |")
+    }
+    return (
+        "\n".join([head, ruler, *(lines[name] for name in COST if name in lines)])
+        + "\n"
+    )
 
 
 def with_verdicts(page: str, verdicts: Mapping[str, str]) -> str:
@@ -100,7 +123,11 @@ def with_verdicts(page: str, verdicts: Mapping[str, str]) -> str:
 
     def replaced(found: re.Match[str]) -> str:
         name = found["name"]
-        return f"<!-- verdict: {name} -->\n\n{verdicts[name]}\n\n" if name in verdicts else found[0]
+        return (
+            f"<!-- verdict: {name} -->\n\n{verdicts[name]}\n\n"
+            if name in verdicts
+            else found[0]
+        )
 
     return VERDICT.sub(replaced, page)
 
@@ -109,7 +136,9 @@ def shown(value: float, unit: str) -> str:
     """A time as one reads it, with two digits; another quantity as it is."""
     if unit in ("s", "us"):
         seconds = value * (1.0 if unit == "s" else 1e-6)
-        unit, factor = next(each for each in SECONDS if seconds >= 0.1 / each[1] or each is SECONDS[-1])
+        unit, factor = next(
+            each for each in SECONDS if seconds >= 0.1 / each[1] or each is SECONDS[-1]
+        )
         value = factor * seconds
     return f"{rounded(value)} {unit}"
 
@@ -121,8 +150,18 @@ def costs(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for name, words in COST.items():
         if name in found:
             line = found[name]
-            beside = f"{shown(line['baseline_value'], line['unit'])}: {line['baseline']}"
-            rows.append((words, shown(line["value"], line["unit"]), beside, line["ratio"], f"`{name}`"))
+            beside = (
+                f"{shown(line['baseline_value'], line['unit'])}: {line['baseline']}"
+            )
+            rows.append(
+                (
+                    words,
+                    shown(line["value"], line["unit"]),
+                    beside,
+                    line["ratio"],
+                    f"`{name}`",
+                )
+            )
     headings = ("what", "cost", "baseline, in the same run", "ratio", "name")
     return {"Cost": {"headings": headings, "rows": rows}} if rows else {}
 
@@ -131,11 +170,22 @@ def main(places: Sequence[Path]) -> None:
     """Rewrite every page that shows what the places hold, and say which."""
     folders = [place for place in places if place.is_dir()]
     records = [
-        json.loads(path.read_text("utf-8")) for folder in folders for path in sorted(folder.glob("*/result.json"))
+        json.loads(path.read_text("utf-8"))
+        for folder in folders
+        for path in sorted(folder.glob("*/result.json"))
     ]
-    lines = [line for place in places if not place.is_dir() for line in json.loads(place.read_text("utf-8"))]
-    tables = {table["title"]: table for record in records for table in record["tables"]} | costs(lines)
-    verdicts = {record["name"]: record["verdict"] for record in records if record["verdict"]}
+    lines = [
+        line
+        for place in places
+        if not place.is_dir()
+        for line in json.loads(place.read_text("utf-8"))
+    ]
+    tables = {
+        table["title"]: table for record in records for table in record["tables"]
+    } | costs(lines)
+    verdicts = {
+        record["name"]: record["verdict"] for record in records if record["verdict"]
+    }
     docs = Path(__file__).parent
     for path in sorted(docs.glob("*.md")):
         before = path.read_text(encoding="utf-8")
@@ -148,7 +198,9 @@ def main(places: Sequence[Path]) -> None:
         if picture.exists():
             with Image.open(drawn) as image:
                 size = tuple(round(SHRUNK * side) for side in image.size)
-                image.convert("RGB").resize(size, Image.Resampling.LANCZOS).quantize(128).save(picture, optimize=True)
+                image.convert("RGB").resize(size, Image.Resampling.LANCZOS).quantize(
+                    128
+                ).save(picture, optimize=True)
             print(f"images/{picture.name}: {picture.stat().st_size / 1000:.0f} kB")
 
 

@@ -28,7 +28,15 @@ INERTIA = MASS * SIDE**2 / 6.0
 LOAD = MASS * GRAVITY
 STIFFNESS, SPEED = 150.0, 0.01  # of the spring [N/m], of its far end [m/s]
 HOOK = jnp.array([0.5 * SIDE, 0.25 * SIDE])  # where the spring is fixed, block axes [m]
-LAW = pf.LuGre(mu_c=0.3, mu_s=0.45, v_s=5e-3, sigma_0=1e5, sigma_1=300.0, sigma_2=0.4, elasto_plastic=0.9)
+LAW = pf.LuGre(
+    mu_c=0.3,
+    mu_s=0.45,
+    v_s=5e-3,
+    sigma_0=1e5,
+    sigma_1=300.0,
+    sigma_2=0.4,
+    elasto_plastic=0.9,
+)
 DEFLECTION = 1e-6
 """Unit [m] in which bristles are about as large as the other states: one tolerance suits all."""
 
@@ -63,7 +71,9 @@ def slope(time, state: State, model: pj.ReducedModel) -> State:
     to_table = turn(state.pose[2])
     twist, z = to_table.T @ state.twist, state.bristles * DEFLECTION
     friction = to_table @ pj.wrench(model, z, twist, LOAD)
-    acceleration = (pull(time, state.pose) + friction) / jnp.array([MASS, MASS, INERTIA])
+    acceleration = (pull(time, state.pose) + friction) / jnp.array(
+        [MASS, MASS, INERTIA]
+    )
     return State(state.twist, acceleration, pj.rate(model, z, twist, LOAD) / DEFLECTION)
 
 
@@ -102,7 +112,11 @@ def draw(times, states: State, forces: np.ndarray, file: Path) -> None:
         if i == 1:
             axes.axhline(LAW.mu_s * LOAD, color="0.4", linestyle=":", linewidth=1.0)
             axes.annotate(
-                "breakaway, mu_s f_N", (0.02 * times[-1], LAW.mu_s * LOAD), va="bottom", color="0.4", fontsize=8
+                "breakaway, mu_s f_N",
+                (0.02 * times[-1], LAW.mu_s * LOAD),
+                va="bottom",
+                color="0.4",
+                fontsize=8,
             )
         if i < 2:
             axes.tick_params(labelbottom=False)
@@ -123,15 +137,23 @@ def run(duration: float = 8.0) -> tuple[np.ndarray, State, np.ndarray]:
 def main() -> None:
     """Simulate, print the largest force of the spring, and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the picture")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for the picture"
+    )
     folder = parser.parse_args().out
-    jax.config.update("jax_enable_x64", True)  # deflections of 1e-6 m beside distances of 0.1 m
+    jax.config.update(
+        "jax_enable_x64", True
+    )  # deflections of 1e-6 m beside distances of 0.1 m
     times, states, forces = run()
     folder.mkdir(parents=True, exist_ok=True)
     draw(times, states, forces, folder / "diffrax_contact.png")
     largest = np.hypot(forces[:, 0], forces[:, 1]).max()
-    print(f"largest force of the spring: {largest:.3f} N, {largest / (LAW.mu_s * LOAD):.1%} of mu_s f_N")
-    print(f"yaw at the end: {np.degrees(states.pose[-1, 2]):.1f} deg; picture: {folder / 'diffrax_contact.png'}")
+    print(
+        f"largest force of the spring: {largest:.3f} N, {largest / (LAW.mu_s * LOAD):.1%} of mu_s f_N"
+    )
+    print(
+        f"yaw at the end: {np.degrees(states.pose[-1, 2]):.1f} deg; picture: {folder / 'diffrax_contact.png'}"
+    )
 
 
 if __name__ == "__main__":

@@ -21,7 +21,12 @@ from matplotlib.figure import Figure
 import planarfriction as pf
 from planarfriction.cli.console import print_table, work_progress
 from planarfriction.errors import FrictionError
-from planarfriction.identify import MassProperties, Slide, identify_motion, predict_slide
+from planarfriction.identify import (
+    MassProperties,
+    Slide,
+    identify_motion,
+    predict_slide,
+)
 from planarfriction_studies.measured import Case as Toss
 from planarfriction_studies.measured import slides as measured
 from planarfriction_studies.measured.scores import rms
@@ -29,7 +34,10 @@ from planarfriction_studies.measured.scores import rms
 BODY = MassProperties(measured.MASS, measured.INERTIA)
 SQUARE = measured.face()
 CORNERS = pf.ContactPatch.points(
-    0.5 * measured.SIDE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), name="four corners"
+    0.5
+    * measured.SIDE
+    * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
+    name="four corners",
 )
 
 WINDOW = 8
@@ -56,10 +64,27 @@ class Case:
 
 CASES = (
     Case("square, mu alone", SQUARE, pf.ReducedModelPublished, ("mu_c",)),
-    Case("square, mu and r", SQUARE, pf.ReducedModelPublished, ("mu_c", "contact_radius")),
-    Case("square, mu(v) and r", SQUARE, pf.ReducedModelPublished, ("mu_c", "sigma_2", "contact_radius")),
-    Case("corners, mu(v) and r", CORNERS, pf.DistributedModel, ("mu_c", "sigma_2", "contact_radius")),
-    Case("ellipsoid, mu(v) and r", SQUARE, ellipsoid, ("mu_c", "sigma_2", "contact_radius")),
+    Case(
+        "square, mu and r", SQUARE, pf.ReducedModelPublished, ("mu_c", "contact_radius")
+    ),
+    Case(
+        "square, mu(v) and r",
+        SQUARE,
+        pf.ReducedModelPublished,
+        ("mu_c", "sigma_2", "contact_radius"),
+    ),
+    Case(
+        "corners, mu(v) and r",
+        CORNERS,
+        pf.DistributedModel,
+        ("mu_c", "sigma_2", "contact_radius"),
+    ),
+    Case(
+        "ellipsoid, mu(v) and r",
+        SQUARE,
+        ellipsoid,
+        ("mu_c", "sigma_2", "contact_radius"),
+    ),
 )
 
 
@@ -68,9 +93,13 @@ def as_slide(toss: Toss) -> Slide:
     return Slide(toss.question.time, toss.answer, name=toss.name)
 
 
-def split(tosses: Sequence[Toss], seed: int, most: int | None = None) -> tuple[list[Toss], list[Toss]]:
+def split(
+    tosses: Sequence[Toss], seed: int, most: int | None = None
+) -> tuple[list[Toss], list[Toss]]:
     """Split (at most `most` different) tosses into halves to fit and to test; copies of a toss stay in one half."""
-    ids = np.random.default_rng(seed).permutation(sorted({toss.group for toss in tosses}))[:most]
+    ids = np.random.default_rng(seed).permutation(
+        sorted({toss.group for toss in tosses})
+    )[:most]
     halves = set(ids[: len(ids) // 2]), set(ids[len(ids) // 2 :])
     fit, test = ([toss for toss in tosses if toss.group in half] for half in halves)
     return fit, test
@@ -83,18 +112,48 @@ def errors(predicted: np.ndarray, slide: Slide, skipped: int) -> list[float]:
     return [position[-1], yaw[-1], rms(position), rms(yaw)]
 
 
-def run(fit: Sequence[Slide], test: Sequence[Slide], cases: Sequence[Case], seed: int) -> list[tuple[str, ...]]:
+def run(
+    fit: Sequence[Slide], test: Sequence[Slide], cases: Sequence[Case], seed: int
+) -> list[tuple[str, ...]]:
     """Fit every case to one half and predict the other, starting from a parabola and from the first poses."""
     rows = []
     for case in cases:
-        options = {"parameters": case.parameters, "start": _start(case), "model": case.build, "samples": WINDOW}
+        options = {
+            "parameters": case.parameters,
+            "start": _start(case),
+            "model": case.build,
+            "samples": WINDOW,
+        }
         with work_progress(case.name) as progress:
             found = identify_motion(fit, case.patch, BODY, **options, progress=progress)
-        told = ", ".join(f"{n} {v:.4g} ± {found.errors[n]:.1g}" for n, v in found.estimates.items())
+        told = ", ".join(
+            f"{n} {v:.4g} ± {found.errors[n]:.1g}" for n, v in found.estimates.items()
+        )
         for name, samples in (("parabola", None), (f"first {WINDOW} poses", WINDOW)):
-            all_errors = [errors(predict_slide(found.model, BODY, s, samples=samples), s, samples or 0) for s in test]
-            rows.append((str(seed), case.name, name, told, *(f"{rms(e):.2f}" for e in np.array(all_errors).T)))
-        print(" | ".join(rows[-2]), "\n", " | ".join(rows[-1]), file=sys.stderr, flush=True)
+            all_errors = [
+                errors(
+                    predict_slide(found.model, BODY, s, samples=samples),
+                    s,
+                    samples or 0,
+                )
+                for s in test
+            ]
+            rows.append(
+                (
+                    str(seed),
+                    case.name,
+                    name,
+                    told,
+                    *(f"{rms(e):.2f}" for e in np.array(all_errors).T),
+                )
+            )
+        print(
+            " | ".join(rows[-2]),
+            "\n",
+            " | ".join(rows[-1]),
+            file=sys.stderr,
+            flush=True,
+        )
     return rows
 
 
@@ -107,9 +166,14 @@ def _start(case: Case) -> pf.LuGre:
 
 def friction_of_each(slides: Sequence[Slide]) -> tuple[np.ndarray, np.ndarray]:
     """Initial speed [m/s] and friction coefficient of each slide, identified from that slide alone."""
-    found = [identify_motion(s, SQUARE, BODY, parameters=("mu_c",), start=_start(CASES[0])) for s in slides]
+    found = [
+        identify_motion(s, SQUARE, BODY, parameters=("mu_c",), start=_start(CASES[0]))
+        for s in slides
+    ]
     starts = np.array([each.histories[0]["start"] for each in found])
-    return np.hypot(starts[:, 3], starts[:, 4]), np.array([each.estimates["mu_c"] for each in found])
+    return np.hypot(starts[:, 3], starts[:, 4]), np.array(
+        [each.estimates["mu_c"] for each in found]
+    )
 
 
 def draw(speed: np.ndarray, mu: np.ndarray) -> Figure:
@@ -117,7 +181,9 @@ def draw(speed: np.ndarray, mu: np.ndarray) -> Figure:
     figure = Figure(figsize=(6.0, 3.6), dpi=110, layout="constrained")
     axes = figure.add_subplot()
     axes.plot(speed, mu, ".", color="#0072B2", markersize=5)
-    axes.axhline(np.median(mu), color="0.4", linewidth=1.0, label=f"median {np.median(mu):.3f}")
+    axes.axhline(
+        np.median(mu), color="0.4", linewidth=1.0, label=f"median {np.median(mu):.3f}"
+    )
     axes.set(xlabel="initial speed [m/s]", ylabel="friction coefficient of the slide")
     axes.legend(frameon=False)
     axes.grid(True, color="0.9", linewidth=0.6)
@@ -128,24 +194,49 @@ def draw(speed: np.ndarray, mu: np.ndarray) -> Figure:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, nargs="?", help="folder with the table (default: the one of the package)")
+    parser.add_argument(
+        "folder",
+        type=Path,
+        nargs="?",
+        help="folder with the table (default: the one of the package)",
+    )
     parser.add_argument("--splits", type=int, default=1, help="number of splits")
-    parser.add_argument("--tosses", type=int, help="use at most this many different tosses")
-    parser.add_argument("--out", type=Path, help="folder for a picture of the friction of every slide")
+    parser.add_argument(
+        "--tosses", type=int, help="use at most this many different tosses"
+    )
+    parser.add_argument(
+        "--out", type=Path, help="folder for a picture of the friction of every slide"
+    )
     options = parser.parse_args(arguments)
     try:
         tosses = measured.read(options.folder)
         rows = []
         for seed in range(options.splits):
-            fit, test = ([as_slide(toss) for toss in half] for half in split(tosses, seed, options.tosses))
+            fit, test = (
+                [as_slide(toss) for toss in half]
+                for half in split(tosses, seed, options.tosses)
+            )
             rows += run(fit, test, CASES, seed)
-        headings = ["split", "model", "start from", "fitted", "end [mm]", "end [deg]", "way [mm]", "way [deg]"]
-        print_table("RMS errors on the test half: at the end, and along the way", headings, rows)
+        headings = [
+            "split",
+            "model",
+            "start from",
+            "fitted",
+            "end [mm]",
+            "end [deg]",
+            "way [mm]",
+            "way [deg]",
+        ]
+        print_table(
+            "RMS errors on the test half: at the end, and along the way", headings, rows
+        )
         if options.out is not None:
             options.out.mkdir(parents=True, exist_ok=True)
             chosen = tosses if options.tosses is None else tosses[: options.tosses]
             speed, mu = friction_of_each([as_slide(toss) for toss in chosen])
-            print(f"friction of single slides: median {np.median(mu):.4f}, spread {mu.std():.4f}")
+            print(
+                f"friction of single slides: median {np.median(mu):.4f}, spread {mu.std():.4f}"
+            )
             draw(speed, mu).savefig(options.out / "identify_slides.png")
     except (FrictionError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)

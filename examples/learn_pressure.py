@@ -34,7 +34,11 @@ from planarfriction.torch import DistributedModel, rollout, tracking_loss
 
 CELLS, CELL = 8, 3e-3  # cells of a side, side of a cell [m]
 LAW = pf.LuGre(mu_c=0.7, mu_s=0.7, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
-LOAD, DT, STEPS = 5.0, 5e-3, 2  # [N], [s], steps of one motion: long enough to slide steadily
+LOAD, DT, STEPS = (
+    5.0,
+    5e-3,
+    2,
+)  # [N], [s], steps of one motion: long enough to slide steadily
 NOISE = 2e-3  # of the friction force, and of the friction torque: that of a good sensor
 
 
@@ -54,7 +58,9 @@ def true_patch() -> pf.ContactPatch:
     x, y = np.meshgrid(*[(np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL] * 2)
     heavy = np.exp(-((x + 5e-3) ** 2 + (y - 4e-3) ** 2) / (2 * 4e-3**2))
     light = 0.5 * np.exp(-((x - 6e-3) ** 2 + (y + 6e-3) ** 2) / (2 * 3e-3**2))
-    return pf.ContactPatch.from_pressure((0.05 + heavy + light)[::-1], CELL)  # row 0 is the top
+    return pf.ContactPatch.from_pressure(
+        (0.05 + heavy + light)[::-1], CELL
+    )  # row 0 is the top
 
 
 def slides_about_points(count: int, rng: np.random.Generator) -> torch.Tensor:
@@ -74,7 +80,9 @@ def held(twists: np.ndarray) -> torch.Tensor:
     return torch.tensor(twists)[:, None].expand(-1, STEPS, -1).contiguous()
 
 
-def measure(patch: pf.ContactPatch, twists: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
+def measure(
+    patch: pf.ContactPatch, twists: torch.Tensor, rng: np.random.Generator
+) -> torch.Tensor:
     """Wrenches of the true patch, with noise."""
     model = DistributedModel(patch, LAW, trainable=(), dtype=torch.float64)
     wrenches = rollout(model, None, twists, LOAD, DT).wrenches
@@ -114,7 +122,9 @@ def summary(truth: pf.ContactPatch, weights: np.ndarray) -> dict[str, float]:
     return {
         "centre": float(np.hypot(*shift)),
         "radius": abs(float(patch.contact_radius() / truth.contact_radius()) - 1.0),
-        "second moment": abs(float(patch.second_moment() / truth.second_moment()) - 1.0),
+        "second moment": abs(
+            float(patch.second_moment() / truth.second_moment()) - 1.0
+        ),
         "moved load": moved_load(truth, weights),
     }
 
@@ -127,19 +137,38 @@ def draw(truth: pf.ContactPatch, rich: Learnt, poor: Learnt):
     figure = new_figure(10.5, 3.1)
     axes = figure.subplots(1, 4, width_ratios=[1, 1, 1, 1.25])
     half = 0.5e3 * CELLS * CELL
-    maps = {"true": truth.weights(), "learnt, many points": rich.weights, "learnt, one spin": poor.weights}
+    maps = {
+        "true": truth.weights(),
+        "learnt, many points": rich.weights,
+        "learnt, one spin": poor.weights,
+    }
     top = 100 * max(weights.max() for weights in (truth.weights(), rich.weights))
     for ax, (title, weights) in zip(axes, maps.items(), strict=False):
         image = ax.imshow(
-            100 * weights.reshape(CELLS, CELLS), cmap=PRESSURE_MAP, vmin=0, vmax=top, extent=(-half, half, -half, half)
+            100 * weights.reshape(CELLS, CELLS),
+            cmap=PRESSURE_MAP,
+            vmin=0,
+            vmax=top,
+            extent=(-half, half, -half, half),
         )
         ax.set_title(title, fontsize=9)
         ax.set_xlabel("x [mm]")
     axes[0].set_ylabel("y [mm]")
-    figure.colorbar(image, ax=axes[:3].tolist(), label="load on a cell [%]", shrink=0.85)
-    for learnt, label, colour in ((rich, "many points", PALETTE[0]), (poor, "one spin", PALETTE[1])):
+    figure.colorbar(
+        image, ax=axes[:3].tolist(), label="load on a cell [%]", shrink=0.85
+    )
+    for learnt, label, colour in (
+        (rich, "many points", PALETTE[0]),
+        (poor, "one spin", PALETTE[1]),
+    ):
         axes[3].semilogy(np.sqrt(learnt.losses), color=colour, label=label)
-    axes[3].axhline(np.sqrt(3) * NOISE * LAW.mu_c, color=PALETTE[6], linewidth=0.8, linestyle="--", label="noise")
+    axes[3].axhline(
+        np.sqrt(3) * NOISE * LAW.mu_c,
+        color=PALETTE[6],
+        linewidth=0.8,
+        linestyle="--",
+        label="noise",
+    )
     axes[3].set_xlabel("step of the optimiser")
     axes[3].set_ylabel("RMS misfit / load")
     axes[3].legend(fontsize=8)
@@ -147,20 +176,29 @@ def draw(truth: pf.ContactPatch, rich: Learnt, poor: Learnt):
     return figure
 
 
-def run(steps: int = 300, motions: int = 200, seed: int = 0) -> tuple[pf.ContactPatch, Learnt, Learnt]:
+def run(
+    steps: int = 300, motions: int = 200, seed: int = 0
+) -> tuple[pf.ContactPatch, Learnt, Learnt]:
     """Measure and learn twice: from turns about many points, and from one spin only."""
     rng = np.random.default_rng(seed)
     truth = true_patch()
     fits = [
         learn(twists, measure(truth, twists, rng), steps)
-        for twists in (slides_about_points(motions, rng), spins_about_the_middle(motions // 10))
+        for twists in (
+            slides_about_points(motions, rng),
+            spins_about_the_middle(motions // 10),
+        )
     ]
     return truth, fits[0], fits[1]
 
 
 def main(arguments: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description="Learn a pressure distribution from wrenches.")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder of the picture")
+    parser = argparse.ArgumentParser(
+        description="Learn a pressure distribution from wrenches."
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder of the picture"
+    )
     parser.add_argument("--steps", type=int, default=300, help="steps of the optimiser")
     options = parser.parse_args(arguments)
     truth, rich, poor = run(options.steps)

@@ -20,8 +20,12 @@ TASKS = ("slides",)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the comparison; returns the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    tables = ["--tables", given.pop(0)] if given and not given[0].startswith("-") else []
-    return planarfriction(["measured", *(f"--task={task}" for task in TASKS), *tables, *given])
+    tables = (
+        ["--tables", given.pop(0)] if given and not given[0].startswith("-") else []
+    )
+    return planarfriction(
+        ["measured", *(f"--task={task}" for task in TASKS), *tables, *given]
+    )
 
 
 if __name__ == "__main__":

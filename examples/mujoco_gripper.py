@@ -29,8 +29,15 @@ from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
 from planarfriction.adapters.mujoco.draw import CENTRE, FRICTION, OUTLINE
 from planarfriction.plots.style import new_figure
 
-MU, RADIUS, MASS, ARM = 1.0, 0.012, 0.1, 0.04  # [-], pads [m], plate [kg], from the pads to its centre of mass [m]
-SIDE = RADIUS / np.sqrt(2.0)  # half the width of boxes with their corners on the rim [m]: boxes meet in several points
+MU, RADIUS, MASS, ARM = (
+    1.0,
+    0.012,
+    0.1,
+    0.04,
+)  # [-], pads [m], plate [kg], from the pads to its centre of mass [m]
+SIDE = (
+    RADIUS / np.sqrt(2.0)
+)  # half the width of boxes with their corners on the rim [m]: boxes meet in several points
 FIRM, LOOSE = 6.0, 1.4  # forces of each finger [N]
 GRIPS = (
     (0.3, FIRM),
@@ -71,15 +78,23 @@ def controls(t: float) -> tuple[float, float, float]:
 
 def soft_pad() -> pf.ReducedModel:
     """Build the friction of a pad."""
-    law = pf.LuGre(mu_c=MU, mu_s=MU, sigma_0=1e5, sigma_1=300.0, sigma_2=10.0, elasto_plastic=0.9)
+    law = pf.LuGre(
+        mu_c=MU, mu_s=MU, sigma_0=1e5, sigma_1=300.0, sigma_2=10.0, elasto_plastic=0.9
+    )
     return pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), law)
 
 
-def hand(pad: pf.models.FrictionModel) -> tuple[mujoco.MjModel, mujoco.MjData, Friction]:
+def hand(
+    pad: pf.models.FrictionModel,
+) -> tuple[mujoco.MjModel, mujoco.MjData, Friction]:
     """Build the model, its data, and the friction of its pads."""
-    patches = [PatchContact(pad, site=side, geoms=(side, "plate")) for side in ("near", "far")]
+    patches = [
+        PatchContact(pad, site=side, geoms=(side, "plate")) for side in ("near", "far")
+    ]
     spec = mujoco.MjSpec.from_string(HAND)
-    spec.geom("near").contype = spec.geom("far").contype = 0  # they touch the plate through its pairs alone
+    spec.geom("near").contype = spec.geom("far").contype = (
+        0  # they touch the plate through its pairs alone
+    )
     prepare(spec, patches)
     m = spec.compile()
     return m, mujoco.MjData(m), Friction(m, patches)
@@ -89,7 +104,9 @@ def reach() -> float:
     """Horizontal distance [m] of the centre of mass from the pads while the grip is loose, in theory."""
     spins = np.geomspace(1e-2, 1e5, 4001)  # of a disc that moves with 1 m/s
     twists = np.stack([np.zeros_like(spins), np.ones_like(spins), spins], axis=1)
-    wrench = abs(pf.LimitSurfaceExact(pf.ContactPatch.disc(radius=RADIUS)).wrench(twists))
+    wrench = abs(
+        pf.LimitSurfaceExact(pf.ContactPatch.disc(radius=RADIUS)).wrench(twists)
+    )
     share = MASS * 9.81 / (2.0 * MU * LOOSE)
     return float(np.interp(share, wrench[::-1, 1], wrench[::-1, 2])) / share
 
@@ -102,7 +119,12 @@ def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
     m, d, friction = hand(soft_pad())
     renderer = mujoco.Renderer(m, 400, 440) if draw else None
     camera = mujoco.MjvCamera()
-    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (0.0, 0.034, -0.02), 0.17, 187.0, -8.0
+    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (
+        (0.0, 0.034, -0.02),
+        0.17,
+        187.0,
+        -8.0,
+    )
     gravity, m.opt.gravity[:] = m.opt.gravity.copy(), 0.0
     rows, pictures = [], []
     for k in range(-100, round(END / m.opt.timestep)):
@@ -114,12 +136,16 @@ def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
         turned, plate = d.body("hand").xmat.reshape(3, 3), d.body("plate")
         held, at = turned.T @ plate.xmat.reshape(3, 3), turned.T @ plate.xipos
         rows.append([t, -np.arctan2(held[2, 1], held[1, 1]), at[1], -at[2]])
-        if renderer is not None and any(abs(t - shown + m.opt.timestep) < 1e-9 for shown in SHOWN):
+        if renderer is not None and any(
+            abs(t - shown + m.opt.timestep) < 1e-9 for shown in SHOWN
+        ):
             renderer.update_scene(d, camera)
             first = renderer.scene.ngeom
             friction.draw(renderer.scene, d)
             for geom in renderer.scene.geoms[first : renderer.scene.ngeom]:
-                if geom.type == mujoco.mjtGeom.mjGEOM_ARROW:  # on the pads; on the plate it is opposite
+                if (
+                    geom.type == mujoco.mjtGeom.mjGEOM_ARROW
+                ):  # on the pads; on the plate it is opposite
                     geom.mat[:] = geom.mat @ np.diag([1.0, -1.0, -1.0])
             pictures.append(renderer.render())
     return np.array(rows), pictures
@@ -127,8 +153,12 @@ def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
 
 def main() -> None:
     """Simulate, print the results, and draw."""
-    parser = argparse.ArgumentParser(description="A plate that swings in a gripper, in MuJoCo.")
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the picture")
+    parser = argparse.ArgumentParser(
+        description="A plate that swings in a gripper, in MuJoCo."
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for the picture"
+    )
     folder = parser.parse_args().out
     rows, pictures = run()
     time, angle, beside, below = rows.T
@@ -138,22 +168,43 @@ def main() -> None:
         f" {1e3 * beside[loose]:.1f} mm to the side of the pads (theory: {1e3 * reach():.1f} mm)"
     )
     turned = np.degrees(np.ptp(angle[time > TURNS]))
-    print(f"firm grip: it turns by {turned:.3f} degrees relative to the hand while the hand turns by 69 degrees")
+    print(
+        f"firm grip: it turns by {turned:.3f} degrees relative to the hand while the hand turns by 69 degrees"
+    )
     creep = np.hypot(np.ptp(beside[last]), np.ptp(below[last])) / 0.2
     print(f"at rest: it creeps at {1e6 * creep:.4f} um/s")
     folder.mkdir(parents=True, exist_ok=True)
     figure = new_figure(9.0, 3.1)
-    for axes, shown, picture in zip(figure.subplots(1, len(SHOWN)), SHOWN, pictures, strict=True):
+    for axes, shown, picture in zip(
+        figure.subplots(1, len(SHOWN)), SHOWN, pictures, strict=True
+    ):
         axes.imshow(picture)
-        axes.set_title(f"{shown} s, grip {controls(shown)[0]:.1f} N", fontsize="x-large")
+        axes.set_title(
+            f"{shown} s, grip {controls(shown)[0]:.1f} N", fontsize="x-large"
+        )
         axes.axis("off")
     marks = {"patch of a pad": ("o", OUTLINE, "none"), "friction on the plate": ("^", FRICTION, "full"),
              "centre of rotation": (".", CENTRE, "full")}  # fmt: skip
     handles = [
-        Line2D([], [], linestyle="", marker=marker, color=colour, fillstyle=fill, markersize=11, label=name)
+        Line2D(
+            [],
+            [],
+            linestyle="",
+            marker=marker,
+            color=colour,
+            fillstyle=fill,
+            markersize=11,
+            label=name,
+        )
         for name, (marker, colour, fill) in marks.items()
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize="x-large")
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=3,
+        frameon=False,
+        fontsize="x-large",
+    )
     figure.savefig(folder / "mujoco-gripper.png")
     print(f"wrote {folder / 'mujoco-gripper.png'}")
 

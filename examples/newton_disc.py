@@ -26,15 +26,34 @@ def scene(own: bool) -> tuple[Any, Any]:
     """Return the model and its solver, with Newton's own friction or with none."""
     builder = newton.ModelBuilder()
     newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
-    material = newton.ModelBuilder.ShapeConfig(mu=MU, density=MASS / (np.pi * RADIUS**2 * HEIGHT))
+    material = newton.ModelBuilder.ShapeConfig(
+        mu=MU, density=MASS / (np.pi * RADIUS**2 * HEIGHT)
+    )
     material.mu_torsional = 2.0 / 3.0 * RADIUS
-    options = {"cfg": material} if own else {"cfg": material, "custom_attributes": {"mujoco:condim": 1}}
-    builder.add_shape_plane(body=-1, plane=(0.0, 0.0, 1.0, 0.0), width=0.0, length=0.0, label="floor", **options)
+    options = (
+        {"cfg": material}
+        if own
+        else {"cfg": material, "custom_attributes": {"mujoco:condim": 1}}
+    )
+    builder.add_shape_plane(
+        body=-1,
+        plane=(0.0, 0.0, 1.0, 0.0),
+        width=0.0,
+        length=0.0,
+        label="floor",
+        **options,
+    )
     disc = builder.add_body(xform=((0.0, 0.0, 0.5 * HEIGHT), (0.0, 0.0, 0.0, 1.0)))
-    builder.add_shape_cylinder(disc, radius=RADIUS, half_height=0.5 * HEIGHT, label="disc", **options)
-    builder.add_site(disc, xform=((0.0, 0.0, -0.5 * HEIGHT), (0.0, 0.0, 0.0, 1.0)), label="under")
+    builder.add_shape_cylinder(
+        disc, radius=RADIUS, half_height=0.5 * HEIGHT, label="disc", **options
+    )
+    builder.add_site(
+        disc, xform=((0.0, 0.0, -0.5 * HEIGHT), (0.0, 0.0, 0.0, 1.0)), label="under"
+    )
     model = builder.finalize(device="cpu")
-    return model, newton.solvers.SolverMuJoCo(model, cone="pyramidal", include_sites=True)
+    return model, newton.solvers.SolverMuJoCo(
+        model, cone="pyramidal", include_sites=True
+    )
 
 
 def patch_friction(solver: Any) -> Friction:
@@ -42,7 +61,9 @@ def patch_friction(solver: Any) -> Friction:
     m = solver.mj_model
     law = pf.LuGre(mu_c=MU, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
     disc = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=31), law)
-    patch = PatchContact(disc, site=m.site(0).name, geoms=(m.geom(0).name, m.geom(1).name))
+    patch = PatchContact(
+        disc, site=m.site(0).name, geoms=(m.geom(0).name, m.geom(1).name)
+    )
     return Friction(m, [patch], model=solver.mjw_model, data=solver.mjw_data)
 
 
@@ -55,7 +76,10 @@ def slide(own: bool) -> tuple[float, float]:
         model.control(),
         newton.Contacts(64, 0, device="cpu"),
     )
-    distance, angle = 0.5 * DT * SPEED, 0.5 * DT * SPIN  # what the stepper leaves out of the first step
+    distance, angle = (
+        0.5 * DT * SPEED,
+        0.5 * DT * SPIN,
+    )  # what the stepper leaves out of the first step
     with ExitStack() as stack:
         if not own:
             stack.enter_context(patch_friction(solver).install())
@@ -74,5 +98,10 @@ def slide(own: bool) -> tuple[float, float]:
 if __name__ == "__main__":
     wp.config.log_level = logging.ERROR
     for name, own in (("Newton's own", True), ("patch", False)):
-        errors = [100.0 * (found / exact - 1.0) for found, exact in zip(slide(own), EXACT, strict=True)]
-        print(f"{name:12}  distance {errors[0]:+6.2f} %, angle {errors[1]:+6.2f} % of a disc with Coulomb friction")
+        errors = [
+            100.0 * (found / exact - 1.0)
+            for found, exact in zip(slide(own), EXACT, strict=True)
+        ]
+        print(
+            f"{name:12}  distance {errors[0]:+6.2f} %, angle {errors[1]:+6.2f} % of a disc with Coulomb friction"
+        )

@@ -35,20 +35,27 @@ def plate(grip: float, mu_c: float) -> pf.Scene:
     """The plate between two fingers with a constant grip force [N], for half a second."""
     law = pf.LuGre(mu_c=mu_c, mu_s=RATIO * mu_c, elasto_plastic=pf.ElastoPlastic(0.9))
     model = pf.ReducedModel(PAD, law)
-    return pf.scenes.in_hand(model, normal_force=grip, centre_of_mass=(OFFSET, 0.0), mass=MASS, t_end=0.5)
+    return pf.scenes.in_hand(
+        model, normal_force=grip, centre_of_mass=(OFFSET, 0.0), mass=MASS, t_end=0.5
+    )
 
 
 def end(solution: pf.Solution) -> dict[str, float]:
     """Final angle [rad] and slip of the pads [m]."""
     x, y, theta = (solution.histories[name].values[-1] for name in ("x", "y", "theta"))
     start = OFFSET * np.array([np.cos(theta), np.sin(theta)])
-    pad = np.array([x, y]) - start  # the point of the plate that was between the pads at the start
+    pad = (
+        np.array([x, y]) - start
+    )  # the point of the plate that was between the pads at the start
     return {"angle": float(theta), "slip": float(np.linalg.norm(pad))}
 
 
 def run(points: int, folder: Path | None = None) -> xr.Dataset:
     """Run the sweep with `points` values of each quantity."""
-    values = {"grip": np.linspace(1.5, 6.0, points), "mu_c": np.linspace(0.5, 1.5, points)}
+    values = {
+        "grip": np.linspace(1.5, 6.0, points),
+        "mu_c": np.linspace(0.5, 1.5, points),
+    }
     return pf.sweep(plate, values, out=folder, measure=end, progress=print)
 
 
@@ -57,7 +64,9 @@ def holding_grip(mu_s: np.ndarray) -> np.ndarray:
     weight = 9.81 * MASS
     wrench = np.array([0.0, weight, weight * OFFSET])
     surface = pf.LimitSurfaceExact(PAD)
-    limit = surface.wrench(surface.twist(wrench))  # largest wrench in this direction for mu f_N = 1
+    limit = surface.wrench(
+        surface.twist(wrench)
+    )  # largest wrench in this direction for mu f_N = 1
     return np.linalg.norm(wrench) / np.linalg.norm(limit) / (2.0 * mu_s)
 
 
@@ -70,11 +79,18 @@ def draw(data: xr.Dataset) -> Any:
         (panels[0], -np.degrees(data.angle), "angle turned in 0.5 s [deg]"),
         (panels[1], 1e3 * data.slip, "slip of the pads in 0.5 s [mm]"),
     ):
-        capped = values.transpose("mu_c", "grip").clip(0.0, 90.0 if "angle" in words else 20.0)
-        mesh = axes.pcolormesh(data.grip, data.mu_c, capped, shading="nearest", rasterized=True)
+        capped = values.transpose("mu_c", "grip").clip(
+            0.0, 90.0 if "angle" in words else 20.0
+        )
+        mesh = axes.pcolormesh(
+            data.grip, data.mu_c, capped, shading="nearest", rasterized=True
+        )
         figure.colorbar(mesh, ax=axes, label=words, extend="max")  # what is more is cut
         axes.plot(holding_grip(RATIO * mu), mu, "w--", label="limit of holding")
-        axes.set(xlabel="grip of each finger [N]", xlim=(float(data.grip[0]), float(data.grip[-1])))
+        axes.set(
+            xlabel="grip of each finger [N]",
+            xlim=(float(data.grip[0]), float(data.grip[-1])),
+        )
     panels[0].set_ylabel("friction coefficient mu_c [-]")
     panels[0].legend(loc="upper right", facecolor="tab:gray", labelcolor="white")
     return figure
@@ -87,7 +103,9 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     data = run(options.points, options.out / "sweep-grip")
     agree = (abs(data.angle) < HELD) == (data.grip > holding_grip(RATIO * data.mu_c))
-    print(f"held or not, as the limit surface predicts: {int(agree.sum())} of {agree.size} runs")
+    print(
+        f"held or not, as the limit surface predicts: {int(agree.sum())} of {agree.size} runs"
+    )
     path = options.out / "sweep_grip.png"
     draw(data).savefig(path, dpi=120, facecolor="white", metadata={"Software": None})
     print(f"wrote {path}")

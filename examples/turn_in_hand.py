@@ -23,7 +23,9 @@ OFFSET = 0.025  # [m]
 def plan(degrees: float, aim: str) -> GripPlan:
     """Plan to turn the plate by this many degrees within a second."""
     model = pf.ReducedModel(PAD, LAW)
-    scene = pf.scenes.in_hand(model, centre_of_mass=(OFFSET, 0.0), normal_force=4.0, t_end=1.0)
+    scene = pf.scenes.in_hand(
+        model, centre_of_mass=(OFFSET, 0.0), normal_force=4.0, t_end=1.0
+    )
     return plan_grip(scene, {"angle": math.radians(degrees)}, aim=aim)
 
 
@@ -38,7 +40,9 @@ def main() -> None:
         if aim == "nominal":
             weight = 9.81 * found.scene.body.mass / 2  # of two fingers
             load = (0.0, -weight, -OFFSET * weight)
-            print(f"To hold the plate, each finger must press with {holding_load(load, PAD, LAW.mu_s):.2f} N.\n")
+            print(
+                f"To hold the plate, each finger must press with {holding_load(load, PAD, LAW.mu_s):.2f} N.\n"
+            )
         print(f"{found}\n")
         found.plot().savefig(options.out / f"turn-{aim}.png")
         found.scene.to_file(options.out / f"turn-{aim}.toml")

@@ -12,11 +12,15 @@ from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
 
 _GRID = ContactPatch.disc(0.02, cells=4)
-DISCS = ContactPatch(_GRID.positions, _GRID.areas, _GRID.weights(), radii=np.full(_GRID.cells, 0.005))
+DISCS = ContactPatch(
+    _GRID.positions, _GRID.areas, _GRID.weights(), radii=np.full(_GRID.cells, 0.005)
+)
 LEANING = dataclasses.replace(DISCS, asymmetry=(0.3, -0.2))
 
 
-def _patches(reference: float | None, sigma_0: float = 1e6, second: ContactPatch = DISCS) -> CoupledPatches:
+def _patches(
+    reference: float | None, sigma_0: float = 1e6, second: ContactPatch = DISCS
+) -> CoupledPatches:
     law = LuGre(mu_s=1.2, sigma_0=sigma_0, elasto_plastic=0.9, reference_load=reference)
     return CoupledPatches([DistributedModel(_GRID, law), DistributedModel(second, law)])
 
@@ -26,33 +30,49 @@ def _host(seed: int, load: float | None = None, response: float = 0.0) -> HostSt
     twist = rng.normal(size=(2, 3)) * [3e-3, 3e-3, 0.1]
     loads = rng.uniform(0.5, 3.0, 2) if load is None else np.full(2, load)
     by_load = response * rng.normal(size=(2, 6)) * np.tile([1.0, 1.0, 30.0], 2)
-    return HostStep(twist, loads, np.zeros((2, 3)), np.diag(np.tile([0.01, 0.01, 20.0], 2)), by_load)
+    return HostStep(
+        twist, loads, np.zeros((2, 3)), np.diag(np.tile([0.01, 0.01, 20.0], 2)), by_load
+    )
 
 
 @pytest.mark.parametrize("load", [1.0, 2.5])
 def test_at_a_held_load_it_is_a_law_of_another_sigma_0(load):
-    fixed, published = _patches(1.0), _patches(None, 1e6 / load)
-    z, y = fixed.rest(), published.rest()
+    fixed = _patches(1.0)
+    published = _patches(None, 1e6 / load)
+    z = fixed.rest()
+    y = published.rest()
     for seed in range(10):
-        one, other = fixed.step(z, _host(seed, load), 1e-3), published.step(y, _host(seed, load), 1e-3)
+        one = fixed.step(z, _host(seed, load), 1e-3)
+        other = published.step(y, _host(seed, load), 1e-3)
         np.testing.assert_allclose(one.wrench, other.wrench, rtol=1e-7, atol=1e-9)
         assert one.converged and one.iterations == other.iterations
-        z, y = one.state, other.state
+        z = one.state
+        y = other.state
 
 
 @pytest.mark.parametrize("second", [DISCS, LEANING], ids=["discs", "leaning discs"])
 def test_wrenches_are_those_of_the_models_while_loads_follow_them(second):
-    patches, z, moved = _patches(1.0, second=second), _patches(1.0).rest(), 0.0
+    patches = _patches(1.0, second=second)
+    z = _patches(1.0).rest()
+    moved = 0.0
     for seed in range(30):
         host = _host(seed, response=0.3)
         done = patches.step(z, host, 1e-3)
         assert done.converged and done.iterations <= 12
-        for k, (model, state) in enumerate(zip(patches.models, patches.states(z), strict=True)):
+        for k, (model, state) in enumerate(
+            zip(patches.models, patches.states(z), strict=True)
+        ):
             new, pull = model.step(state, done.twist[k], done.normal_force[k], 1e-3)
-            rtol = 1e-12 if done.iterations < 8 else 1e-6  # near a kink the last loads differ by the tolerance
+            rtol = (
+                1e-12 if done.iterations < 8 else 1e-6
+            )  # near a kink the last loads differ by the tolerance
             np.testing.assert_allclose(done.wrench[k], pull, rtol=rtol, atol=1e-13)
-            np.testing.assert_allclose(patches.states(done.state)[k], new, rtol=rtol, atol=1e-6 * rtol)
-        loads = np.maximum(host.normal_force + host.load_response @ done.wrench.ravel(), 0.0)
+            np.testing.assert_allclose(
+                patches.states(done.state)[k], new, rtol=rtol, atol=1e-6 * rtol
+            )
+        loads = np.maximum(
+            host.normal_force + host.load_response @ done.wrench.ravel(), 0.0
+        )
         np.testing.assert_allclose(done.normal_force, loads, rtol=0.0, atol=1e-6)
         moved = max(moved, np.abs(loads - host.normal_force).max())
         z = done.state
@@ -61,11 +81,14 @@ def test_wrenches_are_those_of_the_models_while_loads_follow_them(second):
 
 def test_newton_knows_how_wrenches_follow_their_loads():
     """With the slopes of the published law it takes 268 iterations."""
-    patches, z, taken = _patches(1.0), _patches(1.0).rest(), 0
+    patches = _patches(1.0)
+    z = _patches(1.0).rest()
+    taken = 0
     for seed in range(60):
         done = patches.step(z, _host(seed, response=1.0), 1e-3)
         assert done.converged
-        z, taken = done.state, taken + int(done.iterations)
+        z = done.state
+        taken = taken + int(done.iterations)
     assert taken < 230
 
 
@@ -73,13 +96,22 @@ def test_a_held_body_keeps_its_force_under_a_load_that_oscillates():
     """The published law lets it swing."""
     for reference in (1.0, None):
         patches = _patches(reference)
-        z, twist, wrench, forces, place = patches.rest(), np.zeros((2, 3)), np.zeros((2, 3)), [], [0.0]
-        pull, response = np.tile([0.5, 0.1, 0.0], (2, 1)), np.diag(np.tile([0.01, 0.01, 20.0], 2))
+        z = patches.rest()
+        twist = np.zeros((2, 3))
+        wrench = np.zeros((2, 3))
+        forces = []
+        place = [0.0]
+        pull = np.tile([0.5, 0.1, 0.0], (2, 1))
+        response = np.diag(np.tile([0.01, 0.01, 20.0], 2))
         for i in range(400):
             load = 1.0 + 0.3 * np.sin(0.1 * i)
             free = twist + np.array([0.01, 0.01, 20.0]) * (pull + wrench)
-            done = patches.step(z, HostStep(free, np.full(2, load), wrench, response), 1e-3)
-            z, twist, wrench = done.state, done.twist, done.wrench
+            done = patches.step(
+                z, HostStep(free, np.full(2, load), wrench, response), 1e-3
+            )
+            z = done.state
+            twist = done.twist
+            wrench = done.wrench
             forces.append(wrench.copy())
             place.append(place[-1] + 1e-3 * twist[0, 0])
         np.testing.assert_allclose(forces[-1], -pull, atol=1e-4 if reference else 1e-1)
@@ -89,5 +121,7 @@ def test_a_held_body_keeps_its_force_under_a_load_that_oscillates():
 
 def test_moments_are_refused():
     host = _host(0)._replace(moments=np.zeros((2, 2)))
-    with pytest.raises(InvalidValueError, match="moments must be None for a law with a reference_load"):
+    with pytest.raises(
+        InvalidValueError, match="moments must be None for a law with a reference_load"
+    ):
         _patches(1.0).step(_patches(1.0).rest(), host, 1e-3)

@@ -20,34 +20,49 @@ PATCHES = CoupledPatches([pf.ReducedModelPublished(PATCH, LAW, ELLIPSOID)] * 4)
 def _runs(height: float, steps: int):
     """Steps of 0.1 to 10 ms, of bodies that stay and of others in each; friction tilts the loads by the `height`."""
     generator = np.random.default_rng(14)
-    yield from random_run(generator, PATCHES, random_bodies(generator, 256, 4, height), steps)
+    yield from random_run(
+        generator, PATCHES, random_bodies(generator, 256, 4, height), steps
+    )
     yield from abrupt_run(generator, PATCHES, 256, height, steps)
 
 
 def _excess_work(state, host, step, dt) -> np.ndarray:
     """Work on the host beyond what the bristles give, as a share of both."""
-    flat, count = step.wrench.reshape(len(dt), -1), len(dt)
+    flat = step.wrench.reshape(len(dt), -1)
+    count = len(dt)
     change = flat - host.wrench.reshape(count, -1)
-    twist = host.twist.reshape(count, -1) + np.einsum("eij,ej->ei", host.twist_response, change)
+    twist = host.twist.reshape(count, -1) + np.einsum(
+        "eij,ej->ei", host.twist_response, change
+    )
     work = dt * (twist * flat).sum(axis=1)
     lengths = np.array([1.0, 1.0, ELLIPSOID.contact_radius])
-    squares = (((z.reshape(count, 4, 3) / lengths) ** 2).sum(axis=2) for z in (state, step.state))
-    before, after = (0.5 * LAW.sigma_0 * (step.normal_force * each).sum(axis=1) for each in squares)
+    squares = (
+        ((z.reshape(count, 4, 3) / lengths) ** 2).sum(axis=2)
+        for z in (state, step.state)
+    )
+    before, after = (
+        0.5 * LAW.sigma_0 * (step.normal_force * each).sum(axis=1) for each in squares
+    )
     return (work - (before - after)) / (abs(work) + before + after + 1e-300)
 
 
 def test_what_does_not_converge_is_tried_again():
-    once, again = 0, 0
+    once = 0
+    again = 0
     for state, host, dt, step in _runs(0.05, 12):
         first = PATCHES.step(state, host, dt, iterations=50)
-        once, again = once + (~first.converged).sum(), again + (~step.converged).sum()
-        assert (step.residual <= first.residual).all() and (step.iterations >= first.iterations).all()
+        once = once + (~first.converged).sum()
+        again = again + (~step.converged).sum()
+        assert (step.residual <= first.residual).all() and (
+            step.iterations >= first.iterations
+        ).all()
     assert once >= 10 and again <= once / 5
 
 
 def test_what_does_not_converge_does_no_work_that_bristles_do_not_give():
     """Loads that grow faster with friction than friction with loads: some steps have no solution."""
-    lost, wrong = 0, 0
+    lost = 0
+    wrong = 0
     for state, host, dt, step in _runs(3.0, 6):
         first = PATCHES.step(state, host, dt, iterations=50)
         lost += (~step.converged).sum()
@@ -61,11 +76,16 @@ def test_what_does_not_converge_does_no_work_that_bristles_do_not_give():
 def test_a_wedge_that_jams_stops(speed, growth):
     """The load grows by so many newtons for each of friction, which is 1.2 N for each of load: above 1/1.2 it jams."""
     patches = CoupledPatches(PATCHES.models[:1])
-    response, jam = np.diag([1e-3, 1e-3, 10.0]), np.array([[-growth, 0.0, 0.0]])
-    host = HostStep(np.array([[speed, 0.0, 0.0]]), np.ones(1), np.zeros((1, 3)), response, jam)
+    response = np.diag([1e-3, 1e-3, 10.0])
+    jam = np.array([[-growth, 0.0, 0.0]])
+    host = HostStep(
+        np.array([[speed, 0.0, 0.0]]), np.ones(1), np.zeros((1, 3)), response, jam
+    )
     step = patches.step(patches.rest(), host, 1e-3)
     assert step.converged
     if growth > 1.0 or speed < 0.1:
         # bristles of 12 nm hold what the body loses in the step
         assert 0.0 <= step.twist[0, 0] <= 1.2e-8 / 1e-3
-        np.testing.assert_allclose(step.wrench[0, 0], -speed / response[0, 0], rtol=0.02)
+        np.testing.assert_allclose(
+            step.wrench[0, 0], -speed / response[0, 0], rtol=0.02
+        )

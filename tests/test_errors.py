@@ -12,9 +12,14 @@ from planarfriction import errors
 
 
 def test_values_of_messages_are_cut_to_eighty_characters():
-    assert errors.shown(80 * "a") == 80 * "a" and errors.shown(81 * "a") == 77 * "a" + "..."
+    assert (
+        errors.shown(80 * "a") == 80 * "a"
+        and errors.shown(81 * "a") == 77 * "a" + "..."
+    )
     assert errors.shown("a\nb") == "'a\\nb'" and errors.shown("a  b") == "a b"
-    assert errors.shown(list(range(12))).endswith("10, 11]") and errors.shown(list(range(13))).endswith("11, ...]")
+    assert errors.shown(list(range(12))).endswith("10, 11]") and errors.shown(
+        list(range(13))
+    ).endswith("11, ...]")
     assert errors.shown({"a": np.float64(1.5)}) == "{'a': np.float64(1.5)}"
     assert errors.shown(10**5000) == "int that is too long to show"
 
@@ -23,7 +28,10 @@ def test_messages_about_files_lose_their_middle():
     assert errors.one_line(300 * "a") == 300 * "a"
     cut = errors.one_line(150 * "a" + "x" + 150 * "b")
     assert cut == 145 * "a" + " ... " + 150 * "b"
-    assert errors.one_line("a\x1b\nb") == "a\\x1b\\nb" and str(errors.FileError("a\tb")) == "a\\tb"
+    assert (
+        errors.one_line("a\x1b\nb") == "a\\x1b\\nb"
+        and str(errors.FileError("a\tb")) == "a\\tb"
+    )
 
 
 @pytest.mark.parametrize(
@@ -39,9 +47,17 @@ def test_messages_about_files_lose_their_middle():
 )
 def test_errors_travel_with_their_attributes(error):
     for again in (pickle.loads(pickle.dumps(error)), copy.copy(error)):
-        assert type(again) is type(error) and str(again) == str(error) and again.__dict__ == error.__dict__
-    assert "mu must be > 0, got -1.0" in str(errors.InvalidValueError("mu", "be > 0", -1.0))
-    assert str(errors.IdentificationInterrupted({"mu_c": 0.51234567})).endswith("[SI]: mu_c = 0.5123")
+        assert (
+            type(again) is type(error)
+            and str(again) == str(error)
+            and again.__dict__ == error.__dict__
+        )
+    assert "mu must be > 0, got -1.0" in str(
+        errors.InvalidValueError("mu", "be > 0", -1.0)
+    )
+    assert str(errors.IdentificationInterrupted({"mu_c": 0.51234567})).endswith(
+        "[SI]: mu_c = 0.5123"
+    )
 
 
 def test_what_cannot_travel_stays_behind():
@@ -51,10 +67,19 @@ def test_what_cannot_travel_stays_behind():
 
 def test_packages_that_lack_are_named_and_errors_of_our_own_are_not_hidden():
     told = r"^torch is not installed: .*\[torch\]'; for the processor"
-    with pytest.raises(errors.MissingExtraError, match=told), errors.needing("torch", "torch"):
+    with (
+        pytest.raises(errors.MissingExtraError, match=told),
+        errors.needing("torch", "torch"),
+    ):
         raise ImportError("no", name="torch._C")
-    with pytest.raises(errors.MissingExtraError, match=r"\[jax\]'$"), errors.needing("jax", "jax"):
+    with (
+        pytest.raises(errors.MissingExtraError, match=r"\[jax\]'$"),
+        errors.needing("jax", "jax"),
+    ):
         raise ImportError("no", name="jaxlib")
-    with pytest.raises(ImportError, match="gone") as caught, errors.needing("jax", "jax"):
+    with (
+        pytest.raises(ImportError, match="gone") as caught,
+        errors.needing("jax", "jax"),
+    ):
         raise ImportError("gone", name="planarfriction.gone")
     assert type(caught.value) is ImportError

@@ -25,7 +25,14 @@ from planarfriction.scenes.solution import History
 DOCS = Path(__file__).parents[1] / "docs"
 DISC = pf.ContactPatch.disc(0.01, 7)
 LAW = pf.LuGre(mu_c=0.5, elasto_plastic=0.9)
-ALL = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.PUBLISHED_PATCHES, families.SCENES)
+ALL = (
+    families.LAWS,
+    families.MODELS,
+    families.SURFACES,
+    families.SHAPES,
+    families.PUBLISHED_PATCHES,
+    families.SCENES,
+)
 
 
 @dataclass(frozen=True)
@@ -51,8 +58,18 @@ def own():
     """Register members of one's own."""
     pf.laws.register("bronze", Bronze, "dry bronze")
     pf.models.register("coarse", Coarse)
-    pf.patch.register("tile", lambda width, cells=3: pf.ContactPatch.rectangle(width, cells=cells, name="tile"))
-    pf.scenes.register("still", lambda model, t_end=1.0: dataclasses.replace(in_hand(model, t_end=t_end), name="still"))
+    pf.patch.register(
+        "tile",
+        lambda width, cells=3: pf.ContactPatch.rectangle(
+            width, cells=cells, name="tile"
+        ),
+    )
+    pf.scenes.register(
+        "still",
+        lambda model, t_end=1.0: dataclasses.replace(
+            in_hand(model, t_end=t_end), name="still"
+        ),
+    )
 
 
 # ---------------------------------------------------------------------- the library's own
@@ -74,14 +91,22 @@ def test_the_families_are_complete():
         (families.SURFACES, pf.limit_surface, pf.limit_surface.LimitSurface),
     ):
         public = [getattr(package, name) for name in package.__all__]
-        classes = {each for each in public if isinstance(each, type) and issubclass(each, base) and each is not base}
-        classes = {each for each in classes if dataclasses.is_dataclass(each)}  # `RateLaw` is another base
+        classes = {
+            each
+            for each in public
+            if isinstance(each, type) and issubclass(each, base) and each is not base
+        }
+        classes = {
+            each for each in classes if dataclasses.is_dataclass(each)
+        }  # `RateLaw` is another base
         assert classes == set(family.values())
 
 
 def test_names_are_known_without_loading_anything():
     code = (
-        "import sys, planarfriction.families as f\nlist(f.MODELS), f.LAWS.name_of(3)\nassert 'numpy' not in sys.modules"
+        "import sys, planarfriction.families as f\n"
+        "list(f.MODELS), f.LAWS.name_of(3)\n"
+        "assert 'numpy' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
@@ -113,7 +138,11 @@ def test_a_scene_with_members_of_ones_own_comes_back_from_its_file(own, tmp_path
         again = pf.Scene.from_file(tmp_path / f"scene.{suffix}")
         assert again.digest() == scene.digest()
         model = again.contacts[0].model
-        assert type(model) is Coarse and model.grit == 5 and model.law == Bronze(polish=2.0)
+        assert (
+            type(model) is Coarse
+            and model.grit == 5
+            and model.law == Bronze(polish=2.0)
+        )
 
 
 def test_the_command_line_knows_members_of_ones_own(own, capsys):
@@ -129,19 +158,31 @@ def test_the_command_line_knows_members_of_ones_own(own, capsys):
 
 def test_completion_knows_the_members_and_their_words(own):
     command = app.commands["run"]
-    model, scene = (next(each for each in command.params if each.name == name) for name in ("model", "scene"))
+    model, scene = (
+        next(each for each in command.params if each.name == name)
+        for name in ("model", "scene")
+    )
     context = click.Context(command)
     offered = {item.value: item.help for item in model.shell_complete(context, "")}
-    assert offered == {**{name: families.MODELS.words(name) for name in families.MODELS}, "both": None}
+    assert offered == {
+        **{name: families.MODELS.words(name) for name in families.MODELS},
+        "both": None,
+    }
     assert "coarse" in offered
     found = scene.shell_complete(context, "dri")
-    assert [item.value for item in found] == ["drift", "driven", "dri"] and found[-1].type == "file"
+    assert [item.value for item in found] == ["drift", "driven", "dri"] and found[
+        -1
+    ].type == "file"
 
 
 def test_what_cannot_be_registered():
     for name, make, message in (
         ("lugre", Bronze, "not be the name of a member of the library, got lugre"),
-        ("My law", Bronze, "consist of lower-case letters, digits and hyphens, got 'My law'"),
+        (
+            "My law",
+            Bronze,
+            "consist of lower-case letters, digits and hyphens, got 'My law'",
+        ),
         ("bronze", Bronze(), "law must be a class, or a function that makes one"),
     ):
         with pytest.raises(InvalidValueError, match=message):
@@ -153,7 +194,9 @@ def test_what_cannot_be_registered():
 
 def read(folder, contact):
     text = "t_end = 1.0\nbody = { mass = 1.0, inertia = 1.0 }\n[contact]\nnormal_force = 2.0\n"
-    (folder / "scene.toml").write_text(f"{text}{contact}patch = {{ shape = 'disc', radius = 0.01, cells = 5 }}\n")
+    (folder / "scene.toml").write_text(
+        f"{text}{contact}patch = {{ shape = 'disc', radius = 0.01, cells = 5 }}\n"
+    )
     return pf.Scene.from_file(folder / "scene.toml").contacts[0].model
 
 
@@ -161,10 +204,19 @@ def read(folder, contact):
     ("table", "law"),
     [
         ("{ mu_c = 0.3 }", pf.LuGre(mu_c=0.3)),
-        ("{ kind = 'lugre', mu_c = 0.3, elasto_plastic = 0.8 }", pf.LuGre(mu_c=0.3, elasto_plastic=0.8)),
-        ("{ elasto_plastic = { breakaway_ratio = 0.8 } }", pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.8))),
+        (
+            "{ kind = 'lugre', mu_c = 0.3, elasto_plastic = 0.8 }",
+            pf.LuGre(mu_c=0.3, elasto_plastic=0.8),
+        ),
+        (
+            "{ elasto_plastic = { breakaway_ratio = 0.8 } }",
+            pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.8)),
+        ),
         ("{ kind = 'dahl', sigma_0 = 2e4 }", pf.Dahl(sigma_0=2e4)),
-        ("{ kind = 'coulomb-stribeck', mu_c = 0.4, v_s = 0.01 }", pf.CoulombStribeck(mu_c=0.4, v_s=0.01)),
+        (
+            "{ kind = 'coulomb-stribeck', mu_c = 0.4, v_s = 0.01 }",
+            pf.CoulombStribeck(mu_c=0.4, v_s=0.01),
+        ),
     ],
 )
 def test_laws_by_kind(tmp_path, table, law):
@@ -177,9 +229,15 @@ def test_laws_by_kind(tmp_path, table, law):
 @pytest.mark.parametrize(
     ("contact", "message"),
     [
-        ("law = { kind = 'dhal' }\n", "[contact.law]: kind must be one of lugre, dahl, coulomb-stribeck, got 'dhal'"),
+        (
+            "law = { kind = 'dhal' }\n",
+            "[contact.law]: kind must be one of lugre, dahl, coulomb-stribeck, got 'dhal'",
+        ),
         ("law = { kind = 'dahl', mu_s = 1.2 }\n", "[contact.law]: unknown key 'mu_s'"),
-        ("law = {}\nmodel = 'fast'\n", "kind must be one of distributed, reduced, reduced-published, got 'fast'"),
+        (
+            "law = {}\nmodel = 'fast'\n",
+            "kind must be one of distributed, reduced, reduced-published, got 'fast'",
+        ),
         (
             "law = {}\nmodel = { kind = 'reduced-published', surface = 'round' }\n",
             "kind must be one of cells, exact, table, table-published, ellipsoid, quartic, got 'round'",
@@ -201,20 +259,31 @@ def test_every_surface_comes_back_from_a_scene(name):
     surface = families.SURFACES[name](DISC)
     scene = in_hand(pf.ReducedModelPublished(DISC, LAW, surface=surface))
     again = pf.Scene.from_dict(scene.to_dict())
-    assert type(again.contacts[0].model.surface) is type(surface) and again.digest() == scene.digest()
+    assert (
+        type(again.contacts[0].model.surface) is type(surface)
+        and again.digest() == scene.digest()
+    )
 
 
 @pytest.mark.quartic
 def test_a_fitted_quartic_comes_back_with_its_numbers():
-    pytest.importorskip("cvxpy", reason="cvxpy is not installed: the convex quartic is an extra")
+    pytest.importorskip(
+        "cvxpy", reason="cvxpy is not installed: the convex quartic is an extra"
+    )
     coefficients = np.zeros(15)
     coefficients[[0, 10, 14]] = 1.0  # x^4, y^4, z^4
     coefficients[[3, 5, 12]] = 2.0  # x^2 y^2, x^2 z^2, y^2 z^2: the sphere
     other = pf.ContactPatch.disc(0.02, 5)
-    quartic = pf.LimitSurfaceQuartic(other, coefficients=coefficients, surface=pf.LimitSurfaceTable(other, segments=6))
+    quartic = pf.LimitSurfaceQuartic(
+        other,
+        coefficients=coefficients,
+        surface=pf.LimitSurfaceTable(other, segments=6),
+    )
     scene = in_hand(pf.ReducedModelPublished(DISC, LAW, surface=quartic))
     again = pf.Scene.from_dict(scene.to_dict()).contacts[0].model.surface
-    assert np.array_equal(again.coefficients, coefficients) and again.surface.segments == 6
+    assert (
+        np.array_equal(again.coefficients, coefficients) and again.surface.segments == 6
+    )
     assert again.patch.contact_radius() == other.contact_radius()
 
 
@@ -223,13 +292,25 @@ def test_a_fitted_quartic_comes_back_with_its_numbers():
 
 def a_solution(model) -> Solution:
     time = np.linspace(0.0, 1.0, 5)
-    histories = {name: History(("time",), np.zeros(5), {"units": "m"}) for name in ("x", "y", "theta")}
-    histories |= {name: History(("time",), np.zeros(5), {"units": "m/s"}) for name in ("vx", "vy", "omega")}
+    histories = {
+        name: History(("time",), np.zeros(5), {"units": "m"})
+        for name in ("x", "y", "theta")
+    }
+    histories |= {
+        name: History(("time",), np.zeros(5), {"units": "m/s"})
+        for name in ("vx", "vy", "omega")
+    }
     for name, unit in {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}.items():
         histories[name] = History(("time", "contact"), np.ones((5, 1)), {"units": unit})
     histories["time"] = History(("time",), time, {"units": "s"})
     histories["contact"] = History(("contact",), np.array(["fingers"]), {})
-    return Solution(histories, Statistics(steps=1, wall_time=0.1), "success", "reached t_end", in_hand(model))
+    return Solution(
+        histories,
+        Statistics(steps=1, wall_time=0.1),
+        "success",
+        "reached t_end",
+        in_hand(model),
+    )
 
 
 def test_a_scene_that_cannot_be_written_still_plots_and_saves(tmp_path):
@@ -241,7 +322,10 @@ def test_a_scene_that_cannot_be_written_still_plots_and_saves(tmp_path):
     again = pf.Solution.load(solution.save(tmp_path / "run.nc"))
     assert again.scene is None and again.data.attrs == solution.data.attrs
     assert np.array_equal(again.data.fx, solution.data.fx)
-    with pytest.raises(FileError, match="the file has no scene, which the plot needs: model must be one of"):
+    with pytest.raises(
+        FileError,
+        match="the file has no scene, which the plot needs: model must be one of",
+    ):
         again.plot()
     twice = pf.Solution.load(again.save(tmp_path / "twice.nc"))
     assert twice.data.attrs == again.data.attrs
@@ -251,11 +335,16 @@ def test_a_scene_that_cannot_be_written_still_plots_and_saves(tmp_path):
 
 @pytest.mark.parametrize("law", [Bronze(), pf.LuGre(mu_c=0.5)], ids=["own", "LuGre"])
 def test_only_what_can_be_written_has_its_scene_in_the_data(law):
-    assert bool(a_solution(pf.DistributedModel(DISC, law)).data.attrs["scene"]) == isinstance(law, pf.LuGre)
+    assert bool(
+        a_solution(pf.DistributedModel(DISC, law)).data.attrs["scene"]
+    ) == isinstance(law, pf.LuGre)
 
 
 def test_a_parameter_that_is_no_plain_data_is_named(own):
-    with pytest.raises(InvalidValueError, match=r"grit must be an attribute of Coarse and plain data .* got function"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"grit must be an attribute of Coarse and plain data .* got function",
+    ):
         in_hand(Coarse(DISC, LAW, grit=lambda: 3)).to_dict()  # pyright: ignore
 
 

@@ -19,7 +19,8 @@ POSIX = ("fcntl", "grp", "pty", "pwd", "resource", "termios")
 
 def refusing(monkeypatch, times: int) -> None:
     """Refuse to replace a file a number of times, as Windows does while another program has it open."""
-    replace, left = os.replace, iter(range(times))
+    replace = os.replace
+    left = iter(range(times))
 
     def refused(part, target):
         if next(left, None) is not None:
@@ -37,7 +38,9 @@ def test_a_file_that_is_open_elsewhere_is_tried_again(tmp_path, monkeypatch):
     writing.write_text(path, "new")
     assert path.read_text() == "new"
     refusing(monkeypatch, 3)
-    with pytest.raises(FileError, match=r"run\.json: cannot be written: Access is denied"):
+    with pytest.raises(
+        FileError, match=r"run\.json: cannot be written: Access is denied"
+    ):
         writing.write_text(path, "newer")
     assert path.read_text() == "new" and os.listdir(tmp_path) == ["run.json"]
 
@@ -65,5 +68,7 @@ for name in ("cli", "_engine.compiler", "scenes", "solvers", "sweeps", "export",
     for module in pkgutil.iter_modules(package.__path__, package.__name__ + "."):
         importlib.import_module(module.name)
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr

@@ -61,7 +61,9 @@ def test_what_is_no_file_is_said_at_once(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", READERS)
-@pytest.mark.parametrize("content", [b"", NOISE, b"\xff\xfe\x00", b"a,b\n1,c\n", b"[" * 20_000, b"\0" * 100])
+@pytest.mark.parametrize(
+    "content", [b"", NOISE, b"\xff\xfe\x00", b"a,b\n1,c\n", b"[" * 20_000, b"\0" * 100]
+)
 def test_files_of_another_kind_get_one_line(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     assert name in one_line(READERS[name], tmp_path / name)
@@ -71,7 +73,13 @@ def test_what_a_shell_pipes_is_read(tmp_path):
     rows = "".join(f"{0.01 * i},0,0,0,0,0,0,1\n" for i in range(20))
     text = f"t,vx,vy,omega,fx,fy,tau,normal_force\n{rows}"
     code = "import sys; from planarfriction.identify import Log; print(len(Log.from_csv('/dev/stdin').time))"
-    done = subprocess.run([sys.executable, "-c", code], input=text, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        input=text,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert done.stdout == "20\n"
 
 
@@ -79,16 +87,25 @@ def test_what_a_shell_pipes_is_read(tmp_path):
 
 
 def test_text_files_have_a_largest_size(tmp_path):
-    for name, most in (("scene.toml", 256), ("load.csv", 4000), ("log.csv", 4000), ("map.csv", 256)):
+    for name, most in (
+        ("scene.toml", 256),
+        ("load.csv", 4000),
+        ("log.csv", 4000),
+        ("map.csv", 256),
+    ):
         with (tmp_path / name).open("wb") as file:
             file.truncate(1 << 40)  # sparse: takes no place, and no memory holds it
-        assert f"is larger than {most} MB, the most that is read" in one_line(READERS[name], tmp_path / name)
+        assert f"is larger than {most} MB, the most that is read" in one_line(
+            READERS[name], tmp_path / name
+        )
 
 
 def test_a_line_without_end_is_not_read_to_its_end(tmp_path, monkeypatch):
     monkeypatch.setattr(reading, "MOST_TEXT", 1000)
     (tmp_path / "log.csv").write_text(2000 * "t")
-    assert "is larger than 4000 MB" in one_line(READERS["log.csv"], tmp_path / "log.csv")
+    assert "is larger than 4000 MB" in one_line(
+        READERS["log.csv"], tmp_path / "log.csv"
+    )
 
 
 @pytest.mark.parametrize("at_once", [1, 2, 3, 1000])
@@ -102,7 +119,9 @@ def test_a_line_without_end_is_not_read_to_its_end(tmp_path, monkeypatch):
         "a\tb\tc\n1\t 2\t3\n4\t5\t6\n7\t8\t9e0\n",
     ],
 )
-def test_tables_are_read_the_same_in_blocks_of_any_size(tmp_path, monkeypatch, text, at_once):
+def test_tables_are_read_the_same_in_blocks_of_any_size(
+    tmp_path, monkeypatch, text, at_once
+):
     monkeypatch.setattr(reading, "AT_ONCE", at_once)
     (tmp_path / "t.csv").write_bytes(text.encode())
     found = reading.Table(tmp_path / "t.csv").numbers(["c", "b"])
@@ -112,17 +131,25 @@ def test_tables_are_read_the_same_in_blocks_of_any_size(tmp_path, monkeypatch, t
 @pytest.mark.parametrize("at_once", [2, 1000])
 @pytest.mark.parametrize(
     ("row", "words"),
-    [("x,2", "line 4, column 'a': 'x' is not a number"), ("1,2,3", "line 4 has 3 columns"), ("inf,2", "is not finite")],
+    [
+        ("x,2", "line 4, column 'a': 'x' is not a number"),
+        ("1,2,3", "line 4 has 3 columns"),
+        ("inf,2", "is not finite"),
+    ],
 )
 def test_what_is_wrong_in_a_block_is_named(tmp_path, monkeypatch, row, words, at_once):
     monkeypatch.setattr(reading, "AT_ONCE", at_once)
     (tmp_path / "t.csv").write_text(f"a,b\n1,2\n3,4\n{row}\n")
-    assert words in one_line(lambda path: reading.Table(path).numbers(["a", "b"]), tmp_path / "t.csv")
+    assert words in one_line(
+        lambda path: reading.Table(path).numbers(["a", "b"]), tmp_path / "t.csv"
+    )
 
 
 def test_a_table_is_read_in_little_more_memory_than_its_numbers(tmp_path):
     """Its numbers, the block that is parsed, and what a growing array has in reserve: less than the text."""
-    (tmp_path / "t.csv").write_text("a,b\n" + 300_000 * "1.000000001,2.000000000000001\n")
+    (tmp_path / "t.csv").write_text(
+        "a,b\n" + 300_000 * "1.000000001,2.000000000000001\n"
+    )
     tracemalloc.start()
     found = reading.Table(tmp_path / "t.csv").numbers(["a", "b"])
     most = tracemalloc.get_traced_memory()[1]
@@ -132,8 +159,16 @@ def test_a_table_is_read_in_little_more_memory_than_its_numbers(tmp_path):
 
 def test_pipes_have_a_largest_size():
     code = "from planarfriction import reading\nreading.MOST_TEXT = 100_000\nreading.read_text('/dev/stdin', 'a text')"
-    done = subprocess.run([sys.executable, "-c", code], input=100_001 * "a", capture_output=True, text=True)
-    assert "FileError: /dev/stdin: is larger than 0.1 MB, the most that is read as a text" in done.stderr
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        input=100_001 * "a",
+        capture_output=True,
+        text=True,
+    )
+    assert (
+        "FileError: /dev/stdin: is larger than 0.1 MB, the most that is read as a text"
+        in done.stderr
+    )
 
 
 def test_maps_have_a_largest_size(tmp_path, monkeypatch):
@@ -142,7 +177,9 @@ def test_maps_have_a_largest_size(tmp_path, monkeypatch):
     Image.new("L", (10, 10), 1).save(tmp_path / "map.png")
     (tmp_path / "map.csv").write_text(10 * (",".join(10 * "1") + "\n"))
     for name in ("map.npy", "map.png", "map.csv"):
-        assert f"{name}: has more than 99 cells" in one_line(read_pressure_map, tmp_path / name)
+        assert f"{name}: has more than 99 cells" in one_line(
+            read_pressure_map, tmp_path / name
+        )
 
 
 def test_huge_pictures_are_refused_before_memory_is_asked_for(tmp_path):
@@ -156,9 +193,13 @@ def test_arrays_that_claim_more_than_they_hold(tmp_path):
     np.save(tmp_path / "map.npy", np.ones((2, 2)))
     content = (tmp_path / "map.npy").read_bytes()
     for shape in (b"(999999, 999999)", b"(9999999999999, 9999999999999)"):
-        changed = content.replace(b"(2, 2)", shape, 1).replace(b" " * (len(shape) - 6), b"", 1)
+        changed = content.replace(b"(2, 2)", shape, 1).replace(
+            b" " * (len(shape) - 6), b"", 1
+        )
         (tmp_path / "map.npy").write_bytes(changed)
-        assert "not a readable .npy file" in one_line(read_pressure_map, tmp_path / "map.npy")
+        assert "not a readable .npy file" in one_line(
+            read_pressure_map, tmp_path / "map.npy"
+        )
 
 
 # ---------------------------------------------------------------------- CSV as others write it
@@ -180,7 +221,11 @@ def test_quotes_comments_empty_lines_and_line_ends(tmp_path):
     )
     read = table(tmp_path, text)
     assert read.names == ["t", "two\nlines", "note"]
-    assert read.numbers(["two\nlines", "t"]).tolist() == [[1.0, 0.0], [2.0, 1.0], [3.0, 2.0]]
+    assert read.numbers(["two\nlines", "t"]).tolist() == [
+        [1.0, 0.0],
+        [2.0, 1.0],
+        [3.0, 2.0],
+    ]
 
 
 @pytest.mark.parametrize(
@@ -190,7 +235,10 @@ def test_quotes_comments_empty_lines_and_line_ends(tmp_path):
         ("# x\n\n a , a\n1,2\n", "line 3 has two columns 'a'"),
         ('a,b\n1,"2\n', "line 2 is not CSV: unexpected end of data"),
         ('a,b\n1,"2"3\n', "line 2 is not CSV"),
-        (f"a,b\n1,{200_000 * '7'}\n", "line 2 is not CSV: field larger than field limit"),
+        (
+            f"a,b\n1,{200_000 * '7'}\n",
+            "line 2 is not CSV: field larger than field limit",
+        ),
         (f"a,b\n1,{1000 * 'x'}\n", "xxx... is not a number"),
         ('a,b\n1,"2\n2"\n', r"line 2, column 'b': '2\n2' is not a number"),
         ("a,b\n1,2\n\n1,inf\n", "line 4, column 'b': 'inf' is not finite"),
@@ -216,7 +264,9 @@ def test_columns_that_nobody_asks_for_may_hold_anything(tmp_path):
 def test_long_tables_come_out_to_the_bit(tmp_path):
     text = "a,b\n" + "".join(f"{i},{i / 3}\n" for i in range(100_000))
     values = table(tmp_path, text).numbers(["b", "a"])
-    assert np.array_equal(values[:, 1], np.arange(100_000)) and np.array_equal(values[:, 0], np.arange(100_000) / 3)
+    assert np.array_equal(values[:, 1], np.arange(100_000)) and np.array_equal(
+        values[:, 0], np.arange(100_000) / 3
+    )
 
 
 def test_duplicate_names_in_signals_and_logs_are_refused(tmp_path):
@@ -237,7 +287,11 @@ def test_what_is_no_path_is_refused(name):
 @pytest.mark.parametrize("name", READERS)
 def test_names_that_cannot_be_printed_are_escaped_and_long_ones_cut(tmp_path, name):
     kind = name[name.index(".") :]
-    for odd, shown in (("a\nb", r"a\nb"), ("\udcff", r"\udcff"), ("\x1b[31m", r"\x1b[31m")):
+    for odd, shown in (
+        ("a\nb", r"a\nb"),
+        ("\udcff", r"\udcff"),
+        ("\x1b[31m", r"\x1b[31m"),
+    ):
         assert shown in one_line(READERS[name], tmp_path / f"{odd}{kind}")
     assert len(one_line(READERS[name], tmp_path / (5000 * "x") / name)) == 300
 
@@ -245,10 +299,13 @@ def test_names_that_cannot_be_printed_are_escaped_and_long_ones_cut(tmp_path, na
 def test_damaged_arrays_get_one_line(tmp_path):
     """NumPy reads the header of an array as source code, and says so in warnings and errors of the parser."""
     np.save(tmp_path / "map.npy", np.ones((3, 3)))
-    good, random = (tmp_path / "map.npy").read_bytes(), np.random.default_rng(5)
+    good = (tmp_path / "map.npy").read_bytes()
+    random = np.random.default_rng(5)
     for _ in range(300):
         place = int(random.integers(128))
-        (tmp_path / "map.npy").write_bytes(good[:place] + random.bytes(2) + good[place + 2 :])
+        (tmp_path / "map.npy").write_bytes(
+            good[:place] + random.bytes(2) + good[place + 2 :]
+        )
         try:
             assert read_pressure_map(tmp_path / "map.npy").shape
         except FrictionError as error:
@@ -256,9 +313,18 @@ def test_damaged_arrays_get_one_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("cell", "number"), [("2,5", 2.5), ("-0,25", -0.25), ("+,5", 0.5), ("1,5e-3", 1.5e-3), ("12,5E+2", 1250.0)]
+    ("cell", "number"),
+    [
+        ("2,5", 2.5),
+        ("-0,25", -0.25),
+        ("+,5", 0.5),
+        ("1,5e-3", 1.5e-3),
+        ("12,5E+2", 1250.0),
+    ],
 )
-def test_numbers_with_a_comma_are_read_as_spreadsheets_write_them(tmp_path, cell, number):
+def test_numbers_with_a_comma_are_read_as_spreadsheets_write_them(
+    tmp_path, cell, number
+):
     (tmp_path / "load.csv").write_text(f"time;value\n0,0;{cell}\n1,0;{cell}\n")
     assert Signal.from_csv(tmp_path / "load.csv").values.tolist() == [number, number]
 

@@ -15,7 +15,9 @@ ELSEWHERE = "figures", "commands", "fits", "surfaces"
 """Results of which a folder has a test of its own."""
 
 
-@pytest.mark.parametrize("name", [name for name in subjects.SUBJECTS if name not in ELSEWHERE])
+@pytest.mark.parametrize(
+    "name", [name for name in subjects.SUBJECTS if name not in ELSEWHERE]
+)
 def test_results_are_those_that_were_recorded(name):
     subjects.check(name, subjects.SUBJECTS[name]())
 
@@ -26,7 +28,13 @@ def told(value):
 
 def test_a_record_sees_numbers_words_and_data():
     row = {"value": 1.0, "reference": 1.1, "tolerance": 0.2}
-    value = {"number": 1.0, "words": "it is 1.25 m", "array": np.arange(9.0), "row": row, "kept": [1, "a", None, True]}
+    value = {
+        "number": 1.0,
+        "words": "it is 1.25 m",
+        "array": np.arange(9.0),
+        "row": row,
+        "kept": [1, "a", None, True],
+    }
     changes = {
         "number": 1.001,
         "words": "it is 1.27 m",
@@ -37,15 +45,36 @@ def test_a_record_sees_numbers_words_and_data():
     assert [*recorded.differences(told(value), told(value))] == []
     for name, other in changes.items():
         assert [*recorded.differences(told(value | {name: other}), told(value))], name
-    assert [*recorded.differences(told(value | {"words": "it is 1.26 m", "number": 1.0 + 1e-9}), told(value))] == []
+    assert [
+        *recorded.differences(
+            told(value | {"words": "it is 1.26 m", "number": 1.0 + 1e-9}), told(value)
+        )
+    ] == []
 
 
 def test_what_two_runs_disagree_about_is_not_compared():
-    one = {"time": 1.0, "near": 2.0, "words": "in 3 ms, 4 times", "array": np.arange(9.0)}
-    other = {"time": 3.0, "near": 2.0001, "words": "in 5 ms, 4 times", "array": np.arange(9.0) + 1e-5}
+    one = {
+        "time": 1.0,
+        "near": 2.0,
+        "words": "in 3 ms, 4 times",
+        "array": np.arange(9.0),
+    }
+    other = {
+        "time": 3.0,
+        "near": 2.0001,
+        "words": "in 5 ms, 4 times",
+        "array": np.arange(9.0) + 1e-5,
+    }
     kept = recorded.shared(told(one), told(other))
     assert kept["time"] is None and kept["words"] == "in # ms, 4 times"
-    for third in (other, one | {"time": 9.0, "words": "in 8 ms, 4 times", "near": 2.001}):
+    for third in (
+        other,
+        one | {"time": 9.0, "words": "in 8 ms, 4 times", "near": 2.001},
+    ):
         assert [*recorded.differences(told(third), kept)] == []
-    for name, wrong in {"near": 2.1, "words": "in 3 ms, 6 times", "array": np.arange(9.0) + 0.01}.items():
+    for name, wrong in {
+        "near": 2.1,
+        "words": "in 3 ms, 6 times",
+        "array": np.arange(9.0) + 0.01,
+    }.items():
         assert [*recorded.differences(told(one | {name: wrong}), kept)], name

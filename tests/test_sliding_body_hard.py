@@ -10,7 +10,13 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.sliding_body import BodyStep
-from tests.support.body_problems import failures, random_body, random_steps, shown, tally
+from tests.support.body_problems import (
+    failures,
+    random_body,
+    random_steps,
+    shown,
+    tally,
+)
 from tests.support.c_libraries import library
 
 SHORT = slice(0, 3)
@@ -19,13 +25,17 @@ SHORT = slice(0, 3)
 
 def check(table: np.ndarray) -> None:
     """Check that no step of up to 10 ms fails, and one in 100,000 of the others at most."""
-    assert table[:, SHORT, 1].sum() == 0 and table[..., 1].sum() <= 1e-5 * table[..., 0].sum(), shown(table)
+    assert (
+        table[:, SHORT, 1].sum() == 0
+        and table[..., 1].sum() <= 1e-5 * table[..., 0].sum()
+    ), shown(table)
 
 
 def test_a_light_body_that_is_pressed_hard():
     """Residuals of 2e-9 m/s, where the load can cause 80 m/s in the step."""
     model = pf.ReducedModel(pf.ContactPatch.disc(0.003), pf.LuGre(0.3, 0.4))
-    body, rng = pf.SlidingBody(0.005, 5e-8, model), np.random.default_rng(0)
+    body = pf.SlidingBody(0.005, 5e-8, model)
+    rng = np.random.default_rng(0)
     push = rng.normal(size=(500, 3)) * [1.0, 1.0, 0.003]
     end = body.step(body.rest(), np.zeros(3), 10.0, 0.1, push)
     held = np.hypot(push[:, 0], push[:, 1]) + np.abs(push[:, 2]) / 0.002 < 0.3 * 10.0
@@ -43,21 +53,30 @@ def test_a_million_random_steps_of_all_sizes(seed):
     check(failures(seed, 100_000))
 
 
-def failures_in_c(seed: int, name: str, patches: int, total: int, count: int = 250, steps: int = 8) -> np.ndarray:
+def failures_in_c(
+    seed: int, name: str, patches: int, total: int, count: int = 250, steps: int = 8
+) -> np.ndarray:
     """Return steps and failures by the decades of mass and time step, `[12, 5, 2]`."""
-    made, generator = library(name, "double", "-O2", patches=patches), np.random.default_rng(seed)
-    table, states = np.zeros((12, 5, 2), int), patches * int(np.prod(made.model.state_shape))
+    made = library(name, "double", "-O2", patches=patches)
+    generator = np.random.default_rng(seed)
+    table = np.zeros((12, 5, 2), int)
+    states = patches * int(np.prod(made.model.state_shape))
     while table[..., 0].sum() < total:
         body = random_body(generator, [made.model], patches)
         places = np.hstack([body.positions, body.angles[:, None]])
         numbers = np.array([body.mass, body.inertia, *places.ravel()])
-        run, end = random_steps(generator, body, count, steps), None
+        run = random_steps(generator, body, count, steps)
+        end = None
         for _ in range(steps):
             given = run.send(end)
             arrays = [np.array(each, order="C") for each in given[:5]]
             before = [each.copy() for each in arrays[:2]]
-            wrench, codes = np.zeros((count, 3)), np.zeros(count, np.int32)
-            pointers = [ctypes.c_void_p(each.ctypes.data) for each in (numbers, *arrays, wrench, codes)]
+            wrench = np.zeros((count, 3))
+            codes = np.zeros(count, np.int32)
+            pointers = [
+                ctypes.c_void_p(each.ctypes.data)
+                for each in (numbers, *arrays, wrench, codes)
+            ]
             made.functions.run_bodies(count, *pointers)
             lost = codes != 0
             assert np.isin(codes, (0, 4)).all()

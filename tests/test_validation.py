@@ -24,7 +24,9 @@ def refused(check, *given, **options) -> str:
     return told
 
 
-@pytest.mark.parametrize("value", [LARGEST, -LARGEST, 0.0, 3, np.float32(0.5), Fraction(1, 4), np.array(2.0)])
+@pytest.mark.parametrize(
+    "value", [LARGEST, -LARGEST, 0.0, 3, np.float32(0.5), Fraction(1, 4), np.array(2.0)]
+)
 def test_numbers_that_pass_are_floats(value):
     found = v.number("x", value)
     assert type(found) is float and found == float(value)
@@ -55,9 +57,14 @@ def test_what_is_no_finite_number_is_refused(value, rule):
 
 
 def test_ends_of_ranges():
-    assert v.positive("x", v.SMALLEST) == v.SMALLEST and v.positive_load("x", 5e-324) == 5e-324
+    assert (
+        v.positive("x", v.SMALLEST) == v.SMALLEST
+        and v.positive_load("x", 5e-324) == 5e-324
+    )
     assert v.non_negative("x", 0) == 0.0 and v.length("x", v.LONGEST) == v.LONGEST
-    assert "must be > 0, got 0" in refused(v.positive, 0.0) and "must be > 0" in refused(v.positive_load, 0.0)
+    assert "must be > 0, got 0" in refused(
+        v.positive, 0.0
+    ) and "must be > 0" in refused(v.positive_load, 0.0)
     assert "must be at least 1e-50" in refused(v.positive, 0.9 * v.SMALLEST)
     assert "must be >= 0" in refused(v.non_negative, -5e-324)
     assert "must be at most 1e+24" in refused(v.length, 1.001 * v.LONGEST)
@@ -66,11 +73,17 @@ def test_ends_of_ranges():
     assert "an integer >= 1, got 1.5" in refused(v.count, 1.5)
     assert "at most 5, got 6" in refused(v.count, 6, 3, 5)
     assert v.number_in("x", " -2.5e-3") == -2.5e-3
-    assert "be a number, got" in refused(v.number_in, "1,5") and "be finite" in refused(v.number_in, "-inf")
+    assert "be a number, got" in refused(v.number_in, "1,5") and "be finite" in refused(
+        v.number_in, "-inf"
+    )
 
 
 def test_batches_stand_before_what_is_inside():
-    assert v.batched(4, (2, 3)) == (4, 2, 3) and v.batched((5, 0), (3,)) == (5, 0, 3) and v.batched((), (3,)) == (3,)
+    assert (
+        v.batched(4, (2, 3)) == (4, 2, 3)
+        and v.batched((5, 0), (3,)) == (5, 0, 3)
+        and v.batched((), (3,)) == (3,)
+    )
     assert len(v.batched([1] * 31, (3,))) == 32
     with pytest.raises(InvalidValueError, match="at most 32 axes and 30000000 numbers"):
         v.batched([1] * 32, (3,))
@@ -87,15 +100,24 @@ def test_arrays_have_their_shape_and_say_where_they_are_wrong():
     assert "have shape [any, 3], got shape [3, 2]" in refused(v.array, given, (None, 3))
     assert "have shape [2], got shape [3, 2]" in refused(v.vector, given, 2)
     assert v.vector("x", [1, 2], 2).dtype == float
-    for value, told in ((np.nan, "finite, got nan at index (2, 1)"), (-np.inf, "finite, got -inf at index (2, 1)")):
+    for value, told in (
+        (np.nan, "finite, got nan at index (2, 1)"),
+        (-np.inf, "finite, got -inf at index (2, 1)"),
+    ):
         given[2, 1] = value
-        assert told in refused(v.array, given, (None, 2)) and told in refused(v.finite_numbers, given)
+        assert told in refused(v.array, given, (None, 2)) and told in refused(
+            v.finite_numbers, given
+        )
     given[2, 1] = -ABOVE
     assert "be at most 1e" in refused(v.finite_numbers, given)
     given[2] = 4.0, -5.0
     assert v.array("x", given, (3, 2), largest=5.0)[2, 1] == -5.0
-    assert "at most 4.9 in size, got -5.0 at index (2, 1)" in refused(v.array, given, (3, 2), largest=4.9)
-    assert "be >= 0, got -5.0 at index (2, 1)" in refused(v.non_negative_array, given, (3, 2))
+    assert "at most 4.9 in size, got -5.0 at index (2, 1)" in refused(
+        v.array, given, (3, 2), largest=4.9
+    )
+    assert "be >= 0, got -5.0 at index (2, 1)" in refused(
+        v.non_negative_array, given, (3, 2)
+    )
     assert "be > 0, got -5.0 at index 5" in refused(v.positive_array, given, (3, 2))
     given[2, 1] = 0.0
     assert v.non_negative_array("x", given, (3, 2))[2, 1] == 0.0
@@ -111,10 +133,16 @@ def test_many_numbers_at_once():
     for bad in (-1.0, math.inf, math.nan):
         assert "be finite and >= 0" in refused(v.non_negative_numbers, [0.0, bad])
     assert (v.filled("x", [[1.0], [2.0]], (2, 3)) == [[1.0] * 3, [2.0] * 3]).all()
-    assert "have shape [2, 3], got shape [3, 1]" in refused(v.filled, np.ones((3, 1)), (2, 3))
+    assert "have shape [2, 3], got shape [3, 1]" in refused(
+        v.filled, np.ones((3, 1)), (2, 3)
+    )
     assert "be finite" in refused(v.filled, math.nan, (2,))
     wide = np.broadcast_to(1.0, v.MOST_NUMBERS + 1)
-    for check, given in ((v.finite_numbers, ()), (v.non_negative_numbers, ()), (v.array, ((None,),))):
+    for check, given in (
+        (v.finite_numbers, ()),
+        (v.non_negative_numbers, ()),
+        (v.array, ((None,),)),
+    ):
         assert "hold at most 30000000 numbers" in refused(check, wide, *given)
     v.within_range("x", -LARGEST, LARGEST)
     assert refused(v.within_range, -ABOVE, 0.0).endswith(f"got {-ABOVE}")
@@ -145,18 +173,23 @@ def test_texts_paths_and_choices():
     assert "be a path" in refused(v.path, b"a") and "be a path" in refused(v.path, 3)
     assert v.choice("x", "reduced", ["distributed", "reduced"]) == "reduced"
     told = refused(v.choice, "redused", ["distributed", "reduced"])
-    assert "must be one of distributed, reduced, got 'redused' (did you mean 'reduced'?)" in told
+    assert (
+        "must be one of distributed, reduced, got 'redused' (did you mean 'reduced'?)"
+        in told
+    )
     assert refused(v.choice, "zzz", ["a", "b"]).endswith("one of a, b, got 'zzz'")
     assert v.choices("x", ("b", "a"), ["a", "b"]) == ["b", "a"]
     assert "be a list of a, b" in refused(v.choices, "a", ["a", "b"])
-    assert v.instance("x", 3, int, "a number") == 3 and "be a number, got '3'" in refused(
-        v.instance, "3", int, "a number"
-    )
+    assert v.instance(
+        "x", 3, int, "a number"
+    ) == 3 and "be a number, got '3'" in refused(v.instance, "3", int, "a number")
 
 
 def test_tables_have_their_keys_and_no_others():
     v.keys("x", {"a": 1, "b": 2}, ["a"], ["b", "c"])
-    assert "x key must be one of a, b" in refused(v.keys, {"a": 1, "d": 2}, ["a"], ["b"])
+    assert "x key must be one of a, b" in refused(
+        v.keys, {"a": 1, "d": 2}, ["a"], ["b"]
+    )
     assert "have the key 'a', got b" in refused(v.keys, {"b": 1}, ["a"], ["b"])
     assert "have the key 'a', got none" in refused(v.keys, {}, ["a"])
     assert "be a table of keys and values" in refused(v.keys, [1], ["a"])
@@ -164,5 +197,8 @@ def test_tables_have_their_keys_and_no_others():
 
 def test_shapes_that_do_not_broadcast_are_named():
     assert v.broadcast(one=np.ones((4, 1)), other=np.ones(3)) == (4, 3)
-    with pytest.raises(InvalidValueError, match=r"one and other must broadcast, got shapes \[2\], \[3\]"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"one and other must broadcast, got shapes \[2\], \[3\]",
+    ):
         v.broadcast(one=np.ones(2), other=np.ones(3))

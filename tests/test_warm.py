@@ -57,7 +57,9 @@ assert at_once == [run(kind) for kind in kinds], at_once
 """
 
 
-COMMAND_LINE = "import sys; from planarfriction.cli import main; sys.exit(main(sys.argv[1:]))"
+COMMAND_LINE = (
+    "import sys; from planarfriction.cli import main; sys.exit(main(sys.argv[1:]))"
+)
 
 INTERRUPTED = {
     "simulate": [f"while True:\n    exec({FIRST_RUN!r})"],
@@ -70,11 +72,15 @@ INTERRUPTED = {
 
 
 def started(code: str, cache=None, *arguments: str) -> subprocess.Popen:
-    where = os.environ if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    where = (
+        os.environ if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    )
     # what runs in the background of a plain shell ignores Ctrl-C, and hands that down
     heeds = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     command = [sys.executable, "-c", heeds + code, *arguments]
-    return subprocess.Popen(command, env=where, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        command, env=where, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
 
 
 def result(process: subprocess.Popen) -> str:
@@ -106,35 +112,49 @@ class Terminal(io.StringIO):
         (Terminal, None, 0),
     ],
 )
-def test_the_first_function_that_is_compiled_says_so(monkeypatch, stream, module, lines):
+def test_the_first_function_that_is_compiled_says_so(
+    monkeypatch, stream, module, lines
+):
     """Once, to somebody who waits; functions of users say nothing."""
     monkeypatch.setattr(sys, "stderr", stream())
     monkeypatch.setattr(notice._Said, "done", False)
     for _ in range(2):
-        function = lambda x: x + 1.0  # noqa: E731
+        function = lambda x: x + 1.0
         function.__module__ = module
         numba.njit(function)(1.0)
     said = sys.stderr.getvalue().splitlines()
-    assert len(said) == lines and all("compiles its loops, once after installation" in line for line in said)
+    assert len(said) == lines and all(
+        "compiles its loops, once after installation" in line for line in said
+    )
 
 
 @pytest.mark.parametrize("processors", [1, 3])
 def test_warming_up_names_its_parts_to_somebody_who_waits(monkeypatch, processors):
     """Also where no other process can help: all end at once."""
     monkeypatch.setattr(threads, "processors", lambda: processors)
-    monkeypatch.setattr(sys, "executable", shutil.which("false") or pytest.skip("there is no program `false`"))
+    monkeypatch.setattr(
+        sys,
+        "executable",
+        shutil.which("false") or pytest.skip("there is no program `false`"),
+    )
     monkeypatch.setattr(sys, "stderr", Terminal())
     monkeypatch.setattr(warm, "_parts", lambda: {"first": dict, "second": dict})
     assert list(pf.warm_up()) == ["first", "second"]
     shown = sys.stderr.getvalue()
-    assert "\rcompiling: first" in shown and "\rcompiling: second" in shown and "compiled 2 parts" in shown
+    assert (
+        "\rcompiling: first" in shown
+        and "\rcompiling: second" in shown
+        and "compiled 2 parts" in shown
+    )
 
 
 @pytest.mark.slow
 def test_two_first_runs_at_once(tmp_path):
     pair = [started(FIRST_RUN, tmp_path) for _ in range(2)]
     first, second = (result(process) for process in pair)
-    assert first == second == result(started(FIRST_RUN, tmp_path))  # compiled or read from the cache: to the last bit
+    assert (
+        first == second == result(started(FIRST_RUN, tmp_path))
+    )  # compiled or read from the cache: to the last bit
 
 
 @pytest.mark.slow
@@ -145,9 +165,17 @@ def test_first_runs_in_several_threads(tmp_path):
 def read_only_installation(folder: Path) -> dict[str, str]:
     """Install the package where nothing can be written beside it; returns the environment that has it."""
     installed = folder / "planarfriction"
-    shutil.copytree(Path(pf.__file__).parent, installed, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        Path(pf.__file__).parent,
+        installed,
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )
     (installed / "__pycache__").write_text("nothing can be written beside the sources")
-    where = {**os.environ, "PYTHONPATH": str(folder), "XDG_CACHE_HOME": str(folder / "cache")}
+    where = {
+        **os.environ,
+        "PYTHONPATH": str(folder),
+        "XDG_CACHE_HOME": str(folder / "cache"),
+    }
     where.pop("NUMBA_CACHE_DIR", None)
     return where
 
@@ -158,7 +186,13 @@ def test_a_read_only_installation_uses_the_cache_of_the_user(tmp_path):
     counting = COUNTING.replace("pf.warm_up()", FIRST_RUN.strip())
     counts = []
     for _ in range(2):
-        run = subprocess.run([sys.executable, "-c", counting], env=where, capture_output=True, text=True, check=True)
+        run = subprocess.run(
+            [sys.executable, "-c", counting],
+            env=where,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         counts.append(int(run.stdout.split()[-1]))
     assert counts[0] > 0 and counts[1] == 0
     assert any((tmp_path / "cache").rglob("*.machine"))
@@ -169,7 +203,9 @@ def test_without_a_folder_for_machine_code_commands_run_and_say_so(tmp_path):
     where = read_only_installation(tmp_path)
     (tmp_path / "cache").write_text("there is no home either")
     command = [sys.executable, "-c", COMMAND_LINE, "run", "in-hand", "--t-end", "0.01"]
-    run = subprocess.run(command, env=where, cwd=tmp_path, capture_output=True, text=True, check=True)
+    run = subprocess.run(
+        command, env=where, cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     (line,) = [line for line in run.stderr.splitlines() if "NUMBA_CACHE_DIR" in line]
     assert line.startswith("warning: compiled code is not kept")
     assert "Traceback" not in run.stderr and "~" not in os.listdir(tmp_path)
@@ -190,7 +226,11 @@ def test_ctrl_c_while_compiling_ends_the_run(what, tmp_path):
             time.sleep(0.01)
         time.sleep(draw.uniform(0.0, 3.0))
         process.send_signal(signal.SIGINT)
-        _, error = process.communicate(timeout=60)  # a second where the machine is idle; two of these never end alone
-        assert process.returncode in (130, -signal.SIGINT), error  # -SIGINT: Python ends so, shells call it 130
+        _, error = process.communicate(
+            timeout=60
+        )  # a second where the machine is idle; two of these never end alone
+        assert process.returncode in (130, -signal.SIGINT), (
+            error
+        )  # -SIGINT: Python ends so, shells call it 130
         assert "Exception ignored" not in error
     assert result(started(FIRST_RUN, cache)) == result(started(FIRST_RUN))

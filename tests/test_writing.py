@@ -53,12 +53,16 @@ WRITER = """
 
 
 def test_several_writers_always_leave_a_whole_file_of_one_of_them(tmp_path):
-    target, own = tmp_path / "run.nc", tmp_path / "run.nc.part"
+    target = tmp_path / "run.nc"
+    own = tmp_path / "run.nc.part"
     own.write_bytes(OLD)
     target.write_bytes(1_000_000 * b"o")
-    seen, reads = set(), 0
+    seen = set()
+    reads = 0
     with contextlib.ExitStack() as stack:
-        writers = [stack.enter_context(started(WRITER, target, letter, 80)) for letter in "abc"]
+        writers = [
+            stack.enter_context(started(WRITER, target, letter, 80)) for letter in "abc"
+        ]
         while any(writer.poll() is None for writer in writers):
             content = target.read_bytes()
             assert content == 1_000_000 * content[:1]
@@ -81,7 +85,9 @@ def test_a_kill_leaves_the_old_file_or_the_new_one(tmp_path):
         content = target.read_bytes()
         assert content == 1_000_000 * content[:1]
     left = [name for name in names(tmp_path) if name != "run.nc"]
-    assert all(name.startswith(".planarfriction-") and name.endswith(".part") for name in left)
+    assert all(
+        name.startswith(".planarfriction-") and name.endswith(".part") for name in left
+    )
 
 
 def test_a_kill_before_the_writing_itself_leaves_nothing(tmp_path):
@@ -108,7 +114,10 @@ def test_an_error_on_the_way_leaves_the_old_file(tmp_path):
         with pytest.raises(error), replacing(tmp_path / "table.csv") as file:
             file.write(b"half of ")
             raise error
-    with pytest.raises(FrictionError, match=r"table.csv: cannot be written: no ink"), replacing(tmp_path / "table.csv"):
+    with (
+        pytest.raises(FrictionError, match=r"table.csv: cannot be written: no ink"),
+        replacing(tmp_path / "table.csv"),
+    ):
         raise OSError("no ink")
     assert (tmp_path / "table.csv").read_bytes() == OLD
     assert names(tmp_path) == ["table.csv"]
@@ -124,7 +133,9 @@ def test_a_full_disk_leaves_the_old_file(tmp_path):
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limits[1]))
     try:
-        with pytest.raises(FrictionError, match=r"run.nc: cannot be written: File too large"):
+        with pytest.raises(
+            FrictionError, match=r"run.nc: cannot be written: File too large"
+        ):
             write_text(target, 200_000 * "a")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
@@ -139,8 +150,12 @@ def test_a_disk_that_fails_late_leaves_the_old_file(tmp_path, monkeypatch, call)
 
     target = tmp_path / "run.nc"
     target.write_bytes(OLD)
-    monkeypatch.setattr(os, "fsync", full) if call == "fsync" else monkeypatch.setattr(os, "replace", full)
-    with pytest.raises(FrictionError, match=r"run.nc: cannot be written: No space left on device") as caught:
+    monkeypatch.setattr(os, "fsync", full) if call == "fsync" else monkeypatch.setattr(
+        os, "replace", full
+    )
+    with pytest.raises(
+        FrictionError, match=r"run.nc: cannot be written: No space left on device"
+    ) as caught:
         write_text(target, "new")
     assert "\n" not in str(caught.value)
     assert target.read_bytes() == OLD
@@ -149,9 +164,14 @@ def test_a_disk_that_fails_late_leaves_the_old_file(tmp_path, monkeypatch, call)
 
 def test_the_bytes_are_on_the_disk_before_they_take_the_place(tmp_path, monkeypatch):
     calls = []
-    fsync, replace = os.fsync, os.replace
-    monkeypatch.setattr(os, "fsync", lambda number: calls.append("fsync") or fsync(number))
-    monkeypatch.setattr(os, "replace", lambda part, to: calls.append("replace") or replace(part, to))
+    fsync = os.fsync
+    replace = os.replace
+    monkeypatch.setattr(
+        os, "fsync", lambda number: calls.append("fsync") or fsync(number)
+    )
+    monkeypatch.setattr(
+        os, "replace", lambda part, to: calls.append("replace") or replace(part, to)
+    )
     write_text(tmp_path / "a.txt", "µ")
     assert calls == ["fsync", "replace"]
     assert (tmp_path / "a.txt").read_bytes() == "µ".encode()
@@ -175,7 +195,10 @@ def test_permissions_stay_and_new_files_have_those_of_any_new_file(tmp_path):
 def test_links_stay_links(tmp_path):
     (tmp_path / "data").mkdir()
     (tmp_path / "link").symlink_to(Path("data") / "run.nc")
-    for text in ("first", "second"):  # the first one makes the file that the link points to
+    for text in (
+        "first",
+        "second",
+    ):  # the first one makes the file that the link points to
         write_text(tmp_path / "link", text)
         assert (tmp_path / "link").is_symlink()
         assert (tmp_path / "data" / "run.nc").read_text() == text
@@ -208,13 +231,18 @@ def test_places_where_no_file_can_be(tmp_path, monkeypatch, name, reason):
     for act in (check_writable, lambda path: write_text(path, "new")):
         with pytest.raises(FrictionError) as caught:
             act(name)
-        assert "cannot be written" in str(caught.value) and reason in str(caught.value).lower()
+        assert (
+            "cannot be written" in str(caught.value)
+            and reason in str(caught.value).lower()
+        )
         assert "\n" not in str(caught.value)
     assert names(tmp_path) == before and (tmp_path / "plain").read_bytes() == OLD
 
 
 def test_text_that_utf_8_cannot_hold_gets_one_line(tmp_path):
-    with pytest.raises(FrictionError, match=r"a.txt: cannot be written: .*surrogates not allowed"):
+    with pytest.raises(
+        FrictionError, match=r"a.txt: cannot be written: .*surrogates not allowed"
+    ):
         write_text(tmp_path / "a.txt", "\udc80")
     assert names(tmp_path) == []
 
@@ -243,5 +271,8 @@ def test_a_limit_on_the_size_of_files_leaves_the_old_one(tmp_path):
         print(error)
     """
     with started(code, path) as process:
-        assert process.stdout is not None and "cannot be written: File too large" in process.stdout.read()
+        assert (
+            process.stdout is not None
+            and "cannot be written: File too large" in process.stdout.read()
+        )
     assert path.read_bytes() == OLD and names(tmp_path) == ["run.npz"]

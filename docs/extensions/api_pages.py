@@ -41,7 +41,17 @@ SUBJECTS = {
     "Describe": (
         "A contact is a patch, a friction law, and a model of both.",
         "patch = pf.ContactPatch.disc(radius=0.01)\nmodel = pf.ReducedModel(patch, pf.LuGre(mu_c=0.8, mu_s=1.0))",
-        ("patch", "laws", "limit_surface", "models", "extend", "formulas", "families", "geometry", "errors"),
+        (
+            "patch",
+            "laws",
+            "limit_surface",
+            "models",
+            "extend",
+            "formulas",
+            "families",
+            "geometry",
+            "errors",
+        ),
     ),
     "Simulate": (
         "A scene is a body with contacts; a solution has its motion.",
@@ -75,14 +85,27 @@ NAMED = re.compile(rf"(?<![\w.])(?:{'|'.join(COMPILED)})(?:\.\w+){{1,2}}")
 
 
 def public_modules() -> list[str]:
-    modules = [name for name in planarfriction.__all__ if inspect.ismodule(getattr(planarfriction, name))]
-    return ["planarfriction", *(f"planarfriction.{name}" for name in (*modules, *OPTIONAL))]
+    modules = [
+        name
+        for name in planarfriction.__all__
+        if inspect.ismodule(getattr(planarfriction, name))
+    ]
+    return [
+        "planarfriction",
+        *(f"planarfriction.{name}" for name in (*modules, *OPTIONAL)),
+    ]
 
 
 def public_names(module: ModuleType) -> list[str]:
     """Return the names in `__all__`, or those that the module defines; modules have pages of their own."""
-    own = [name for name, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
-    names = getattr(module, "__all__", [name for name in own if not name.startswith("_")])
+    own = [
+        name
+        for name, value in vars(module).items()
+        if getattr(value, "__module__", None) == module.__name__
+    ]
+    names = getattr(
+        module, "__all__", [name for name in own if not name.startswith("_")]
+    )
     return [name for name in names if not inspect.ismodule(getattr(module, name, None))]
 
 
@@ -93,12 +116,25 @@ def heading(text: str, line: str = "=") -> list[str]:
 def entry(full_name: str, value: Any) -> list[str]:
     """The directive that documents `value`, its members and those that it inherits from us."""
     if inspect.isclass(value):
-        foreign = [base.__name__ for base in value.__mro__ if not base.__module__.startswith("planarfriction")]
-        return [f".. autoclass:: {full_name}", f"   :inherited-members: {', '.join(foreign)}", ""]
+        foreign = [
+            base.__name__
+            for base in value.__mro__
+            if not base.__module__.startswith("planarfriction")
+        ]
+        return [
+            f".. autoclass:: {full_name}",
+            f"   :inherited-members: {', '.join(foreign)}",
+            "",
+        ]
     if inspect.isfunction(value) or hasattr(value, "py_func"):
         return [f".. autofunction:: {full_name}", ""]
     name = full_name.rsplit(".", 1)[-1]
-    return [f".. py:data:: {full_name}", "", *(f"   {line}" for line in words_of(name, value)), ""]
+    return [
+        f".. py:data:: {full_name}",
+        "",
+        *(f"   {line}" for line in words_of(name, value)),
+        "",
+    ]
 
 
 def words_of(name: str, value: Any) -> list[str]:
@@ -106,7 +142,10 @@ def words_of(name: str, value: Any) -> list[str]:
     if inspect.isroutine(value):
         return (inspect.getdoc(value) or "").splitlines()
     for module in list(sys.modules):
-        if module.startswith("planarfriction.") and vars(sys.modules[module]).get(name) is value:
+        if (
+            module.startswith("planarfriction.")
+            and vars(sys.modules[module]).get(name) is value
+        ):
             words = ModuleAnalyzer.for_module(module).find_attr_docs().get(("", name))
             if words:
                 return words
@@ -125,7 +164,11 @@ def page(name: str, documented: dict[int, str]) -> list[str]:
     elsewhere = []
     for each in public_names(module):
         value = getattr(module, each)
-        known = documented.setdefault(id(value), f"{name}.{each}") if not isinstance(value, (str, int)) else None
+        known = (
+            documented.setdefault(id(value), f"{name}.{each}")
+            if not isinstance(value, (str, int))
+            else None
+        )
         if known in (None, f"{name}.{each}"):
             lines += entry(f"{name}.{each}", value)
         else:
@@ -135,15 +178,30 @@ def page(name: str, documented: dict[int, str]) -> list[str]:
     return lines
 
 
-def subject_page(subject: str, rows: list[tuple[str, str]], documented: dict[int, str]) -> list[str]:
+def subject_page(
+    subject: str, rows: list[tuple[str, str]], documented: dict[int, str]
+) -> list[str]:
     """Return a subject's page: its sentence, example and modules, and the names that `planarfriction` has of them."""
     sentence, example, modules = SUBJECTS[subject]
     lines = [*heading(subject), sentence, "", ".. code-block:: python", ""]
-    lines += [*(f"   {line}" for line in example.splitlines()), "", ".. list-table::", "   :widths: 25 75", ""]
+    lines += [
+        *(f"   {line}" for line in example.splitlines()),
+        "",
+        ".. list-table::",
+        "   :widths: 25 75",
+        "",
+    ]
     rows = [row for row in rows if row[0].split(".")[0] in modules]
     for file, words in rows:
         lines += [f"   * - :doc:`{file}`", f"     - {words}"]
-    lines += ["", ".. toctree::", "   :hidden:", "", *(f"   {file}" for file, _ in rows), ""]
+    lines += [
+        "",
+        ".. toctree::",
+        "   :hidden:",
+        "",
+        *(f"   {file}" for file, _ in rows),
+        "",
+    ]
     for name in public_names(planarfriction):
         value = getattr(planarfriction, name)
         if not isinstance(value, str) and value.__module__.split(".")[1] in modules:
@@ -154,7 +212,11 @@ def subject_page(subject: str, rows: list[tuple[str, str]], documented: dict[int
 
 def kernels_page(pages: Path) -> list[str]:
     """The compiled functions and modules that the pages name, with their words and their source."""
-    named = {name for path in pages.glob("*.md") for name in NAMED.findall(path.read_text(encoding="utf-8"))}
+    named = {
+        name
+        for path in pages.glob("*.md")
+        for name in NAMED.findall(path.read_text(encoding="utf-8"))
+    }
     lines = heading("Compiled loops")
     lines += [
         "Internal: no promise is made about them. They are here since the pages name them beside their equations.",
@@ -196,7 +258,8 @@ def generate(app: Sphinx) -> None:
     public = [name.removeprefix("planarfriction.") for name in public_modules()[1:]]
     for subject in SUBJECTS:  # first, so that other pages only name what these document
         subject_page(subject, [], documented)
-    pages, rows = {}, []
+    pages = {}
+    rows = []
     for file in public:
         name = f"planarfriction.{file}"
         try:
@@ -206,7 +269,11 @@ def generate(app: Sphinx) -> None:
                 raise error
             continue
         rows.append((file, first_sentence(importlib.import_module(name))))
-    lines = [*heading("Python"), "Every public name, from its docstring, by subject.", ""]
+    lines = [
+        *heading("Python"),
+        "Every public name, from its docstring, by subject.",
+        "",
+    ]
     lines += ["A field of the type ``Kept[A, B]`` is given as A, and kept as B.", ""]
     for subject, (sentence, *_) in SUBJECTS.items():
         pages[subject.lower()] = subject_page(subject, rows, documented)
@@ -214,7 +281,12 @@ def generate(app: Sphinx) -> None:
     lines += ["- :doc:`kernels`: compiled loops that these pages name.", ""]
     lines += [".. automodule:: planarfriction", "   :no-members:", ""]
     subjects = [subject.lower() for subject in SUBJECTS]
-    lines += [".. toctree::", "   :hidden:", "", *(f"   {file}" for file in (*subjects, "kernels"))]
+    lines += [
+        ".. toctree::",
+        "   :hidden:",
+        "",
+        *(f"   {file}" for file in (*subjects, "kernels")),
+    ]
     pages |= {"kernels": kernels_page(Path(app.srcdir)), "index": lines}
     for file, lines in pages.items():
         write(folder / f"{file}.rst", lines)
@@ -223,7 +295,9 @@ def generate(app: Sphinx) -> None:
         (folder / old).unlink()
 
 
-def as_restructured_text(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+def as_restructured_text(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
     """Sections in the style of NumPy, and `|v|` outside of backticks as a size, which is a substitution there.
 
     The words of attributes have no sections, and a colon in them is a colon.
@@ -231,7 +305,9 @@ def as_restructured_text(app: Sphinx, what: str, name: str, thing: Any, options:
     if what == "class" and f"{HEADING}:" in lines:  # each has an entry of its own here
         del lines[lines.index(f"{HEADING}:") :]
     if what not in ("attribute", "property", "data"):
-        lines[:] = NumpyDocstring(list(lines), app.config, app, what, name, thing, options).lines()
+        lines[:] = NumpyDocstring(
+            list(lines), app.config, app, what, name, thing, options
+        ).lines()
     code = False
     for i, line in enumerate(lines):
         pieces = line.split("`")
@@ -242,9 +318,19 @@ def as_restructured_text(app: Sphinx, what: str, name: str, thing: Any, options:
         lines[i] = "`".join(pieces)
 
 
-def with_names(app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str | None, returns: Any) -> Any:
+def with_names(
+    app: Sphinx,
+    what: str,
+    name: str,
+    thing: Any,
+    options: Any,
+    signature: str | None,
+    returns: Any,
+) -> Any:
     """Show aliases of types by their names inside other types too."""
-    return signature and re.sub(r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature), returns
+    return signature and re.sub(
+        r"TypeAliasForwardRef\('(\w+)'\)", r"\1", signature
+    ), returns
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

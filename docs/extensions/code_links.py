@@ -38,7 +38,12 @@ class CodeLinks(SphinxPostTransform):
                 continue
             target = objects[found]
             reference = make_refnode(
-                self.app.builder, self.env.docname, target.docname, target.node_id, literal.deepcopy(), found
+                self.app.builder,
+                self.env.docname,
+                target.docname,
+                target.node_id,
+                literal.deepcopy(),
+                found,
             )
             literal.replace_self(reference)
 
@@ -47,7 +52,12 @@ class CodeLinks(SphinxPostTransform):
         if not hasattr(self.env, "_name_ends"):
             ends: dict[str, str | None] = {}
             for name, each in objects.items():
-                if each.aliased or each.objtype in ("method", "attribute", "property", "module"):
+                if each.aliased or each.objtype in (
+                    "method",
+                    "attribute",
+                    "property",
+                    "module",
+                ):
                     continue
                 last = name.rsplit(".", 1)[-1]
                 ends[last] = None if ends.get(last, name) != name else name
@@ -63,10 +73,17 @@ class CodeLinks(SphinxPostTransform):
         if ("." in text or not text.islower()) and f"planarfriction.{text}" in objects:
             return f"planarfriction.{text}"  # of models that have one name in several front ends, the one in NumPy
         first, _, rest = text.partition(".")
-        if rest and f"planarfriction.{first}" in objects:  # a module, from which the object is documented elsewhere
+        if (
+            rest and f"planarfriction.{first}" in objects
+        ):  # a module, from which the object is documented elsewhere
             first, _, rest = rest.partition(".")
         full = ends.get(first)
-        if full is None or (not rest and first.islower() and "_" not in first and first not in ("simulate", "rollout")):
+        if full is None or (
+            not rest
+            and first.islower()
+            and "_" not in first
+            and first not in ("simulate", "rollout")
+        ):
             return None
         name = f"{full}.{rest}" if rest else full
         return name if name in objects else None

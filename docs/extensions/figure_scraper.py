@@ -23,10 +23,14 @@ def thicker(gallery_conf: dict[str, Any], name: str) -> None:
     matplotlib.rcParams.update({"lines.linewidth": 2.0, "axes.labelsize": 11.0})
 
 
-def figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
+def figures(
+    block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]
+) -> str:
     """Save every figure that a variable of the script holds, once, in the order in which they were named."""
     del block
-    shown, paths, turning = _SHOWN.setdefault(block_vars["src_file"], []), [], ""
+    shown = _SHOWN.setdefault(block_vars["src_file"], [])
+    paths = []
+    turning = ""
     for value in list(block_vars["example_globals"].values()):
         if any(value is each for each in shown):
             continue
@@ -40,12 +44,21 @@ def figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]
     return figure_rst(paths, gallery_conf["src_dir"]) + turning
 
 
-def interactive(figure: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
+def interactive(
+    figure: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]
+) -> str:
     """A figure of plotly as raw HTML, with the script from where the site keeps it."""
     folder = Path(block_vars["target_file"]).parent
-    code = Path(os.path.relpath(Path(gallery_conf["src_dir"]) / "_static" / "plotly.min.js", folder)).as_posix()
+    code = Path(
+        os.path.relpath(
+            Path(gallery_conf["src_dir"]) / "_static" / "plotly.min.js", folder
+        )
+    ).as_posix()
     drawn = figure.to_html(
-        full_html=False, include_plotlyjs=False, default_height="460px", config={"displayModeBar": False}
+        full_html=False,
+        include_plotlyjs=False,
+        default_height="460px",
+        config={"displayModeBar": False},
     )
     lines = [f'<script src="{code}"></script>', *drawn.splitlines()]
     return "\n.. raw:: html\n\n" + "".join(f"    {line}\n" for line in lines) + "\n"

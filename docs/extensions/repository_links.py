@@ -50,13 +50,17 @@ def rewrite(app: Sphinx, name: str, source: list[str]) -> None:
         text, _, lists = source[0].partition("## All pages\n")
         source[0] = text + ITEM.sub(contents, lists)
     if name == "glossary":
-        source[0] = re.sub(rf"(?:{ITEM.pattern})+", glossary, source[0], flags=re.MULTILINE)
+        source[0] = re.sub(
+            rf"(?:{ITEM.pattern})+", glossary, source[0], flags=re.MULTILINE
+        )
 
 
 def contents(kind: re.Match[str]) -> str:
     """Return the table of contents of one kind of pages."""
     pages = [page or other for page, other in PLACE.findall(kind[2])]
-    return "\n".join([":::{toctree}", f":caption: {kind[1]}", ":hidden:", "", *pages, ":::", "", ""])
+    return "\n".join(
+        [":::{toctree}", f":caption: {kind[1]}", ":hidden:", "", *pages, ":::", "", ""]
+    )
 
 
 def glossary(terms: re.Match[str]) -> str:

@@ -41,8 +41,26 @@ PASSES = 10
 _WORTH_A_THREAD = 200
 """Patches below which starting a thread costs more than it saves."""
 
-_INPUTS = ("state", "dt", "twist", "normal_force", "wrench", "twist_response", "load_response", "moments")
-_PLACES = ("state", "dt", "free_twist", "free_load", "guess", "response", "load_response", "moments")
+_INPUTS = (
+    "state",
+    "dt",
+    "twist",
+    "normal_force",
+    "wrench",
+    "twist_response",
+    "load_response",
+    "moments",
+)
+_PLACES = (
+    "state",
+    "dt",
+    "free_twist",
+    "free_load",
+    "guess",
+    "response",
+    "load_response",
+    "moments",
+)
 
 
 @by_parts
@@ -103,11 +121,19 @@ class CoupledPatches(ByValue):
     """Friction models with compiled steps, one for each patch."""
 
     def __post_init__(self) -> None:
-        if isinstance(self.models, FrictionModel | np.ndarray) or not isinstance(self.models, Iterable):
-            raise InvalidValueError("models", "be a list of friction models, one for each patch", self.models)
+        if isinstance(self.models, FrictionModel | np.ndarray) or not isinstance(
+            self.models, Iterable
+        ):
+            raise InvalidValueError(
+                "models",
+                "be a list of friction models, one for each patch",
+                self.models,
+            )
         self._set(models=tuple(self.models))
         for model in self.models:
-            validation.instance("models", model, FrictionModel, "friction models, one for each patch")
+            validation.instance(
+                "models", model, FrictionModel, "friction models, one for each patch"
+            )
         if not self.models:
             raise InvalidValueError("models", "hold at least one", "none")
         _ = self._packed
@@ -131,9 +157,16 @@ class CoupledPatches(ByValue):
         """
         if not (isinstance(state, np.ndarray) and state.shape[-1:] == self.state_shape):
             shape = list(np.shape(state))
-            raise InvalidValueError("state", f"be an array of shape [..., {self._bounds[-1]}]", f"shape {shape}")
+            raise InvalidValueError(
+                "state",
+                f"be an array of shape [..., {self._bounds[-1]}]",
+                f"shape {shape}",
+            )
         ends = zip(self._bounds, self._bounds[1:], self.models, strict=False)
-        return [state[..., a:b].reshape(*state.shape[:-1], *model.state_shape) for a, b, model in ends]
+        return [
+            state[..., a:b].reshape(*state.shape[:-1], *model.state_shape)
+            for a, b, model in ends
+        ]
 
     def step(
         self,
@@ -161,17 +194,24 @@ class CoupledPatches(ByValue):
         if not isinstance(host, HostStep):
             raise InvalidValueError("host", "be a HostStep", type(host).__name__)
         tolerance = validation.positive("tolerance", tolerance)
-        most = ITERATIONS if iterations is None else validation.count("iterations", iterations, 0, 10**9)
+        most = (
+            ITERATIONS
+            if iterations is None
+            else validation.count("iterations", iterations, 0, 10**9)
+        )
         given = dict(zip(_INPUTS, (state, dt, *host), strict=True))
         for name in ("load_response", "moments"):
             if given[name] is None:
                 del given[name]
         if host.moments is not None:
             self._check_follows()
-        arrays = {name: validation.numbers(name, value) for name, value in given.items()}
+        arrays = {
+            name: validation.numbers(name, value) for name, value in given.items()
+        }
         problems, batch = self._problems(arrays)
         parts = self._parts
-        problems[:, parts["tolerance"]], problems[:, parts["most"]] = tolerance, most
+        problems[:, parts["tolerance"]] = tolerance
+        problems[:, parts["most"]] = most
         problems[:, parts["again"]] = float(iterations is None)
         problems[:, parts["wrench"]] = problems[:, parts["guess"]]
         counts = self._solve(problems)
@@ -181,9 +221,12 @@ class CoupledPatches(ByValue):
 
     # ------------------------------------------------------------------ rows
 
-    def _problems(self, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, tuple[int, ...]]:
+    def _problems(
+        self, arrays: dict[str, np.ndarray]
+    ) -> tuple[np.ndarray, tuple[int, ...]]:
         """Return a row for each environment, with the inputs written, and the batch axes."""
-        k, n = len(self.models), 3 * len(self.models)
+        k = len(self.models)
+        n = 3 * len(self.models)
         inner = {
             "state": self.state_shape, "dt": (), "twist": (k, 3), "normal_force": (k,), "wrench": (k, 3),
             "twist_response": (n, n), "load_response": (k, n), "moments": (k, 2),
@@ -193,19 +236,24 @@ class CoupledPatches(ByValue):
             cut = array.ndim - len(inner[name])
             if cut < 0 or array.shape[cut:] != inner[name]:
                 wanted = ", ".join(["...", *map(str, inner[name])])
-                raise InvalidValueError(name, f"have shape [{wanted}]", f"shape {list(array.shape)}")
+                raise InvalidValueError(
+                    name, f"have shape [{wanted}]", f"shape {list(array.shape)}"
+                )
             axes[name] = array.shape[:cut]
         batch = axes["state"]
         if any(each != batch for each in axes.values()):
             batch = validation.common_shape("batch axes", axes.values())
-        count, words = math.prod(batch), self._packed.layout.size
+        count = math.prod(batch)
+        words = self._packed.layout.size
         if count * words > validation.MOST_NUMBERS:
             rule = f"hold at most {validation.MOST_NUMBERS // words} environments of these patches"
             raise InvalidValueError("batch axes", rule, list(batch))
         problems = np.zeros((*batch, words))
         for name, place in zip(_INPUTS, _PLACES, strict=True):
             if name in arrays:
-                problems[..., self._parts[place]] = arrays[name].reshape(*axes[name], math.prod(inner[name]))
+                problems[..., self._parts[place]] = arrays[name].reshape(
+                    *axes[name], math.prod(inner[name])
+                )
         problems[..., self._parts["follows"]] = float("moments" in arrays)
         return problems.reshape(count, words), batch
 
@@ -216,15 +264,19 @@ class CoupledPatches(ByValue):
                 rule = "be None: a patch without cells cannot follow them while its shape follows the load"
                 if self.models[p].law.reference_load is not None:
                     rule = "be None for a law with a reference_load"
-                raise InvalidValueError("moments", rule, f"model {p}: {type(self.models[p]).__name__}")
+                raise InvalidValueError(
+                    "moments", rule, f"model {p}: {type(self.models[p]).__name__}"
+                )
 
     def _solve(self, problems: np.ndarray) -> np.ndarray:
         """Solve all problems; the iterations that each took, negative for invalid ones."""
-        packed, parts = self._packed, self._parts
+        packed = self._packed
+        parts = self._parts
         problems.view(np.int64)[:, parts["records"]] = packed.records
         if not packed.following:
             return self._once(problems)
-        total, unsettled = np.zeros(len(problems), int), np.arange(len(problems))
+        total = np.zeros(len(problems), int)
+        unsettled = np.arange(len(problems))
         loads = problems[:, parts["free_load"]].copy()
         for i in range(PASSES + 1):
             rows = problems[unsettled]
@@ -233,24 +285,36 @@ class CoupledPatches(ByValue):
                 rows[:, parts["most"]] = 0
             taken = self._once(rows)
             del kept
-            problems[unsettled], total[unsettled] = rows, total[unsettled] + taken
+            problems[unsettled] = rows
+            total[unsettled] = total[unsettled] + taken
             came_out = rows[:, parts["load"]]
             # each environment on its own, so that it does not matter which others are in the batch
-            settled = (came_out == loads).all(axis=1) | (taken < 0) | ((i > 0) & (taken == 0))
-            unsettled, loads = unsettled[~settled], came_out[~settled]
+            settled = (
+                (came_out == loads).all(axis=1) | (taken < 0) | ((i > 0) & (taken == 0))
+            )
+            unsettled = unsettled[~settled]
+            loads = came_out[~settled]
             if not unsettled.size:
                 break
         return total
 
     def _once(self, problems: np.ndarray) -> np.ndarray:
         """Solve all problems with the shapes that they hold."""
-        row, most = self._packed.patches.words, len(problems) * len(self.models) // _WORTH_A_THREAD
-        share(len(problems), most, lambda first, last: kernels.solve_batch(row, problems, first, last))
+        row = self._packed.patches.words
+        most = len(problems) * len(self.models) // _WORTH_A_THREAD
+        share(
+            len(problems),
+            most,
+            lambda first, last: kernels.solve_batch(row, problems, first, last),
+        )
         return problems[:, self._parts["iterations"].start].astype(int)
 
-    def _write_following(self, problems: np.ndarray, loads: np.ndarray) -> list[PackedModel]:
+    def _write_following(
+        self, problems: np.ndarray, loads: np.ndarray
+    ) -> list[PackedModel]:
         """Write the records of patches whose shapes follow their loads `[E, k]`; returns what has to be kept."""
-        records, kept = problems.view(np.int64)[:, self._parts["records"]], []
+        records = problems.view(np.int64)[:, self._parts["records"]]
+        kept = []
         for p in self._packed.following:
             chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))
             records[:, p] = 0
@@ -260,14 +324,24 @@ class CoupledPatches(ByValue):
                 kept.append(packed)
         return kept
 
-    def _result(self, problems: np.ndarray, counts: np.ndarray, batch: tuple[int, ...]) -> CoupledStep:
-        names, k = ("new", "wrench", "twist", "load", "residual", "converged"), len(self.models)
+    def _result(
+        self, problems: np.ndarray, counts: np.ndarray, batch: tuple[int, ...]
+    ) -> CoupledStep:
+        names = ("new", "wrench", "twist", "load", "residual", "converged")
+        k = len(self.models)
         shapes = self.state_shape, (k, 3), (k, 3), (k,), (), ()
         new, wrench, twist, load, residual, converged = (
-            problems[:, self._parts[name]].reshape((*batch, *shape)) for name, shape in zip(names, shapes, strict=True)
+            problems[:, self._parts[name]].reshape((*batch, *shape))
+            for name, shape in zip(names, shapes, strict=True)
         )
-        step = CoupledStep(new, wrench, twist, load, counts.reshape(batch), residual, converged > 0.0)
-        return step if len(problems) == 1 else CoupledStep(*map(np.ascontiguousarray, step))
+        step = CoupledStep(
+            new, wrench, twist, load, counts.reshape(batch), residual, converged > 0.0
+        )
+        return (
+            step
+            if len(problems) == 1
+            else CoupledStep(*map(np.ascontiguousarray, step))
+        )
 
     def _blank_problem(self, follows: Sequence[bool]) -> np.ndarray:
         """Return the row of a problem without inputs, for compiled hosts, with patches of fixed shape.
@@ -275,9 +349,12 @@ class CoupledPatches(ByValue):
         The host gives the moments of those whose pressure `follows` them.
         """
         self._check_follows([p for p, follow in enumerate(follows) if follow])
-        row, parts = np.zeros((1, self._packed.layout.size)), self._parts
+        row = np.zeros((1, self._packed.layout.size))
+        parts = self._parts
         row.view(np.int64)[:, parts["records"]] = self._packed.records
-        row[:, parts["tolerance"]], row[:, parts["most"]], row[:, parts["follows"]] = TOLERANCE, ITERATIONS, follows
+        row[:, parts["tolerance"]] = TOLERANCE
+        row[:, parts["most"]] = ITERATIONS
+        row[:, parts["follows"]] = follows
         row[:, parts["again"]] = 1.0
         return row
 
@@ -320,22 +397,36 @@ class _PackedPatches(NamedTuple):
 def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatches:
     compiled = [model.compiled for model in models]
     fixed = [each.fixed for each in compiled]
-    records = np.array([0 if each is None else places_of(each.records)[0] for each in fixed], np.int64)
-    sizes = np.array([0 if each is None else each.records.shape[1] for each in fixed], np.int64)
+    records = np.array(
+        [0 if each is None else places_of(each.records)[0] for each in fixed], np.int64
+    )
+    sizes = np.array(
+        [0 if each is None else each.records.shape[1] for each in fixed], np.int64
+    )
     places, words = zip(*(each.points() for each in compiled), strict=True)
     x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
-    followers = Followers(x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64))
-    rows = layout(len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum()))
+    followers = Followers(
+        x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64)
+    )
+    rows = layout(
+        len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum())
+    )
     patches = Patches(
         count=len(models),
         states=int(bounds[-1]),
         solve=address_of(kernels.solve),
-        steps=np.array([address_of(each.functions.step) for each in compiled], np.int64),
-        slopes=np.array([address_of(each.functions.slopes) for each in compiled], np.int64),
+        steps=np.array(
+            [address_of(each.functions.step) for each in compiled], np.int64
+        ),
+        slopes=np.array(
+            [address_of(each.functions.slopes) for each in compiled], np.int64
+        ),
         firsts=bounds.astype(np.int64),
         # all cells, whatever load they carry: a lever arm that does not follow the load
         radius=np.array([lever_of(model) for model in models]),
-        reference=np.array([model.law.reference_load or 0.0 for model in models], float),
+        reference=np.array(
+            [model.law.reference_load or 0.0 for model in models], float
+        ),
         bristle=np.array([model.state_shape[0] for model in models], np.int64),
         followers=followers,
         row=rows.offsets,
@@ -357,4 +448,6 @@ def _refuse(arrays: dict[str, np.ndarray]) -> None:
         if (arrays[name] < 0.0).any():
             raise InvalidValueError(name, "be >= 0", float(arrays[name].min()))
     diagonal = np.diagonal(arrays["twist_response"], axis1=-2, axis2=-1)
-    raise InvalidValueError("twist_response", "have a diagonal >= 0", float(diagonal.min()))
+    raise InvalidValueError(
+        "twist_response", "have a diagonal >= 0", float(diagonal.min())
+    )

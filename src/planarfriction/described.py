@@ -30,12 +30,21 @@ def field_docs(kind: type) -> dict[str, str]:
     for each in reversed(kind.__mro__):
         try:
             (tree,) = ast.parse(textwrap.dedent(inspect.getsource(each))).body
-        except (OSError, TypeError, SyntaxError, ValueError):  # typed into a prompt, or made by Python itself
+        except (
+            OSError,
+            TypeError,
+            SyntaxError,
+            ValueError,
+        ):  # typed into a prompt, or made by Python itself
             continue
         body = getattr(tree, "body", [])
         for field, below in itertools.pairwise(body):
             name = getattr(getattr(field, "target", None), "id", None)
-            if isinstance(field, ast.AnnAssign) and name and isinstance(below, ast.Expr):
+            if (
+                isinstance(field, ast.AnnAssign)
+                and name
+                and isinstance(below, ast.Expr)
+            ):
                 words = getattr(below.value, "value", None)
                 if isinstance(words, str):
                     found[name] = inspect.cleandoc(words)
@@ -51,12 +60,26 @@ class _Description:
 
     def __get__(self, record: object, kind: type) -> str:
         if self._whole is None:
-            owner = next((each for each in kind.__mro__ if each.__dict__.get("__doc__") is self), kind)
-            if dataclasses.is_dataclass(owner) and "__match_args__" not in owner.__dict__:
+            owner = next(
+                (each for each in kind.__mro__ if each.__dict__.get("__doc__") is self),
+                kind,
+            )
+            if (
+                dataclasses.is_dataclass(owner)
+                and "__match_args__" not in owner.__dict__
+            ):
                 return self._words  # the decorator `dataclass` is at work, and looks whether there is a docstring
             docs = field_docs(owner)
-            lines = [f"{name}\n{textwrap.indent(docs[name], '    ')}" for name in _arguments(owner) if name in docs]
-            self._whole = "\n\n".join([self._words, "\n".join([f"{HEADING}:", *lines])] if lines else [self._words])
+            lines = [
+                f"{name}\n{textwrap.indent(docs[name], '    ')}"
+                for name in _arguments(owner)
+                if name in docs
+            ]
+            self._whole = "\n\n".join(
+                [self._words, "\n".join([f"{HEADING}:", *lines])]
+                if lines
+                else [self._words]
+            )
         return self._whole
 
 

@@ -42,7 +42,10 @@ def check(parameters: Mapping[str, Any]) -> dict[str, np.ndarray]:
     Raises InvalidValueError for an unknown name, and values that are not finite or break their rule.
     """
     validation.keys("parameters", parameters, (), PARAMETERS)
-    found = {name: validation.finite_numbers(name, value) for name, value in parameters.items()}
+    found = {
+        name: validation.finite_numbers(name, value)
+        for name, value in parameters.items()
+    }
     for name, values in found.items():
         rule, holds = RULES[name]
         if not (good := holds(values)).all():
@@ -50,11 +53,15 @@ def check(parameters: Mapping[str, Any]) -> dict[str, np.ndarray]:
     if {"mu_c", "mu_s"} <= found.keys():
         low, high = np.broadcast_arrays(found["mu_c"], found["mu_s"])
         if (wrong := high < low).any():
-            raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={high[wrong][0]:g}, mu_c={low[wrong][0]:g}")
+            raise InvalidValueError(
+                "mu_s", "be >= mu_c", f"mu_s={high[wrong][0]:g}, mu_c={low[wrong][0]:g}"
+            )
     return found
 
 
-def randomise(law: FrictionLaw, ranges: Mapping[str, Any], count: int, *, seed: int = 0) -> dict[str, np.ndarray]:
+def randomise(
+    law: FrictionLaw, ranges: Mapping[str, Any], count: int, *, seed: int = 0
+) -> dict[str, np.ndarray]:
     """Draw parameters for `count` environments, by name, `[count]` each.
 
     `ranges` gives, by name, the two ends between which values are drawn uniformly, or a distribution of `scipy.stats`.
@@ -69,7 +76,9 @@ def randomise(law: FrictionLaw, ranges: Mapping[str, Any], count: int, *, seed: 
     validation.keys("ranges", ranges, (), PARAMETERS)
     count = validation.count("count", count, at_most=validation.MOST_DRAWS)
     generator = np.random.default_rng(validation.count("seed", seed, 0))
-    drawn: dict[str, Any] = {name: _drawn(name, given, count, generator) for name, given in ranges.items()}
+    drawn: dict[str, Any] = {
+        name: _drawn(name, given, count, generator) for name, given in ranges.items()
+    }
     own = law.numbers
     if "mu_c" in drawn and "mu_s" not in drawn:
         drawn["mu_s"] = drawn["mu_c"] * (own.mu_s / own.mu_c)
@@ -78,10 +87,14 @@ def randomise(law: FrictionLaw, ranges: Mapping[str, Any], count: int, *, seed: 
     return check(drawn)
 
 
-def _drawn(name: str, given: Any, count: int, generator: np.random.Generator) -> np.ndarray:
+def _drawn(
+    name: str, given: Any, count: int, generator: np.random.Generator
+) -> np.ndarray:
     if hasattr(given, "rvs"):
         return np.asarray(given.rvs(size=count, random_state=generator), float)
     low, high = validation.array(name, given, (2,))
     if not low <= high:
-        raise InvalidValueError(name, "have the lower end of its range first", f"{low:g}, {high:g}")
+        raise InvalidValueError(
+            name, "have the lower end of its range first", f"{low:g}, {high:g}"
+        )
     return generator.uniform(low, high, count)

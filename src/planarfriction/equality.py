@@ -44,7 +44,9 @@ def checked(check: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
 def _checks(kind: Any) -> list[tuple[str, bool, Any]]:
     """Return the fields of a record that are checked, whether each may be None, and its check with arguments."""
     fields = [each for each in dataclasses.fields(kind) if "check" in each.metadata]
-    return [(each.name, each.default is None, each.metadata["check"]) for each in fields]
+    return [
+        (each.name, each.default is None, each.metadata["check"]) for each in fields
+    ]
 
 
 class Checked:
@@ -72,24 +74,32 @@ class ByValue(Checked):
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
-        if "__repr__" not in cls.__dict__:  # else the decorator `dataclass` writes one of its own
+        if (
+            "__repr__" not in cls.__dict__
+        ):  # else the decorator `dataclass` writes one of its own
             cls.__repr__ = super(cls, cls).__repr__  # pyright: ignore[reportAttributeAccessIssue]
 
     def __repr__(self) -> str:
         shown = [field for field in dataclasses.fields(self) if field.repr]  # pyright: ignore[reportArgumentType]
-        return _record(self, {field.name: getattr(self, field.name, None) for field in shown})
+        return _record(
+            self, {field.name: getattr(self, field.name, None) for field in shown}
+        )
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
             return NotImplemented
-        return self is other or all(equal(getattr(self, name), getattr(other, name)) for name in _compared(self))
+        return self is other or all(
+            equal(getattr(self, name), getattr(other, name)) for name in _compared(self)
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields for a copy or another process in one step: another thread may be adding one meanwhile."""
         return dict(self.__dict__)
 
     def __hash__(self) -> int:
-        return hash((type(self), *(_key(getattr(self, name)) for name in _compared(self))))
+        return hash(
+            (type(self), *(_key(getattr(self, name)) for name in _compared(self)))
+        )
 
 
 def by_parts(kind: _KindT) -> _KindT:
@@ -104,7 +114,12 @@ def by_parts(kind: _KindT) -> _KindT:
     def show(self: Any) -> str:
         return _record(self, self._asdict())
 
-    for name, method in (("__eq__", content_equal), ("__ne__", differ), ("__hash__", None), ("__repr__", show)):
+    for name, method in (
+        ("__eq__", content_equal),
+        ("__ne__", differ),
+        ("__hash__", None),
+        ("__repr__", show),
+    ):
         setattr(kind, name, method)
     return described(kind)
 
@@ -112,12 +127,20 @@ def by_parts(kind: _KindT) -> _KindT:
 def short_repr(value: Any) -> str:
     """Return a short text for `value`: long arrays by their shape, long sequences by their length."""
     if isinstance(value, np.ndarray):
-        return np.array2string(value, separator=", ") if value.size <= _SHORT and value.ndim < 2 else _shape(value)
+        return (
+            np.array2string(value, separator=", ")
+            if value.size <= _SHORT and value.ndim < 2
+            else _shape(value)
+        )
     if isinstance(value, (tuple, list)) and type(value) in (tuple, list):
         if len(value) > _SHORT:
             return f"{type(value).__name__} of {len(value)}"
         items = ", ".join(map(short_repr, value))
-        return f"[{items}]" if isinstance(value, list) else f"({items}{',' if len(value) == 1 else ''})"
+        return (
+            f"[{items}]"
+            if isinstance(value, list)
+            else f"({items}{',' if len(value) == 1 else ''})"
+        )
     if isinstance(value, Mapping) and len(value) > _SHORT:
         return f"{type(value).__name__} of {len(value)}"
     return " ".join(repr(value).split())
@@ -128,7 +151,10 @@ def unusual(record: Any, but: tuple[str, ...] = ()) -> list[str]:
     return [
         f"{field.name}={short_repr(getattr(record, field.name))}"
         for field in dataclasses.fields(record)
-        if field.init and field.repr and field.name not in but and not equal(getattr(record, field.name), field.default)
+        if field.init
+        and field.repr
+        and field.name not in but
+        and not equal(getattr(record, field.name), field.default)
     ]
 
 
@@ -147,14 +173,20 @@ def equal(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
             return False
-        return np.array_equal(one, other, equal_nan=one.dtype.kind in "fc" and other.dtype.kind in "fc")
+        return np.array_equal(
+            one, other, equal_nan=one.dtype.kind in "fc" and other.dtype.kind in "fc"
+        )
     if isinstance(one, (tuple, list)) and isinstance(other, (tuple, list)):
         return _same_items(one, other)
     if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(equal(one[key], other[key]) for key in one)
+        return one.keys() == other.keys() and all(
+            equal(one[key], other[key]) for key in one
+        )
     try:
         found = one == other
-        return bool(found.all() if hasattr(found, "all") else found)  # tensors and data frames
+        return bool(
+            found.all() if hasattr(found, "all") else found
+        )  # tensors and data frames
     except Exception:  # parts of a user's own: what cannot be compared is not equal
         return False
 
@@ -170,11 +202,15 @@ def _compared(record: Any) -> list[str]:
 def _key(part: Any) -> Any:
     """Return something to hash that is the same for parts that are the same."""
     if isinstance(part, np.ndarray):
-        return part.shape, (part + 0.0).tobytes() if part.dtype.kind == "f" else part.tobytes()  # + 0.0: -0.0 is 0.0
+        return part.shape, (
+            part + 0.0
+        ).tobytes() if part.dtype.kind == "f" else part.tobytes()  # + 0.0: -0.0 is 0.0
     if isinstance(part, (tuple, list)):
         return tuple(map(_key, part))
     try:
         hash(part)
-    except TypeError:  # mappings and parts of a user's own: these do not tell records apart
+    except (
+        TypeError
+    ):  # mappings and parts of a user's own: these do not tell records apart
         return None
     return part

@@ -16,14 +16,20 @@ LONGEST = 300
 """Characters of a message about a file."""
 
 _BRIEF = reprlib.Repr()
-_BRIEF.maxlist = _BRIEF.maxtuple = _BRIEF.maxset = _BRIEF.maxfrozenset = _BRIEF.maxdict = _BRIEF.maxarray = 12
+_BRIEF.maxlist = _BRIEF.maxtuple = _BRIEF.maxset = _BRIEF.maxfrozenset = (
+    _BRIEF.maxdict
+) = _BRIEF.maxarray = 12
 _BRIEF.maxstring = _BRIEF.maxlong = _BRIEF.maxother = 2 * WIDTH
 
 
 def shown(value: Any) -> str:
     """Return `value` for a message: on one line, cut to `WIDTH` characters; texts without quotes."""
     try:
-        text = value if isinstance(value, str) and value.isprintable() else _BRIEF.repr(value)
+        text = (
+            value
+            if isinstance(value, str) and value.isprintable()
+            else _BRIEF.repr(value)
+        )
     except Exception:  # what cannot be printed, such as integers of more than 4300 digits, is still named
         text = f"{type(value).__name__} that is too long to show"
     line = " ".join(text[: 4 * WIDTH].split())
@@ -33,8 +39,14 @@ def shown(value: Any) -> str:
 def one_line(message: str) -> str:
     """Return `message` without what cannot be printed, and without its middle where it is longer than `LONGEST`."""
     if not message.isprintable():
-        message = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in message)
-    return message if len(message) <= LONGEST else f"{message[: LONGEST // 2 - 5]} ... {message[-LONGEST // 2 :]}"
+        message = "".join(
+            each if each.isprintable() else ascii(each)[1:-1] for each in message
+        )
+    return (
+        message
+        if len(message) <= LONGEST
+        else f"{message[: LONGEST // 2 - 5]} ... {message[-LONGEST // 2 :]}"
+    )
 
 
 class _Travels:
@@ -42,7 +54,10 @@ class _Travels:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # By default an error is restored from its message alone, which these constructors do not take.
-        kept = {name: value if _can_travel(value) else None for name, value in self.__dict__.items()}
+        kept = {
+            name: value if _can_travel(value) else None
+            for name, value in self.__dict__.items()
+        }
         return copyreg.__newobj__, (type(self), *self.args), kept  # pyright: ignore[reportAttributeAccessIssue]
 
 
@@ -69,7 +84,9 @@ class InvalidValueError(FrictionError, ValueError):
     """
 
     def __init__(self, name: str, rule: str, value: Any):
-        self.name, self.rule, self.value = name, rule, value
+        self.name = name
+        self.rule = rule
+        self.value = value
         super().__init__(f"{name} must {rule}, got {shown(value)}")
 
 
@@ -84,10 +101,13 @@ class MissingExtraError(FrictionError, ImportError):
     """An optional package is not installed; the message names the extra that installs it."""
 
     def __init__(self, package: str, extra: str):
-        self.package, self.extra = package, extra
+        self.package = package
+        self.extra = extra
         alone = "; for the processor alone, first pip install torch --index-url https://download.pytorch.org/whl/cpu"
         more = alone if extra == "torch" else ""
-        super().__init__(f"{package} is not installed: run pip install 'planarfriction[{extra}]'{more}")
+        super().__init__(
+            f"{package} is not installed: run pip install 'planarfriction[{extra}]'{more}"
+        )
 
 
 @contextlib.contextmanager
@@ -108,9 +128,16 @@ class SolverError(FrictionError, RuntimeError):
     `BodyStep` of all bodies and `converged` `[...]` is True for those whose results hold; both are None elsewhere.
     """
 
-    def __init__(self, message: str, solution: Any = None, step: Any = None, converged: Any = None):
+    def __init__(
+        self,
+        message: str,
+        solution: Any = None,
+        step: Any = None,
+        converged: Any = None,
+    ):
         self.solution = solution
-        self.step, self.converged = step, converged
+        self.step = step
+        self.converged = converged
         super().__init__(message)
 
 
@@ -127,8 +154,12 @@ class IdentificationInterrupted(_Travels, KeyboardInterrupt):
 
     def __init__(self, estimates: Mapping[str, float]):
         self.estimates = dict(estimates)
-        found = ", ".join(f"{name} = {value:.4g}" for name, value in self.estimates.items())
-        super().__init__(f"identification interrupted, not finished; best so far, without intervals [SI]: {found}")
+        found = ", ".join(
+            f"{name} = {value:.4g}" for name, value in self.estimates.items()
+        )
+        super().__init__(
+            f"identification interrupted, not finished; best so far, without intervals [SI]: {found}"
+        )
 
 
 class SweepError(FrictionError, RuntimeError):

@@ -51,7 +51,9 @@ class Family(Mapping[str, Any]):
 
     def choose(self, name: str) -> Any:
         """Return the class or function of a member. Raises `InvalidValueError` with all names if there is none."""
-        from planarfriction import validation  # brings NumPy with it, which names alone do not need
+        from planarfriction import (
+            validation,
+        )  # brings NumPy with it, which names alone do not need
 
         return self[validation.choice(self.what, name, self)]
 
@@ -59,7 +61,10 @@ class Family(Mapping[str, Any]):
         """Return the name of the class of `member`, or None if it is not a member; load nothing."""
         kind = type(member)
         path = f"{kind.__module__.removeprefix('planarfriction.')}:{kind.__qualname__}"
-        return next((name for name, (_, make) in self._members.items() if make in (kind, path)), None)
+        return next(
+            (name for name, (_, make) in self._members.items() if make in (kind, path)),
+            None,
+        )
 
     def register(self, name: str, make: Callable[..., Any], words: str = "") -> None:
         """Add a member of your own, which files and the command line of this process then know by `name`.
@@ -70,21 +75,35 @@ class Family(Mapping[str, Any]):
         is that of a member of the library, and if `make` cannot be called.
         """
         called = f"name of a {self.what}"
-        if not (isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name)):
+        if not (
+            isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name)
+        ):
             given = repr(name[:80]) if isinstance(name, str) else name
-            raise InvalidValueError(called, "consist of lower-case letters, digits and hyphens", given)
+            raise InvalidValueError(
+                called, "consist of lower-case letters, digits and hyphens", given
+            )
         if name in self and isinstance(self._members[name][1], str):
-            raise InvalidValueError(called, "not be the name of a member of the library", name)
+            raise InvalidValueError(
+                called, "not be the name of a member of the library", name
+            )
         if not callable(make):
-            raise InvalidValueError(self.what, "be a class, or a function that makes one", make)
+            raise InvalidValueError(
+                self.what, "be a class, or a function that makes one", make
+            )
         self._members[name] = words, make
 
 
 LAWS = Family(
     "law",
     {
-        "lugre": ("LuGre bristles, plain or elasto-plastic, with Stribeck and viscous terms", "laws.lugre:LuGre"),
-        "dahl": ("Dahl's bristles: a force that depends on the distance, not on the speed", "laws.dahl:Dahl"),
+        "lugre": (
+            "LuGre bristles, plain or elasto-plastic, with Stribeck and viscous terms",
+            "laws.lugre:LuGre",
+        ),
+        "dahl": (
+            "Dahl's bristles: a force that depends on the distance, not on the speed",
+            "laws.dahl:Dahl",
+        ),
         "coulomb-stribeck": (
             "Coulomb with Stribeck and viscous terms, regularised by a creep speed",
             "laws.coulomb_stribeck:CoulombStribeck",
@@ -98,7 +117,10 @@ SURFACES = Family(
         "cells": ("sum over the cells", "limit_surface.cells:LimitSurfaceCells"),
         "exact": ("exact", "limit_surface.exact:LimitSurfaceExact"),
         "table": ("table, smooth", "limit_surface.table:LimitSurfaceTable"),
-        "table-published": ("table, as published", "limit_surface.table_published:LimitSurfaceTablePublished"),
+        "table-published": (
+            "table, as published",
+            "limit_surface.table_published:LimitSurfaceTablePublished",
+        ),
         "ellipsoid": ("ellipsoid", "limit_surface.ellipsoid:LimitSurfaceEllipsoid"),
         "quartic": ("convex quartic", "limit_surface.quartic:LimitSurfaceQuartic"),
     },
@@ -107,7 +129,10 @@ SURFACES = Family(
 MODELS = Family(
     "model",
     {
-        "distributed": ("a bristle in every cell", "models.distributed:DistributedModel"),
+        "distributed": (
+            "a bristle in every cell",
+            "models.distributed:DistributedModel",
+        ),
         "reduced": ("bristles on a few small discs", "models.reduced:ReducedModel"),
         "reduced-published": (
             "three bristles and a limit surface, as published",
@@ -121,8 +146,14 @@ PRESSURES = Family(
     {
         "uniform": ("the same everywhere", "patch.pressure:Uniform"),
         "linear_gradient": ("linear over the patch", "patch.pressure:LinearGradient"),
-        "soft_finger": ("a soft fingertip that grows with the load", "patch.pressure:SoftFinger"),
-        "pressure_maps": ("maps measured at several loads", "patch.pressure_maps:PressureMaps"),
+        "soft_finger": (
+            "a soft fingertip that grows with the load",
+            "patch.pressure:SoftFinger",
+        ),
+        "pressure_maps": (
+            "maps measured at several loads",
+            "patch.pressure_maps:PressureMaps",
+        ),
         "shared": ("that of the cells of another patch", "patch.shared:SharedPressure"),
     },
 )
@@ -131,14 +162,23 @@ SHAPES = Family(
     "shape",
     {
         "disc": ("a disc", "patch:ContactPatch.disc"),
-        "disc-published": ("whole cells within a radius, as published", "patch:ContactPatch.disc_published"),
+        "disc-published": (
+            "whole cells within a radius, as published",
+            "patch:ContactPatch.disc_published",
+        ),
         "rectangle": ("a rectangle or a square", "patch:ContactPatch.rectangle"),
         "ring": ("a disc with a hole", "patch:ContactPatch.ring"),
         "line": ("a line", "patch:ContactPatch.line"),
         "polygon": ("a simple polygon", "patch:ContactPatch.polygon"),
         "points": ("points", "patch:ContactPatch.points"),
-        "pressure-map": ("a measured pressure map, or several", "patch.published:pressure_map"),
-        "published": ("a patch of the published experiments", "patch.published:published"),
+        "pressure-map": (
+            "a measured pressure map, or several",
+            "patch.published:pressure_map",
+        ),
+        "published": (
+            "a patch of the published experiments",
+            "patch.published:published",
+        ),
         "cells": ("the cells themselves", "patch.published:cells"),
     },
 )
@@ -149,10 +189,19 @@ PUBLISHED_PATCHES = Family(
         "Square": ("a square", "patch.published:square"),
         "Circle": ("a disc", "patch.published:circle"),
         "Line": ("a line along y", "patch.published:line"),
-        "LineGrad": ("a line along y, pressed harder at its top", "patch.published:line_grad"),
-        "LineGradX": ("a line along x, pressed harder at its left", "patch.published:line_grad_x"),
+        "LineGrad": (
+            "a line along y, pressed harder at its top",
+            "patch.published:line_grad",
+        ),
+        "LineGradX": (
+            "a line along x, pressed harder at its left",
+            "patch.published:line_grad_x",
+        ),
         "NonConvex1": ("two square pads", "patch.published:non_convex_1"),
-        "NonConvex2": ("a T lying on its side, of two bars", "patch.published:non_convex_2"),
+        "NonConvex2": (
+            "a T lying on its side, of two bars",
+            "patch.published:non_convex_2",
+        ),
     },
 )
 """Name -> function of `(cells=21, width=0.02)` that makes the published patch."""
@@ -160,13 +209,31 @@ PUBLISHED_PATCHES = Family(
 SCENES = Family(
     "scene",
     {
-        "in-hand": ("a plate that slips and turns between finger pads", "scenes.ready:in_hand"),
-        "drift": ("a loaded puck whose elastic patch must not drift", "scenes.ready:drift"),
+        "in-hand": (
+            "a plate that slips and turns between finger pads",
+            "scenes.ready:in_hand",
+        ),
+        "drift": (
+            "a loaded puck whose elastic patch must not drift",
+            "scenes.ready:drift",
+        ),
         "free-slide": ("a puck thrown onto a table", "scenes.ready:free_slide"),
         "driven": ("a patch moved with a prescribed velocity", "scenes.ready:driven"),
-        "pushed": ("a plate on a table, pushed along by finger pads that move", "scenes.ready:pushed"),
-        "pivot": ("a part that swings down in a loosened grip and is caught", "scenes.ready:pivot"),
-        "foot": ("a robot that turns on one foot as its weight moves", "scenes.ready:foot"),
-        "curling": ("a curling stone that slides and spins to rest", "scenes.ready:curling"),
+        "pushed": (
+            "a plate on a table, pushed along by finger pads that move",
+            "scenes.ready:pushed",
+        ),
+        "pivot": (
+            "a part that swings down in a loosened grip and is caught",
+            "scenes.ready:pivot",
+        ),
+        "foot": (
+            "a robot that turns on one foot as its weight moves",
+            "scenes.ready:foot",
+        ),
+        "curling": (
+            "a curling stone that slides and spins to rest",
+            "scenes.ready:curling",
+        ),
     },
 )

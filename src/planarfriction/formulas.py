@@ -86,22 +86,38 @@ def slip_fraction_slope(xp: Any, deflection: Any, breakaway_ratio: Any) -> Any:
     """Derivative of `alpha` with respect to `|z|/z_max` [-]."""
     per_width = 1.0 / (1.0 - breakaway_ratio)
     phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) * per_width
-    return 0.5 * math.pi * per_width * xp.cos(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
+    return (
+        0.5
+        * math.pi
+        * per_width
+        * xp.cos(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
+    )
 
 
-def bristle_decay(xp: Any, deflection: Any, along: Any, speed: Any, grip: Any, law: Any) -> Any:
+def bristle_decay(
+    xp: Any, deflection: Any, along: Any, speed: Any, grip: Any, law: Any
+) -> Any:
     """Rate `k = beta |v| sigma_0 / g` [1/s] of `zdot = u - k z`.
 
     `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v| + v_c` for plain ones (LuGre: v_c = 0);
     `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m]. ("Bristles")
     """
-    return decay_at(xp, slip_fraction(xp, deflection, law.breakaway_ratio), along, speed, grip, law)
+    return decay_at(
+        xp, slip_fraction(xp, deflection, law.breakaway_ratio), along, speed, grip, law
+    )
 
 
 def decay_at(xp: Any, alpha: Any, along: Any, speed: Any, grip: Any, law: Any) -> Any:
     """`bristle_decay` at a known `alpha`."""
-    closing = xp.maximum(speed + along, 0.0)  # rounding below zero would let a long step grow without bound
-    return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * closing, speed + law.creep_speed) * grip
+    closing = xp.maximum(
+        speed + along, 0.0
+    )  # rounding below zero would let a long step grow without bound
+    return (
+        xp.where(
+            law.elasto_plastic > 0.0, 0.5 * alpha * closing, speed + law.creep_speed
+        )
+        * grip
+    )
 
 
 def traction(z: Any, zdot: Any, velocity: Any, law: Any) -> Any:
@@ -131,8 +147,13 @@ def relaxation(xp: Any, decay_dt: Any) -> tuple[Any, Any]:
     # e^-300 is nothing beside 1, and products with less leave the range in which processors are fast
     remaining = xp.where(decay_dt < 300.0, xp.exp(xp.maximum(-decay_dt, -300.0)), 0.0)
     far = decay_dt > 1e-3
-    series = 1.0 - decay_dt * (0.5 - decay_dt * (1.0 / 6.0 - decay_dt * (1.0 / 24.0 - decay_dt * (1.0 / 120.0))))
-    return remaining, xp.where(far, 1.0 - remaining, series) / xp.where(far, decay_dt, 1.0)
+    series = 1.0 - decay_dt * (
+        0.5
+        - decay_dt * (1.0 / 6.0 - decay_dt * (1.0 / 24.0 - decay_dt * (1.0 / 120.0)))
+    )
+    return remaining, xp.where(far, 1.0 - remaining, series) / xp.where(
+        far, decay_dt, 1.0
+    )
 
 
 def reachable_deflection(xp: Any, deflection: Any, law: Any) -> Any:
@@ -177,15 +198,25 @@ def disc_friction(xp: Any, slide: Any, spin: Any) -> tuple[Any, Any, Any]:
 
 def disc_friction_above(slide: Any, spin: Any, rest: Any) -> tuple[Any, Any, Any]:
     """`disc_friction` with p and o in any unit, that of their squares for `rest`, in which it takes `DISC_REST`."""
-    pp, po, oo = slide * slide, slide * spin, spin * spin
+    pp = slide * slide
+    po = slide * spin
+    oo = spin * spin
     per = 1.0 / (oo + (DISC_B * po + DISC_C * pp) + rest)
-    e_1, e_2, e_3 = oo * per, po * per, pp * per
-    h = (7.0 / 36.0 * (DISC_A - DISC_B)) * e_1 - (7.0 / 18.0 * DISC_C) * e_2 - (7.0 / 36.0 * DISC_A * DISC_C) * e_3
+    e_1 = oo * per
+    e_2 = po * per
+    e_3 = pp * per
+    h = (
+        (7.0 / 36.0 * (DISC_A - DISC_B)) * e_1
+        - (7.0 / 18.0 * DISC_C) * e_2
+        - (7.0 / 36.0 * DISC_A * DISC_C) * e_3
+    )
     m = 0.25 + 7.0 / 36.0 * e_1 + (7.0 / 36.0 * DISC_A) * e_2
     return 1.0 + h * e_1, 2.0 * (m - h * e_2), m
 
 
-def disc_deflection(xp: Any, deflection: Any, spin_share: Any, breakaway_ratio: Any) -> Any:
+def disc_deflection(
+    xp: Any, deflection: Any, spin_share: Any, breakaway_ratio: Any
+) -> Any:
     """Deflection [-] at which a single bristle slips as much as a disc does, whose rim slips before its mean.
 
     The breakaway ratio of a disc is `s_ba/E`, `E = 1 + c y (2 - 5 y/3)`, where y is the share of spin in `|z|^2` and
@@ -201,9 +232,15 @@ def disc_deflection(xp: Any, deflection: Any, spin_share: Any, breakaway_ratio: 
 # ---------------------------------------------------------------------- derivatives of a step (docs/differentiable.md)
 
 
-def bristle_decay_by_breakaway(xp: Any, k_deflection: Any, deflection: Any, breakaway_ratio: Any) -> Any:
+def bristle_decay_by_breakaway(
+    xp: Any, k_deflection: Any, deflection: Any, breakaway_ratio: Any
+) -> Any:
     """Derivative of `k` with respect to the breakaway ratio, from that with respect to the deflection."""
-    return -k_deflection * xp.maximum(1.0 - deflection, 0.0) * (1.0 / (1.0 - breakaway_ratio))
+    return (
+        -k_deflection
+        * xp.maximum(1.0 - deflection, 0.0)
+        * (1.0 / (1.0 - breakaway_ratio))
+    )
 
 
 def relaxation_slope(xp: Any, decay_dt: Any, remaining: Any, mean: Any) -> Any:
@@ -212,8 +249,12 @@ def relaxation_slope(xp: Any, decay_dt: Any, remaining: Any, mean: Any) -> Any:
     Below `x = 0.1` its series, exact to 1e-16 there, where the difference would cancel.
     """
     x = decay_dt
-    series = 1.0 / 5760.0 - x * (1.0 / 45360.0 - x * (1.0 / 403200.0 - x * (1.0 / 3991680.0)))
-    series = 1.0 / 8.0 - x * (1.0 / 30.0 - x * (1.0 / 144.0 - x * (1.0 / 840.0 - x * series)))
+    series = 1.0 / 5760.0 - x * (
+        1.0 / 45360.0 - x * (1.0 / 403200.0 - x * (1.0 / 3991680.0))
+    )
+    series = 1.0 / 8.0 - x * (
+        1.0 / 30.0 - x * (1.0 / 144.0 - x * (1.0 / 840.0 - x * series))
+    )
     series = -0.5 + x * (1.0 / 3.0 - x * series)
     return xp.where(x > 0.1, remaining - mean, series) / xp.where(x > 0.1, x, 1.0)
 
@@ -230,9 +271,14 @@ def turning_mean(xp: Any, angle: Any) -> tuple[Any, Any]:
     (a x v)`: its point goes along the chord of an arc. Below `a = 0.1` the second is its series, exact to 1e-13 there,
     where the difference would cancel. (mujoco.md, "What is held on anything that turns")
     """
-    far, square = angle > 0.1, angle * angle
+    far = angle > 0.1
+    square = angle * angle
     half = xp.where(angle > 0.0, 0.5 * angle, 1.0)
     along = xp.where(angle > 0.0, xp.sin(half) / half, 1.0)
-    series = 1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0)))
+    series = 1.0 / 6.0 - square * (
+        1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0))
+    )
     safe = xp.where(far, angle, 1.0)
-    return 0.5 * along * along, xp.where(far, (safe - xp.sin(safe)) / (safe * safe * safe), series)
+    return 0.5 * along * along, xp.where(
+        far, (safe - xp.sin(safe)) / (safe * safe * safe), series
+    )

@@ -14,9 +14,11 @@ def twist_at(twist: ArrayLike, offset: ArrayLike) -> np.ndarray:
 
     `vx' = vx - omega dy`, `vy' = vy + omega dx`, `omega' = omega`; shapes `[..., 3]` and `[..., 2]`.
     """
-    twist, offset = np.asarray(twist, dtype=float), np.asarray(offset, dtype=float)
+    twist = np.asarray(twist, dtype=float)
+    offset = np.asarray(offset, dtype=float)
     omega = twist[..., 2]
-    vx, vy = twist[..., 0] - omega * offset[..., 1], twist[..., 1] + omega * offset[..., 0]
+    vx = twist[..., 0] - omega * offset[..., 1]
+    vy = twist[..., 1] + omega * offset[..., 0]
     return np.stack(np.broadcast_arrays(vx, vy, omega), -1)
 
 
@@ -25,9 +27,16 @@ def wrench_at(wrench: ArrayLike, offset: ArrayLike) -> np.ndarray:
 
     `tau' = tau - (dx fy - dy fx)`; the forces do not change. `wrench . twist` is the same at every point.
     """
-    wrench, offset = np.asarray(wrench, dtype=float), np.asarray(offset, dtype=float)
-    fx, fy = wrench[..., 0], wrench[..., 1]
-    return np.stack(np.broadcast_arrays(fx, fy, wrench[..., 2] - (offset[..., 0] * fy - offset[..., 1] * fx)), -1)
+    wrench = np.asarray(wrench, dtype=float)
+    offset = np.asarray(offset, dtype=float)
+    fx = wrench[..., 0]
+    fy = wrench[..., 1]
+    return np.stack(
+        np.broadcast_arrays(
+            fx, fy, wrench[..., 2] - (offset[..., 0] * fy - offset[..., 1] * fx)
+        ),
+        -1,
+    )
 
 
 def transformed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -42,10 +51,17 @@ def transformed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 def rotate(vector: ArrayLike, angle: ArrayLike) -> np.ndarray:
     """Rotate the first two components of a twist, wrench or point by `angle` [rad], counter-clockwise."""
-    vector, angle = np.asarray(vector, dtype=float), np.asarray(angle, dtype=float)
-    c, s = np.cos(angle), np.sin(angle)
-    x, y = vector[..., 0], vector[..., 1]
-    turned = np.broadcast_arrays(c * x - s * y, s * x + c * y, *(vector[..., i] for i in range(2, vector.shape[-1])))
+    vector = np.asarray(vector, dtype=float)
+    angle = np.asarray(angle, dtype=float)
+    c = np.cos(angle)
+    s = np.sin(angle)
+    x = vector[..., 0]
+    y = vector[..., 1]
+    turned = np.broadcast_arrays(
+        c * x - s * y,
+        s * x + c * y,
+        *(vector[..., i] for i in range(2, vector.shape[-1])),
+    )
     return np.stack(turned, -1)
 
 
@@ -58,6 +74,10 @@ def chord(twist: ArrayLike, dt: ArrayLike) -> np.ndarray:
     """
     twist = np.asarray(twist, dtype=float)
     half = 0.5 * np.asarray(dt, dtype=float) * twist[..., 2]
-    a, b = np.sinc(2.0 * half / np.pi), half * np.sinc(half / np.pi) ** 2
-    vx, vy = twist[..., 0], twist[..., 1]
-    return np.stack(np.broadcast_arrays(a * vx - b * vy, b * vx + a * vy, twist[..., 2]), -1)
+    a = np.sinc(2.0 * half / np.pi)
+    b = half * np.sinc(half / np.pi) ** 2
+    vx = twist[..., 0]
+    vy = twist[..., 1]
+    return np.stack(
+        np.broadcast_arrays(a * vx - b * vy, b * vx + a * vy, twist[..., 2]), -1
+    )

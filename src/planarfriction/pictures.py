@@ -26,4 +26,6 @@ PICTURES = {
 def picture(name: str, record: Any, *arguments: Any, **options: Any) -> Any:
     """Return the picture of a record, drawn by the function that `PICTURES` names."""
     module, _, function = PICTURES[name].partition(":")
-    return getattr(importlib.import_module(f"planarfriction.plots.{module}"), function)(record, *arguments, **options)
+    return getattr(importlib.import_module(f"planarfriction.plots.{module}"), function)(
+        record, *arguments, **options
+    )

@@ -68,7 +68,9 @@ def opened(path: str | Path, what: str, most: int | None) -> Iterator[BinaryIO]:
         if stat.S_ISDIR(status.st_mode):
             raise FileError(f"{path}: is a folder, not {what}")
         regular = stat.S_ISREG(status.st_mode)
-        if not (regular or (stat.S_ISFIFO(status.st_mode) and path.is_relative_to("/dev"))):
+        if not (
+            regular or (stat.S_ISFIFO(status.st_mode) and path.is_relative_to("/dev"))
+        ):
             raise FileError(f"{path}: is a device or a pipe, not {what}")
         if most is not None and status.st_size > most:
             raise _too_large(path, what, most)
@@ -78,8 +80,16 @@ def opened(path: str | Path, what: str, most: int | None) -> Iterator[BinaryIO]:
         raise
     except FileNotFoundError:
         raise FileError(f"{path}: no such file (expected {what})") from None
-    except (OSError, ValueError, MemoryError) as error:  # ValueError: a path with a zero byte
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split()) or "not enough memory"
+    except (
+        OSError,
+        ValueError,
+        MemoryError,
+    ) as error:  # ValueError: a path with a zero byte
+        reason = (
+            getattr(error, "strerror", None)
+            or " ".join(str(error).split())
+            or "not enough memory"
+        )
         raise FileError(f"{path}: cannot be read: {reason}") from None
 
 
@@ -98,7 +108,9 @@ def _encoding(start: bytes) -> str:
 
 
 def _no_text(path: str | Path, what: str) -> FileError:
-    return FileError(f"{path}: not a text file (expected {what}); if it is one, save it as UTF-8")
+    return FileError(
+        f"{path}: not a text file (expected {what}); if it is one, save it as UTF-8"
+    )
 
 
 def read_rows(path: str | Path, what: str) -> Iterator[tuple[int, list[str]]]:
@@ -120,7 +132,9 @@ def _lines(path: str | Path, what: str, most: int) -> Iterator[tuple[int, str]]:
         with opened(path, what, most) as file:
             encoding = _encoding(file.peek(3)[:3])  # pyright: ignore[reportAttributeAccessIssue]
             text = io.TextIOWrapper(file, encoding=encoding, newline="")
-            for number, line in enumerate(iter(lambda: text.readline(MOST_TEXT + 1), ""), 1):
+            for number, line in enumerate(
+                iter(lambda: text.readline(MOST_TEXT + 1), ""), 1
+            ):
                 size += len(line)
                 if size > most or len(line) > MOST_TEXT:
                     raise _too_large(path, what, most)
@@ -131,7 +145,9 @@ def _lines(path: str | Path, what: str, most: int) -> Iterator[tuple[int, str]]:
         raise _no_text(path, what) from None
 
 
-def _rows(path: str | Path, lines: Iterator[tuple[int, str]], separator: str = "") -> Iterator[tuple[int, list[str]]]:
+def _rows(
+    path: str | Path, lines: Iterator[tuple[int, str]], separator: str = ""
+) -> Iterator[tuple[int, list[str]]]:
     """Yield the rows in numbered lines; their first one shows the separator, if it is not given."""
     number = 0
     try:
@@ -139,15 +155,29 @@ def _rows(path: str | Path, lines: Iterator[tuple[int, str]], separator: str = "
             if _holds_cells(line):
                 separator = separator or _separator(line)
                 record = itertools.chain([line], (more for _, more in lines))
-                cells = [cell.strip() for cell in next(csv.reader(record, strict=True, delimiter=separator))]
-                yield number, cells if separator == "," else [_with_point(cell) for cell in cells]
+                cells = [
+                    cell.strip()
+                    for cell in next(
+                        csv.reader(record, strict=True, delimiter=separator)
+                    )
+                ]
+                yield (
+                    number,
+                    cells
+                    if separator == ","
+                    else [_with_point(cell) for cell in cells],
+                )
     except csv.Error as error:
         raise FileError(f"{path}: line {number} is not CSV: {error}") from None
 
 
 def _holds_cells(line: str) -> bool:
     """Return True if a line is neither empty nor a remark, nor `sep=;`, which tells Excel the separator."""
-    return bool(line.strip()) and not line.lstrip().startswith("#") and not _SEPARATOR_LINE.fullmatch(line)
+    return (
+        bool(line.strip())
+        and not line.lstrip().startswith("#")
+        and not _SEPARATOR_LINE.fullmatch(line)
+    )
 
 
 def width(cells: Sequence[str]) -> int:
@@ -174,29 +204,53 @@ class Table:
     """A CSV file with a header line and rows of numbers, read once: `names` first, then the columns that are wanted."""
 
     def __init__(self, path: str | Path):
-        self._path, self._lines = path, _lines(path, "a CSV file with a header line", MOST_TABLE)
-        first = [*itertools.islice((each for each in self._lines if _holds_cells(each[1])), 1)]
+        self._path = path
+        self._lines = _lines(path, "a CSV file with a header line", MOST_TABLE)
+        first = [
+            *itertools.islice(
+                (each for each in self._lines if _holds_cells(each[1])), 1
+            )
+        ]
         self._separator = _separator(first[0][1]) if first else ","
-        line, self.names = next(_rows(path, itertools.chain(first, self._lines), self._separator), (0, []))
+        line, self.names = next(
+            _rows(path, itertools.chain(first, self._lines), self._separator), (0, [])
+        )
         """Names of the columns, with units in brackets that stand below them."""
         if not self.names:
-            raise FileError(f"{path}: is empty (expected a header line and rows of numbers)")
+            raise FileError(
+                f"{path}: is empty (expected a header line and rows of numbers)"
+            )
         for name in filter(None, self.names):
             if self.names.count(name) > 1:
-                raise FileError(f"{path}: line {line} has two columns {shown(repr(name))}")
+                raise FileError(
+                    f"{path}: line {line} has two columns {shown(repr(name))}"
+                )
         self._read_units()
 
     def _read_units(self) -> None:
         """Put units in brackets behind the names if the row below them has units in place of numbers."""
-        second = [*itertools.islice((each for each in self._lines if _holds_cells(each[1])), 1)]
-        units = [cell.strip() for cell in second[0][1].split(self._separator)] if second else []
+        second = [
+            *itertools.islice(
+                (each for each in self._lines if _holds_cells(each[1])), 1
+            )
+        ]
+        units = (
+            [cell.strip() for cell in second[0][1].split(self._separator)]
+            if second
+            else []
+        )
         if len(units) == len(self.names) and any(units) and all(map(_is_unit, units)):
             pairs = zip(self.names, [unit.strip("[]()") for unit in units], strict=True)
-            self.names = [f"{name} [{unit}]" if unit and "[" not in name else name for name, unit in pairs]
+            self.names = [
+                f"{name} [{unit}]" if unit and "[" not in name else name
+                for name, unit in pairs
+            ]
         else:
             self._lines = itertools.chain(second, self._lines)
 
-    def numbers(self, names: Sequence[str], spare: Sequence[str] = (), flags: Sequence[str] = ()) -> np.ndarray:
+    def numbers(
+        self, names: Sequence[str], spare: Sequence[str] = (), flags: Sequence[str] = ()
+    ) -> np.ndarray:
         """Return the columns `names`, finite, `[rows, len(names)]`; raises FileError with the line and the column.
 
         Columns that are `spare` too hold NaN where a cell is no finite number, `flags` may hold true and false.
@@ -204,12 +258,19 @@ class Table:
         self._flags = flags
         for name in names:
             if not (isinstance(name, str) and name in self.names):
-                hint = validation.hint(name, self.names) or f" (valid: {shown(', '.join(self.names))})"
-                raise FileError(f"{self._path}: no column {shown(validation.quoted(name))}{hint}")
+                hint = (
+                    validation.hint(name, self.names)
+                    or f" (valid: {shown(', '.join(self.names))})"
+                )
+                raise FileError(
+                    f"{self._path}: no column {shown(validation.quoted(name))}{hint}"
+                )
         columns = [(name, self.names.index(name)) for name in names]
         values = array("d")
         while block := list(itertools.islice(self._lines, AT_ONCE)):
-            found = self._at_once([text for _, text in block], [column for _, column in columns])
+            found = self._at_once(
+                [text for _, text in block], [column for _, column in columns]
+            )
             if found is None:  # slowly, with the words for what is wrong
                 self._one_by_one(iter(block), columns, spare, values)
             else:
@@ -218,24 +279,54 @@ class Table:
             raise FileError(f"{self._path}: has a header line but no rows")
         return np.frombuffer(values).reshape(-1, len(names))
 
-    def _at_once(self, lines: Sequence[str], columns: Sequence[int]) -> np.ndarray | None:
+    def _at_once(
+        self, lines: Sequence[str], columns: Sequence[int]
+    ) -> np.ndarray | None:
         """Return the columns of lines of plain numbers; None if any line or number is of another kind."""
-        text, separators = "".join(lines), len(self.names) - 1
+        text = "".join(lines)
+        separators = len(self.names) - 1
         odd = '"' in text or "#" in text or (self._separator != "," and "," in text)
-        if odd or not separators or any(line.count(self._separator) != separators for line in lines):
+        if (
+            odd
+            or not separators
+            or any(line.count(self._separator) != separators for line in lines)
+        ):
             return None
         try:
-            found = np.loadtxt(lines, delimiter=self._separator, comments=None, usecols=columns, ndmin=2)
+            found = np.loadtxt(
+                lines,
+                delimiter=self._separator,
+                comments=None,
+                usecols=columns,
+                ndmin=2,
+            )
         except ValueError:
             return None
-        return found if (np.abs(found) <= LARGEST).all() and len(found) == len(lines) else None
+        return (
+            found
+            if (np.abs(found) <= LARGEST).all() and len(found) == len(lines)
+            else None
+        )
 
-    def _one_by_one(self, lines: Iterator[Any], columns: Sequence[Any], spare: Sequence[str], values: array) -> None:
+    def _one_by_one(
+        self,
+        lines: Iterator[Any],
+        columns: Sequence[Any],
+        spare: Sequence[str],
+        values: array,
+    ) -> None:
         """Append the numbers of numbered lines row by row; a quoted cell may go on behind them."""
-        for line, row in _rows(self._path, itertools.chain(lines, self._lines), self._separator):
+        for line, row in _rows(
+            self._path, itertools.chain(lines, self._lines), self._separator
+        ):
             if len(row) != len(self.names) and width(row) != width(self.names):
-                raise FileError(f"{self._path}: line {line} has {len(row)} columns, the header has {len(self.names)}")
-            values.extend(self._number(line, name, row[column], name in spare) for name, column in columns)
+                raise FileError(
+                    f"{self._path}: line {line} has {len(row)} columns, the header has {len(self.names)}"
+                )
+            values.extend(
+                self._number(line, name, row[column], name in spare)
+                for name, column in columns
+            )
             if not length_hint(lines):
                 return
 
@@ -289,7 +380,9 @@ def _is_float(text: str) -> bool:
 
 
 def _too_large(path: str | Path, what: str, most: int) -> FileError:
-    return FileError(f"{path}: is larger than {most / 1e6:g} MB, the most that is read as {what}")
+    return FileError(
+        f"{path}: is larger than {most / 1e6:g} MB, the most that is read as {what}"
+    )
 
 
 _REQUIRED: Any = object()
@@ -302,8 +395,16 @@ class Section:
     relative paths start from `folder`.
     """
 
-    def __init__(self, data: Any, where: str = "", source: str = "scene", folder: Path | None = None):
-        self.where, self.source, self.folder = where, source, folder or Path()
+    def __init__(
+        self,
+        data: Any,
+        where: str = "",
+        source: str = "scene",
+        folder: Path | None = None,
+    ):
+        self.where = where
+        self.source = source
+        self.folder = folder or Path()
         if not isinstance(data, dict):
             self.fail(f"must be a table of keys and values, got {_shown(data)}")
         self.data: dict[str, Any] = data
@@ -326,7 +427,9 @@ class Section:
         valid = f" (valid: {', '.join(keys)})"
         for key in self.data:
             if key not in keys:
-                self.fail(f"unknown key {_shown(key)}{validation.hint(key, keys) or valid}")
+                self.fail(
+                    f"unknown key {_shown(key)}{validation.hint(key, keys) or valid}"
+                )
         return self
 
     def get(self, key: str, default: Any = _REQUIRED) -> Any:
@@ -374,7 +477,9 @@ class Section:
             yield
         except FrictionError as error:
             message = str(error)
-            raise (error if message.startswith(f"{self.source}: ") else self.error(message)) from None
+            raise (
+                error if message.startswith(f"{self.source}: ") else self.error(message)
+            ) from None
 
 
 def _shown(value: Any) -> str:

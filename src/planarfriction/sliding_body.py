@@ -62,7 +62,9 @@ class SlidingBody(ByValue):
     @functools.cached_property
     def patches(self) -> CoupledPatches:
         """Patches of the body; `patches.states(state)` has the bristles of each."""
-        return CoupledPatches([self.models] if isinstance(self.models, FrictionModel) else self.models)
+        return CoupledPatches(
+            [self.models] if isinstance(self.models, FrictionModel) else self.models
+        )
 
     def rest(self, batch: int | Sequence[int] = ()) -> np.ndarray:
         """Return the state at rest, with relaxed bristles, or of a `batch` of bodies: `[*batch, states]`.
@@ -96,10 +98,18 @@ class SlidingBody(ByValue):
         `converged` with their result, the others with the best that was found.
         """
         given = {"twist": twist, "wrench": wrench, "dt": dt, "angle": angle}
-        twist, wrench, dt, angle = (validation.finite_numbers(name, value) for name, value in given.items())
-        twist, wrench = validation.vectors("twist", twist, 3), validation.vectors("wrench", wrench, 3)
+        twist, wrench, dt, angle = (
+            validation.finite_numbers(name, value) for name, value in given.items()
+        )
+        twist = validation.vectors("twist", twist, 3)
+        wrench = validation.vectors("wrench", wrench, 3)
         load = self._loads(normal_force)
-        batches = {"twist": twist[..., 0], "wrench": wrench[..., 0], "dt": dt, "angle": angle}
+        batches = {
+            "twist": twist[..., 0],
+            "wrench": wrench[..., 0],
+            "dt": dt,
+            "angle": angle,
+        }
         carried = 0.0
         if support_velocity is not None:
             support = validation.finite_numbers("support_velocity", support_velocity)
@@ -107,15 +117,23 @@ class SlidingBody(ByValue):
             batches["support_velocity"] = support[..., 0]
             carried = geometry.chord(support, dt)
         validation.broadcast(**batches, normal_force=load[..., 0])
-        to_patches = geometry.rotate(self._to_patches, angle[..., None]) if angle.any() else self._to_patches
+        to_patches = (
+            geometry.rotate(self._to_patches, angle[..., None])
+            if angle.any()
+            else self._to_patches
+        )
         response = dt[..., None] * self._per_mass
         pushed = twist - carried + response * wrench
         free = np.einsum("...ij,...j->...i", to_patches, pushed)
         free = free.reshape(*free.shape[:-1], len(self.patches.models), 3)
         coupled = np.einsum("...im,...m,...jm->...ij", to_patches, response, to_patches)
-        end = self.patches.step(state, HostStep(free, load, np.zeros(free.shape[-2:]), coupled), dt)
+        end = self.patches.step(
+            state, HostStep(free, load, np.zeros(free.shape[-2:]), coupled), dt
+        )
         friction = np.einsum(
-            "...i,...im->...m", end.wrench.reshape(*end.wrench.shape[:-2], len(self._to_patches)), to_patches
+            "...i,...im->...m",
+            end.wrench.reshape(*end.wrench.shape[:-2], len(self._to_patches)),
+            to_patches,
         )
         step = BodyStep(end.state, pushed + response * friction + carried, friction)
         if not end.converged.all():
@@ -135,13 +153,19 @@ class SlidingBody(ByValue):
 
         Raises InvalidValueError for loads that are not finite or below zero, or not one for each patch.
         """
-        load, damping, stiffness = self._loads(normal_force), 0.0, 0.0
+        load = self._loads(normal_force)
+        damping = 0.0
+        stiffness = 0.0
         for k, model in enumerate(self.patches.models):
             rows = self._to_patches[3 * k : 3 * k + 3] * np.sqrt(self._per_mass)
             still, one = (
-                -model.step_jacobians(model.rest(), np.zeros(3), load[..., k], dt).wrench_twist for dt in (0.0, 1.0)
+                -model.step_jacobians(
+                    model.rest(), np.zeros(3), load[..., k], dt
+                ).wrench_twist
+                for dt in (0.0, 1.0)
             )
-            damping, stiffness = damping + rows.T @ still @ rows, stiffness + rows.T @ (one - still) @ rows
+            damping = damping + rows.T @ still @ rows
+            stiffness = stiffness + rows.T @ (one - still) @ rows
         c, k = (np.linalg.eigvalsh(each)[..., -1] for each in (damping, stiffness))
         with np.errstate(divide="ignore"):
             return 4.0 / (c + np.sqrt(c * c + 4.0 * k))

@@ -84,7 +84,11 @@ def why_not_numeric(value: Any, depth: int = 0) -> str | None:
         except Exception:  # tensors on a device, tracers: the reasons are theirs
             return ""
         return why_not_numeric(found)
-    return None if hasattr(type(value), "__float__") or hasattr(type(value), "__index__") else ""
+    return (
+        None
+        if hasattr(type(value), "__float__") or hasattr(type(value), "__index__")
+        else ""
+    )
 
 
 def _refusal_inside(values: Sequence[Any], depth: int) -> str | None:
@@ -93,7 +97,14 @@ def _refusal_inside(values: Sequence[Any], depth: int) -> str | None:
         return f" in lists at most {DEEPEST} deep"
     if _PLAIN.issuperset(map(type, values)):
         return None
-    return next((reason for each in values if (reason := why_not_numeric(each, depth + 1)) is not None), None)
+    return next(
+        (
+            reason
+            for each in values
+            if (reason := why_not_numeric(each, depth + 1)) is not None
+        ),
+        None,
+    )
 
 
 def _unit(value: Any) -> Any:
@@ -110,7 +121,10 @@ def _states_a_unit(value: Any) -> bool:
     unit = _unit(value)
     if unit is None:
         return False
-    return not isinstance(unit, str) or not set(re.findall(r"[^\W\d_]+|[%°]", unit)) <= SI_UNITS
+    return (
+        not isinstance(unit, str)
+        or not set(re.findall(r"[^\W\d_]+|[%°]", unit)) <= SI_UNITS
+    )
 
 
 def numbers(name: str, value: Any) -> np.ndarray:
@@ -127,14 +141,20 @@ def numbers(name: str, value: Any) -> np.ndarray:
         return np.asarray(value, dtype=float)
     except OverflowError:
         raise InvalidValueError(name, "be finite", value) from None
-    except Exception:  # rows of different lengths; what an __array__ or __float__ raises
-        raise InvalidValueError(name, "be an array of numbers, with rows of equal length", value) from None
+    except (
+        Exception
+    ):  # rows of different lengths; what an __array__ or __float__ raises
+        raise InvalidValueError(
+            name, "be an array of numbers, with rows of equal length", value
+        ) from None
 
 
 def _check_size(name: str, value: Any) -> None:
     """Raise, before memory is asked for, where an array is too large to be copied."""
     if isinstance(value, np.ndarray) and value.size > MOST_NUMBERS:
-        raise InvalidValueError(name, f"hold at most {MOST_NUMBERS} numbers", f"shape {list(value.shape)}")
+        raise InvalidValueError(
+            name, f"hold at most {MOST_NUMBERS} numbers", f"shape {list(value.shape)}"
+        )
 
 
 def number(name: str, value: Any) -> float:
@@ -142,7 +162,9 @@ def number(name: str, value: Any) -> float:
     if type(value) is not float:
         value = _scalar(name, value)
     if not -LARGEST <= value <= LARGEST:
-        rule = f"be at most {LARGEST:g} in size" if math.isfinite(value) else "be finite"
+        rule = (
+            f"be at most {LARGEST:g} in size" if math.isfinite(value) else "be finite"
+        )
         raise InvalidValueError(name, rule, value)
     return value
 
@@ -178,7 +200,9 @@ def positive(name: str, value: Any) -> float:
     """Return `value` as a finite float > 0, or raise."""
     result = number(name, value)
     if result < SMALLEST:
-        raise InvalidValueError(name, "be > 0" if result <= 0.0 else f"be at least {SMALLEST:g}", result)
+        raise InvalidValueError(
+            name, "be > 0" if result <= 0.0 else f"be at least {SMALLEST:g}", result
+        )
     return result
 
 
@@ -238,7 +262,9 @@ def vectors(name: str, value: Any, size: int) -> np.ndarray:
     """Return `value` as a float array `[..., size]` (no copy where it is one), or raise."""
     result = numbers(name, value)
     if result.shape[-1:] != (size,):
-        raise InvalidValueError(name, f"have shape [..., {size}]", f"shape {list(result.shape)}")
+        raise InvalidValueError(
+            name, f"have shape [..., {size}]", f"shape {list(result.shape)}"
+        )
     return result
 
 
@@ -255,7 +281,9 @@ def within_range(name: str, low: Any, high: Any) -> None:
     if not (low >= -LARGEST and high <= LARGEST):
         worst = float(high if low >= -LARGEST else low)
         beyond = f"be between {-LARGEST:g} and {LARGEST:g}"
-        raise InvalidValueError(name, beyond if math.isfinite(worst) else "be finite", worst)
+        raise InvalidValueError(
+            name, beyond if math.isfinite(worst) else "be finite", worst
+        )
 
 
 def non_negative_numbers(name: str, value: Any) -> np.ndarray:
@@ -269,13 +297,20 @@ def non_negative_numbers(name: str, value: Any) -> np.ndarray:
     return result
 
 
-def array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: float = LARGEST) -> np.ndarray:
+def array(
+    name: str, value: Any, shape: tuple[int | None, ...], *, largest: float = LARGEST
+) -> np.ndarray:
     """Return `value` as a new finite float array, no number beyond `largest`; None in `shape` takes any length."""
     result = numbers(name, value)
-    fits = (wanted in (None, length) for wanted, length in zip(shape, result.shape, strict=False))
+    fits = (
+        wanted in (None, length)
+        for wanted, length in zip(shape, result.shape, strict=False)
+    )
     if result.ndim != len(shape) or not all(fits):
         wanted = "[" + ", ".join("any" if n is None else str(n) for n in shape) + "]"
-        raise InvalidValueError(name, f"have shape {wanted}", f"shape {list(result.shape)}")
+        raise InvalidValueError(
+            name, f"have shape {wanted}", f"shape {list(result.shape)}"
+        )
     _check_size(name, result)
     result = result.copy()
     _check_finite(name, result, largest)
@@ -290,18 +325,24 @@ def filled(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
     except ValueError as error:
         if isinstance(error, InvalidValueError):
             raise
-        raise InvalidValueError(name, f"have shape {list(shape)}", f"shape {list(result.shape)}") from None
+        raise InvalidValueError(
+            name, f"have shape {list(shape)}", f"shape {list(result.shape)}"
+        ) from None
 
 
 def positive_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
     """Return `value` as an array of that shape of numbers > 0."""
     result = array(name, value, shape)
     if not (result > 0.0).all():
-        raise InvalidValueError(name, "be > 0", f"{result.min()} at index {result.argmin()}")
+        raise InvalidValueError(
+            name, "be > 0", f"{result.min()} at index {result.argmin()}"
+        )
     return result
 
 
-def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: float = LARGEST) -> np.ndarray:
+def non_negative_array(
+    name: str, value: Any, shape: tuple[int | None, ...], *, largest: float = LARGEST
+) -> np.ndarray:
     """Return `value` as a new finite float array >= 0, as `array` does."""
     result = array(name, value, shape, largest=largest)
     _check_each(name, result, result >= 0.0, "be >= 0")
@@ -311,13 +352,19 @@ def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...], *, 
 def _check_finite(name: str, values: np.ndarray, largest: float) -> None:
     if not np.abs(values).max(initial=0.0) <= min(largest, _FINITE):
         _check_each(name, values, np.isfinite(values), "be finite")
-        _check_each(name, values, np.abs(values) <= largest, f"be at most {largest:g} in size")
+        _check_each(
+            name, values, np.abs(values) <= largest, f"be at most {largest:g} in size"
+        )
 
 
 def _check_each(name: str, values: np.ndarray, good: np.ndarray, rule: str) -> None:
     if not good.all():
-        where = tuple(int(i) for i in np.unravel_index(int(np.argmin(good)), good.shape))
-        raise InvalidValueError(name, rule, f"{values[where]} at index {where}" if where else float(values))
+        where = tuple(
+            int(i) for i in np.unravel_index(int(np.argmin(good)), good.shape)
+        )
+        raise InvalidValueError(
+            name, rule, f"{values[where]} at index {where}" if where else float(values)
+        )
 
 
 def instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) -> Any:
@@ -329,11 +376,20 @@ def instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) ->
 
 def text(name: str, value: Any) -> str:
     """Return `value` if it is a text that can be a name: printable, not empty, not long, no spaces at its ends."""
-    if not (isinstance(value, str) and value.isprintable() and value.strip() == value and value):
-        rule = "be a text that is not empty, is printable, and has no spaces at its ends"
+    if not (
+        isinstance(value, str)
+        and value.isprintable()
+        and value.strip() == value
+        and value
+    ):
+        rule = (
+            "be a text that is not empty, is printable, and has no spaces at its ends"
+        )
         raise InvalidValueError(name, rule, quoted(value))
     if len(value) > LONGEST_NAME:
-        raise InvalidValueError(name, f"have at most {LONGEST_NAME} characters", f"{len(value)}")
+        raise InvalidValueError(
+            name, f"have at most {LONGEST_NAME} characters", f"{len(value)}"
+        )
     return value
 
 
@@ -346,7 +402,11 @@ def path(name: str, value: Any) -> Path:
 
 def hint(value: Any, valid: Iterable[str]) -> str:
     """Return " (did you mean 'x'?)" with the one of `valid` that is nearest to a text, or nothing."""
-    near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
+    near = (
+        difflib.get_close_matches(value[:200], valid, n=1)
+        if isinstance(value, str)
+        else []
+    )
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 
@@ -356,7 +416,11 @@ def choice(name: str, value: Any, valid: Iterable[str]) -> str:
     if isinstance(value, str) and value in valid:
         return value
     near = hint(value, valid)
-    raise InvalidValueError(name, f"be one of {', '.join(valid)}", f"{value!r}{near}" if near else quoted(value))
+    raise InvalidValueError(
+        name,
+        f"be one of {', '.join(valid)}",
+        f"{value!r}{near}" if near else quoted(value),
+    )
 
 
 def choices(name: str, value: Any, valid: Iterable[str]) -> list[str]:
@@ -367,7 +431,9 @@ def choices(name: str, value: Any, valid: Iterable[str]) -> list[str]:
     return [choice(name, each, valid) for each in value]
 
 
-def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] = ()) -> None:
+def keys(
+    name: str, data: Any, required: Iterable[str], optional: Iterable[str] = ()
+) -> None:
     """Raise unless `data` is a mapping with all `required` keys and, beyond them, only `optional` ones."""
     required = list(required)
     if not isinstance(data, Mapping):
@@ -376,7 +442,9 @@ def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] 
         choice(f"{name} key", key, dict.fromkeys([*required, *optional]))
     for key in required:
         if key not in data:
-            raise InvalidValueError(name, f"have the key {key!r}", f"{', '.join(map(str, data)) or 'none'}")
+            raise InvalidValueError(
+                name, f"have the key {key!r}", f"{', '.join(map(str, data)) or 'none'}"
+            )
 
 
 def broadcast(**arrays: np.ndarray) -> tuple[int, ...]:
@@ -384,9 +452,13 @@ def broadcast(**arrays: np.ndarray) -> tuple[int, ...]:
     return common_shape(" and ".join(arrays), [each.shape for each in arrays.values()])
 
 
-def common_shape(name: str, shapes: Collection[tuple[int, ...]], rule: str = "broadcast") -> tuple[int, ...]:
+def common_shape(
+    name: str, shapes: Collection[tuple[int, ...]], rule: str = "broadcast"
+) -> tuple[int, ...]:
     """Return the shape to which all `shapes` broadcast."""
     try:
         return np.broadcast_shapes(*shapes)
     except ValueError:
-        raise InvalidValueError(name, rule, f"shapes {', '.join(str(list(each)) for each in shapes)}") from None
+        raise InvalidValueError(
+            name, rule, f"shapes {', '.join(str(list(each)) for each in shapes)}"
+        ) from None

@@ -38,9 +38,12 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
     shown = progress is None and watched()
     expect_compilation()
     told = _show if shown else progress or (lambda words: None)
-    parts, times = _parts(), {}
+    parts = _parts()
+    times = {}
     code = "from planarfriction import warm; warm.serve()"
-    with together.Crew(code, range(len(parts)), processes=threads.processors() - 1) as crew:
+    with together.Crew(
+        code, range(len(parts)), processes=threads.processors() - 1
+    ) as crew:
         for job, (words, work) in enumerate(parts.items()):
             told(words)
             begin = time.perf_counter()
@@ -48,7 +51,12 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
                 work()
             times[words] = crew.seconds.get(job, time.perf_counter() - begin)
     if shown:
-        print(f"\rcompiled {len(times)} parts in {sum(times.values()):.1f} s".ljust(_WIDTH), file=sys.stderr)
+        print(
+            f"\rcompiled {len(times)} parts in {sum(times.values()):.1f} s".ljust(
+                _WIDTH
+            ),
+            file=sys.stderr,
+        )
     return times
 
 
@@ -68,14 +76,22 @@ def _parts() -> dict[str, Callable[[], Any]]:
 
     Neighbours share functions, which one process then compiles once for them.
     """
-    patch, law = ContactPatch.disc(radius=0.01, cells=5), LuGre(mu_s=1.2, elasto_plastic=0.9)
-    cells, reduced, published = (MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published"))
-    grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
+    patch = ContactPatch.disc(radius=0.01, cells=5)
+    law = LuGre(mu_s=1.2, elasto_plastic=0.9)
+    cells, reduced, published = (
+        MODELS[name](patch, law)
+        for name in ("distributed", "reduced", "reduced-published")
+    )
+    grooved = models.DistributedModel(
+        patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law
+    )
     return {
         **_of(cells, "distributed", *_WORK),
         **_of(grooved, "anisotropic", "scenes", "rollouts"),
         **_of(reduced, "reduced", *_WORK),
-        "coupled patches": functools.partial(_couple, [cells, reduced, published, grooved]),
+        "coupled patches": functools.partial(
+            _couple, [cells, reduced, published, grooved]
+        ),
         **({"steps inside MuJoCo": _host} if find_spec("mujoco") else {}),
         "derivatives of scenes in reverse": functools.partial(_reverse, reduced),
         **_of(published, "reduced-published", *_WORK),
@@ -90,11 +106,17 @@ def _of(model: Any, name: str, *kinds: str) -> dict[str, Callable[[], Any]]:
 
 
 def _reverse(model: Any) -> None:
-    derivatives.scene_gradient(in_hand(model), lambda time, motion: np.ones_like(motion), ["mu"], options=_INSTANT)
+    derivatives.scene_gradient(
+        in_hand(model),
+        lambda time, motion: np.ones_like(motion),
+        ["mu"],
+        options=_INSTANT,
+    )
 
 
 def _step(model: Any) -> None:
-    state, twist = model.rest(), (0.01, 0.0, 1.0)
+    state = model.rest()
+    twist = (0.01, 0.0, 1.0)
     for method in (model.rate, model.wrench, model.jacobians):
         method(state, twist, 1.0)
     for method in (model.step, model.step_jacobians):
@@ -106,7 +128,13 @@ def _step(model: Any) -> None:
 def _couple(kinds: list[Any]) -> None:
     patches = coupling.CoupledPatches(kinds)
     k = len(kinds)
-    host = coupling.HostStep(np.ones((k, 3)), np.ones(k), np.zeros((k, 3)), np.eye(3 * k), moments=np.zeros((k, 2)))
+    host = coupling.HostStep(
+        np.ones((k, 3)),
+        np.ones(k),
+        np.zeros((k, 3)),
+        np.eye(3 * k),
+        moments=np.zeros((k, 2)),
+    )
     patches.step(patches.rest(), host, 1e-4)
 
 
@@ -125,20 +153,35 @@ def _roll(model: Any) -> None:
 
 
 def _joints() -> None:
-    time, plant = np.linspace(0.0, 4.0, 400), joints.Plant(inertia=0.1)
+    time = np.linspace(0.0, 4.0, 400)
+    plant = joints.Plant(inertia=0.1)
     q = np.sin(2.0 * time) + 0.3 * np.sin(5.0 * time)
     push = joints.JointFriction(1.0).along(time, np.gradient(q, time))
-    for log in (joints.JointLog(time, q, torque=push), joints.JointLog(time, q, voltage=push)):
+    for log in (
+        joints.JointLog(time, q, torque=push),
+        joints.JointLog(time, q, voltage=push),
+    ):
         joints.identify_joint([log] * 4, plant, terms=())
 
 
 def _surfaces(patch: ContactPatch) -> None:
-    kinds = (limit_surface.LimitSurfaceExact, limit_surface.LimitSurfaceCells, limit_surface.LimitSurfaceTable)
-    for kind in (*kinds, limit_surface.LimitSurfaceTablePublished, limit_surface.LimitSurfaceEllipsoid):
+    kinds = (
+        limit_surface.LimitSurfaceExact,
+        limit_surface.LimitSurfaceCells,
+        limit_surface.LimitSurfaceTable,
+    )
+    for kind in (
+        *kinds,
+        limit_surface.LimitSurfaceTablePublished,
+        limit_surface.LimitSurfaceEllipsoid,
+    ):
         surface = kind(patch)
         surface.jacobian((0.01, 0.0, 1.0))
         surface.twist(surface.wrench((0.01, 0.0, 1.0)))
-    for each in (ContactPatch.rectangle(0.01, cells=5), PUBLISHED_PATCHES["NonConvex1"]()):
+    for each in (
+        ContactPatch.rectangle(0.01, cells=5),
+        PUBLISHED_PATCHES["NonConvex1"](),
+    ):
         each.grid_error()  # by the loops of polygons
 
 
@@ -146,6 +189,8 @@ _WORK: dict[str, Callable[[Any], Any]] = {
     "scenes": lambda model: simulate(in_hand(model), t_end=_INSTANT.t_end),
     "steps": _step,
     "rollouts": _roll,
-    "derivatives of scenes": lambda model: derivatives.scene_sensitivities(in_hand(model), options=_INSTANT),
+    "derivatives of scenes": lambda model: derivatives.scene_sensitivities(
+        in_hand(model), options=_INSTANT
+    ),
 }
 """Kinds of work with a model."""

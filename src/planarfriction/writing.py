@@ -54,13 +54,19 @@ def check_writable(path: str | Path) -> Path:
     with reporting(path):
         target = Path(os.path.realpath(path))
         if target.is_dir():
-            raise FileError(f"{path}: cannot be written: it is a folder; give the name of a file in it")
+            raise FileError(
+                f"{path}: cannot be written: it is a folder; give the name of a file in it"
+            )
         if not target.parent.is_dir():
-            raise FileError(f"{path}: cannot be written: there is no folder {target.parent}")
+            raise FileError(
+                f"{path}: cannot be written: there is no folder {target.parent}"
+            )
         with contextlib.suppress(FileNotFoundError):
             target.stat()  # tells a name that is too long
             if not target.is_file():
-                raise FileError(f"{path}: cannot be written: it is a device, not a file")
+                raise FileError(
+                    f"{path}: cannot be written: it is a device, not a file"
+                )
             target.open("ab").close()
         part = _part(target)
         part.open("xb").close()
@@ -121,7 +127,10 @@ def reporting(path: str | Path) -> Iterator[None]:
         yield
     except FrictionError:
         raise
-    except (OSError, ValueError) as error:  # ValueError: a path with a zero byte, text that UTF-8 cannot hold
+    except (
+        OSError,
+        ValueError,
+    ) as error:  # ValueError: a path with a zero byte, text that UTF-8 cannot hold
         raise FileError(f"{path}: cannot be written: {_reason(error)}") from None
 
 

@@ -53,7 +53,8 @@ def scene(state: State) -> Scene:
 
 def mujoco(state: State) -> str:
     """Return a geom of MuJoCo whose sliding and torsional friction are the half axes of the ellipsoid."""
-    mu, torsion = state.law.numbers.mu_c, state.law.numbers.mu_c * state.drawing.patch.contact_radius()
+    mu = state.law.numbers.mu_c
+    torsion = state.law.numbers.mu_c * state.drawing.patch.contact_radius()
     return f"""<!-- MuJoCo alone: an ellipsoid with the half axes mu_c f_N and mu_c r f_N -->
 <geom condim="4" friction="{mu:.6g} {torsion:.6g} 0"/>
 
@@ -73,8 +74,16 @@ def _described(drawing: Drawing) -> dict[str, Any]:
     if drawing.origin == "published":
         return {"shape": "published", "name": drawing.name}
     if drawing.origin == "file":
-        return {"shape": "pressure-map", "file": drawing.name, "cell_size": drawing.cell_size}
-    return {"shape": "pressure-map", "cell_size": drawing.cell_size, "values": drawing.pressures.tolist()}
+        return {
+            "shape": "pressure-map",
+            "file": drawing.name,
+            "cell_size": drawing.cell_size,
+        }
+    return {
+        "shape": "pressure-map",
+        "cell_size": drawing.cell_size,
+        "values": drawing.pressures.tolist(),
+    }
 
 
 def _patch(drawing: Drawing) -> str:
@@ -82,7 +91,9 @@ def _patch(drawing: Drawing) -> str:
         return f"pf.patch.PUBLISHED_PATCHES[{drawing.name!r}]()"
     if drawing.origin == "file":
         return f"pf.ContactPatch.from_pressure({drawing.name!r}, cell_size={drawing.cell_size!r})"
-    rows = "".join(f"    [{', '.join(map(_short, row))}],\n" for row in drawing.pressures.tolist())
+    rows = "".join(
+        f"    [{', '.join(map(_short, row))}],\n" for row in drawing.pressures.tolist()
+    )
     return f"pf.ContactPatch.from_pressure([\n{rows}], cell_size={drawing.cell_size!r})"
 
 

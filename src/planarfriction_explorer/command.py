@@ -6,8 +6,15 @@ import click
 
 
 @click.command(short_help="Explore the friction of a contact in the browser.")
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Port on this computer. Default: a free one.")
-@click.option("--browser/--no-browser", default=True, help="Whether to open the browser.")
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Port on this computer. Default: a free one.",
+)
+@click.option(
+    "--browser/--no-browser", default=True, help="Whether to open the browser."
+)
 def explore(port: int, browser: bool) -> None:
     """Open a page in the browser: draw or load a pressure map, choose a law, drag a twist, and see the friction.
 
@@ -23,4 +30,8 @@ def explore(port: int, browser: bool) -> None:
     from planarfriction.cli.console import note
     from planarfriction_explorer.server import serve
 
-    serve(port, browser=browser, ready=lambda address: note(f"the explorer is at {address} (Ctrl-C stops it)"))
+    serve(
+        port,
+        browser=browser,
+        ready=lambda address: note(f"the explorer is at {address} (Ctrl-C stops it)"),
+    )

@@ -16,7 +16,12 @@ from planarfriction_explorer import looks
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.state import PRESETS, State, law_parameters
 
-TOOLS = {"Centre of rotation": "turn", "Velocity": "slide", "Brush": "brush", "Eraser": "erase"}
+TOOLS = {
+    "Centre of rotation": "turn",
+    "Velocity": "slide",
+    "Brush": "brush",
+    "Eraser": "erase",
+}
 """Actions of a drag over the map."""
 
 OWN = "own map"
@@ -50,25 +55,56 @@ class Controls:
         self.example = widgets.Select(label="Example", options=[CHANGED, *PRESETS])
         self.undo = widgets.Button(label="Undo", disabled=True)
         self.link = widgets.Button(label="Link")
-        self.patch = widgets.Select(label="Patch", options=[*PUBLISHED_PATCHES, OWN], value=state.drawing.name)
-        self.file = widgets.FileInput(label="Pressure map from a file (.csv, .npy, grey image)", accept="")
-        self.cell_size = widgets.FloatInput(label="Cell size [mm]", step=0.1, format="0[.]0000")
+        self.patch = widgets.Select(
+            label="Patch", options=[*PUBLISHED_PATCHES, OWN], value=state.drawing.name
+        )
+        self.file = widgets.FileInput(
+            label="Pressure map from a file (.csv, .npy, grey image)", accept=""
+        )
+        self.cell_size = widgets.FloatInput(
+            label="Cell size [mm]", step=0.1, format="0[.]0000"
+        )
         self.clear = widgets.Button(label="Clear the map", align="end")
-        self.tool = widgets.RadioButtonGroup(options=TOOLS, value="turn", color="primary", variant="outline")
-        self.brush = widgets.FloatSlider(label="Radius of the brush [cells]", start=0.5, end=6.0, step=0.5, value=1.5)
-        self.pressure = widgets.FloatSlider(label="Pressure of the brush", start=0.1, end=1.0, step=0.1, value=1.0)
-        self.law = widgets.Select(label="Law", options=list(LAWS), value=LAWS.name_of(state.law))
-        self.load = widgets.FloatInput(label="Normal force [N]", value=state.normal_force, step=0.5)
-        self.mass = widgets.FloatInput(label="Mass of the part [g]", value=_thousandfold(state.mass), step=10.0)
-        self.lever = widgets.FloatInput(label="Off the middle by [mm]", value=_thousandfold(state.lever), step=1.0)
+        self.tool = widgets.RadioButtonGroup(
+            options=TOOLS, value="turn", color="primary", variant="outline"
+        )
+        self.brush = widgets.FloatSlider(
+            label="Radius of the brush [cells]", start=0.5, end=6.0, step=0.5, value=1.5
+        )
+        self.pressure = widgets.FloatSlider(
+            label="Pressure of the brush", start=0.1, end=1.0, step=0.1, value=1.0
+        )
+        self.law = widgets.Select(
+            label="Law", options=list(LAWS), value=LAWS.name_of(state.law)
+        )
+        self.load = widgets.FloatInput(
+            label="Normal force [N]", value=state.normal_force, step=0.5
+        )
+        self.mass = widgets.FloatInput(
+            label="Mass of the part [g]", value=_thousandfold(state.mass), step=10.0
+        )
+        self.lever = widgets.FloatInput(
+            label="Off the middle by [mm]", value=_thousandfold(state.lever), step=1.0
+        )
         vx, vy, omega = state.twist
-        self.vx = widgets.FloatSlider(label="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
-        self.vy = widgets.FloatSlider(label="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
-        self.omega = widgets.FloatSlider(label="ω [rad/s]", start=-10.0, end=10.0, step=0.01, value=omega)
+        self.vx = widgets.FloatSlider(
+            label="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx
+        )
+        self.vy = widgets.FloatSlider(
+            label="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy
+        )
+        self.omega = widgets.FloatSlider(
+            label="ω [rad/s]", start=-10.0, end=10.0, step=0.01, value=omega
+        )
         docs = field_docs(State) | field_docs(Drawing)
-        tooltips = TOOLTIPS | {"law": members(LAWS), "load": docs.get("normal_force", "")}
+        tooltips = TOOLTIPS | {
+            "law": members(LAWS),
+            "load": docs.get("normal_force", ""),
+        }
         for each in ("cell_size", "mass", "lever"):
-            tooltips[each] = docs.get(each, "").replace("[m]", "[mm]").replace("[kg]", "[g]")
+            tooltips[each] = (
+                docs.get(each, "").replace("[m]", "[mm]").replace("[kg]", "[g]")
+            )
         for name, widget in vars(self).items():  # a name for the widget in the page too
             widget.css_classes = [name.replace("_", "-")]
             widget.sizing_mode = "stretch_width"
@@ -81,14 +117,18 @@ class Controls:
 
     def on(self, widget: Any, act: Callable[[Any], Any]) -> None:
         """Call `act` with each new value that the user gives."""
-        widget.param.watch(lambda event: None if self._silent or event.new is None else act(event.new), "value")
+        widget.param.watch(
+            lambda event: None if self._silent or event.new is None else act(event.new),
+            "value",
+        )
 
     def offer_parameters(self, law: Any, changed: Callable[[Any], Any]) -> None:
         """Put up fields for the parameters of the law; empty ones have a default that depends on others.
 
         `changed` is called with a field that the user changes.
         """
-        fields, docs = [], field_docs(type(law))
+        fields = []
+        docs = field_docs(type(law))
         for name, value in law_parameters(law).items():
             words = docs.get(name, "")
             unit = re.search(r"\[[^]-]+\]", words)
@@ -103,7 +143,9 @@ class Controls:
                     margin=(3, 0, 5, 0),
                 )
             )
-            fields[-1].param.watch(lambda event: None if self._silent else changed(event.obj), "value")
+            fields[-1].param.watch(
+                lambda event: None if self._silent else changed(event.obj), "value"
+            )
         self.parameters.objects = fields
 
     def law_values(self) -> dict[str, float | None]:
@@ -123,7 +165,9 @@ class Controls:
         vx, vy, omega = state.twist
         drawing = state.drawing
         values: dict[Any, Any] = {
-            self.example: next((name for name, each in PRESETS.items() if each is state), CHANGED),
+            self.example: next(
+                (name for name, each in PRESETS.items() if each is state), CHANGED
+            ),
             self.law: LAWS.name_of(state.law),
             self.mass: _thousandfold(state.mass),
             self.lever: _thousandfold(state.lever),
@@ -133,7 +177,10 @@ class Controls:
             self.load: state.normal_force,
             self.cell_size: _thousandfold(drawing.cell_size),
             self.patch: drawing.name if drawing.origin == "published" else OWN,
-            **{each: law_parameters(state.law)[each.tags[0]] for each in self.parameters},
+            **{
+                each: law_parameters(state.law)[each.tags[0]]
+                for each in self.parameters
+            },
         }
         self._silent = True
         try:
@@ -148,7 +195,9 @@ class Controls:
         self.example.styles = looks.grows(200, most=260)
         self.undo.styles = self.link.styles = looks.grows(60, most=90)
         parts = self.example, self.undo, self.link
-        return pn.FlexBox(*parts, gap="0 8px", align_items="flex-end", styles=looks.grows(340))
+        return pn.FlexBox(
+            *parts, gap="0 8px", align_items="flex-end", styles=looks.grows(340)
+        )
 
     def layout(self) -> Any:
         """Return the controls, except for the tool and those of `head` and `motion`, one below the other."""
@@ -156,7 +205,12 @@ class Controls:
             _heading("Contact"),
             self.patch,
             self.file,
-            pn.Row(self.cell_size, pn.Spacer(width=8), self.clear, sizing_mode="stretch_width"),
+            pn.Row(
+                self.cell_size,
+                pn.Spacer(width=8),
+                self.clear,
+                sizing_mode="stretch_width",
+            ),
             self._slider("brush"),
             self._slider("pressure"),
             _heading("Friction"),
@@ -164,7 +218,9 @@ class Controls:
             self.parameters,
             self.load,
             _heading("Held by two such contacts"),
-            pn.Row(self.mass, pn.Spacer(width=8), self.lever, sizing_mode="stretch_width"),
+            pn.Row(
+                self.mass, pn.Spacer(width=8), self.lever, sizing_mode="stretch_width"
+            ),
             stylesheets=[looks.SIDE],
             styles=looks.grows(270, most=320),
         )
@@ -172,7 +228,9 @@ class Controls:
     def motion(self) -> Any:
         """Return the sliders of the twist."""
         rows = map(self._slider, ("vx", "vy", "omega"))
-        return pn.Column(_heading("Motion of the origin"), *rows, sizing_mode="stretch_width")
+        return pn.Column(
+            _heading("Motion of the origin"), *rows, sizing_mode="stretch_width"
+        )
 
     def _slider(self, name: str) -> Any:
         icon = pn.widgets.TooltipIcon(value=TOOLTIPS[name], margin=(0, 0, 0, 10))

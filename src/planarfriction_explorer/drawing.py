@@ -16,9 +16,19 @@ import numpy as np
 from planarfriction import geometry, validation
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceTable
+from planarfriction.limit_surface import (
+    LimitSurfaceEllipsoid,
+    LimitSurfaceExact,
+    LimitSurfaceTable,
+)
 from planarfriction.limit_surface.comparison import directions
-from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, Grid, GridError, read_pressure_map
+from planarfriction.patch import (
+    PUBLISHED_PATCHES,
+    ContactPatch,
+    Grid,
+    GridError,
+    read_pressure_map,
+)
 
 
 def plain_name(name: str) -> str:
@@ -76,7 +86,9 @@ class Drawing(Checked):
         """Return the published patch `name`."""
         patch = PUBLISHED_PATCHES.choose(name)()
         pressures = np.zeros((patch.grid.rows, patch.grid.columns))
-        pressures[_places(patch.grid, patch.positions)] = patch.weights() / patch.weights().max()
+        pressures[_places(patch.grid, patch.positions)] = (
+            patch.weights() / patch.weights().max()
+        )
         return cls(pressures, patch.grid.cell_width, name, "published")
 
     @classmethod
@@ -90,7 +102,9 @@ class Drawing(Checked):
             pressures = read_pressure_map(path)
         if max(pressures.shape) > MOST_SIDE:
             rule = f"have at most {MOST_SIDE} rows and columns here"
-            raise InvalidValueError(f"the map in {name}", rule, "{} x {}".format(*pressures.shape))
+            raise InvalidValueError(
+                f"the map in {name}", rule, "{} x {}".format(*pressures.shape)
+            )
         drawing = cls(pressures, cell_size, name, "file")
         _ = drawing.patch  # refuses what is negative or empty now
         return drawing
@@ -99,7 +113,9 @@ class Drawing(Checked):
         """Return the map with a `pressure` on all cells whose middle is within `radius` [m] of the point (x, y) [m]."""
         centres = self.grid.centres().reshape(*self.pressures.shape, 2)
         under = np.hypot(centres[..., 0] - x, centres[..., 1] - y) <= radius
-        under[_places(self.grid, np.array([[x, y]]))] |= abs(x) < self.width / 2 and abs(y) < self.height / 2
+        under[_places(self.grid, np.array([[x, y]]))] |= (
+            abs(x) < self.width / 2 and abs(y) < self.height / 2
+        )
         return Drawing(np.where(under, pressure, self.pressures), self.cell_size)
 
     def cleared(self) -> Drawing:
@@ -133,7 +149,9 @@ class Drawing(Checked):
         """The contact patch. Raises `InvalidValueError` where nothing presses."""
         if self.origin == "published":
             return PUBLISHED_PATCHES[self.name]()
-        return ContactPatch.from_pressure(self.pressures, self.cell_size, name=self.name)
+        return ContactPatch.from_pressure(
+            self.pressures, self.cell_size, name=self.name
+        )
 
     @functools.cached_property
     def surface(self) -> LimitSurfaceExact:
@@ -161,7 +179,8 @@ class Drawing(Checked):
     def largest_errors(self) -> tuple[float, float]:
         """Return the largest errors of the ellipsoid over all directions: distance of (fx, fy, tau/r) for the same
         twist [-], and angle between the twists (vx, vy, r omega) of the same wrench [deg]."""
-        units, scale = directions(SAMPLES), np.array([1.0, 1.0, self.surface.contact_radius])
+        units = directions(SAMPLES)
+        scale = np.array([1.0, 1.0, self.surface.contact_radius])
         twists = geometry.twist_at(units / scale, -self.surface.centre_of_pressure)
         apart = self.ellipsoid.wrench(twists) - self.surface.wrench(twists)
         apart = geometry.wrench_at(apart, self.surface.centre_of_pressure) / scale
@@ -173,4 +192,6 @@ def _places(grid: Grid, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return rows and columns of the cells that hold `positions` `[N, 2]` [m], or that lie nearest."""
     columns = np.floor((positions[:, 0] - grid.x_min) / grid.cell_width).astype(int)
     from_below = np.floor((positions[:, 1] - grid.y_min) / grid.cell_height).astype(int)
-    return np.clip(grid.rows - 1 - from_below, 0, grid.rows - 1), np.clip(columns, 0, grid.columns - 1)
+    return np.clip(grid.rows - 1 - from_below, 0, grid.rows - 1), np.clip(
+        columns, 0, grid.columns - 1
+    )

@@ -67,10 +67,15 @@ def film(scene: Scene, progress: Callable[[str, float], None]) -> Watched:
     `progress` is called now and then with what is being done and the share of the run that is done; what it raises
     ends the work.
     """
-    solution = simulate(scene, progress=lambda time: progress("simulating", time / scene.t_end))
-    histories, end = BytesIO(), float(solution.histories["time"].values[-1]) or 1.0
+    solution = simulate(
+        scene, progress=lambda time: progress("simulating", time / scene.t_end)
+    )
+    histories = BytesIO()
+    end = float(solution.histories["time"].values[-1]) or 1.0
     plot_histories(solution).savefig(histories)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.html"
-        solution.animate(path, dpi=DPI, progress=lambda time: progress("drawing", time / end))
+        solution.animate(
+            path, dpi=DPI, progress=lambda time: progress("drawing", time / end)
+        )
         return Watched(path.read_text(encoding="utf-8") + _MORE, histories.getvalue())

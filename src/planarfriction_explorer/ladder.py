@@ -54,24 +54,39 @@ def _model(name: str, drawing: Drawing, law: Any) -> Any:
 def motion(state: State) -> Signal:
     """Return the twist of the state, reached in a quarter of the run and reversed after half: stick, slip, reversal."""
     times = T_END * np.array([0.0, 0.25, 0.5, 0.75, 1.0])
-    return Signal.sampled(times, np.outer([0.0, 1.0, 1.0, -1.0, -1.0], state.twist), "linear")
+    return Signal.sampled(
+        times, np.outer([0.0, 1.0, 1.0, -1.0, -1.0], state.twist), "linear"
+    )
 
 
 def climb(state: State) -> Iterator[Rung]:
     """Return each model of `RUNGS` in the same run, the distributed one first."""
-    scale = state.law.numbers.mu_c * np.array([1.0, 1.0, state.drawing.surface.contact_radius])
+    scale = state.law.numbers.mu_c * np.array(
+        [1.0, 1.0, state.drawing.surface.contact_radius]
+    )
     reference = None
     for name in RUNGS:
         try:
             model = _model(name, state.drawing, state.law)
-            scene = driven(model, twist=motion(state), normal_force=state.normal_force, at="origin", t_end=T_END)
+            scene = driven(
+                model,
+                twist=motion(state),
+                normal_force=state.normal_force,
+                at="origin",
+                t_end=T_END,
+            )
             scene = dataclasses.replace(scene, save_every=T_END / 200)
-            runs = [simulate(scene) for _ in range(REPEATS)]  # the first may compile, others may be disturbed
+            runs = [
+                simulate(scene) for _ in range(REPEATS)
+            ]  # the first may compile, others may be disturbed
         except FrictionError as error:
             yield Rung(name, 0, float("nan"), float("nan"), str(error))
             continue
         data = runs[0].data
-        found = np.stack([data[each].values[:, 0] for each in ("fx", "fy", "tau")], axis=1) / state.normal_force
+        found = (
+            np.stack([data[each].values[:, 0] for each in ("fx", "fy", "tau")], axis=1)
+            / state.normal_force
+        )
         reference = found if reference is None else reference
         error = float(np.sqrt((((found - reference) / scale) ** 2).sum(axis=1).mean()))
         seconds = min(run.statistics.wall_time for run in runs)

@@ -24,7 +24,12 @@ _WORDS = (
 
 _COLOURS = dict(zip(RUNGS, (DISTRIBUTED, SECOND, FEW, OTHER, PUBLISHED), strict=True))
 
-_HEAD = ("model", "bristle states", "error [% of μ<sub>c</sub> f<sub>N</sub>]", "time in the solver [ms]")
+_HEAD = (
+    "model",
+    "bristle states",
+    "error [% of μ<sub>c</sub> f<sub>N</sub>]",
+    "time in the solver [ms]",
+)
 
 
 class LadderTab:
@@ -35,11 +40,17 @@ class LadderTab:
         self._live = Live(failed=self._say)
         self.status = pn.pane.HTML("")
         self.table = pn.pane.HTML("", styles=looks.grows(340))
-        self._source = ColumnDataSource({key: [] for key in ("seconds", "error", "colour")})
+        self._source = ColumnDataSource(
+            {key: [] for key in ("seconds", "error", "colour")}
+        )
         self.layout = pn.Column(
             pn.pane.HTML(_WORDS, sizing_mode="stretch_width"),
             self.status,
-            pn.FlexBox(self.table, pn.pane.Bokeh(_chart(self._source), styles=looks.grows(340)), gap="16px"),
+            pn.FlexBox(
+                self.table,
+                pn.pane.Bokeh(_chart(self._source), styles=looks.grows(340)),
+                gap="16px",
+            ),
             sizing_mode="stretch_width",
         )
 
@@ -66,7 +77,11 @@ class LadderTab:
 
     def _show(self, rungs: list[Rung]) -> None:
         done = f"Comparing: {len(rungs)} of {len(RUNGS)} models (the first time this compiles)."
-        self._say(done if len(rungs) < len(RUNGS) else "For the patch, the law and the twist on the screen.")
+        self._say(
+            done
+            if len(rungs) < len(RUNGS)
+            else "For the patch, the law and the twist on the screen."
+        )
         self._show_rungs(rungs)
 
     def _show_rungs(self, rungs: list[Rung]) -> None:
@@ -85,16 +100,27 @@ class LadderTab:
 def table(rungs: list[Rung]) -> str:
     """Return the ladder as HTML."""
     head = "".join(f"<th>{text}</th>" for text in _HEAD)
-    names = [f"<span style='color:{_COLOURS[each.name]}'>●</span> {each.name}" for each in rungs]
-    rows = "".join(f"<tr><td>{name}</td>{_cells(each)}</tr>" for name, each in zip(names, rungs, strict=True))
+    names = [
+        f"<span style='color:{_COLOURS[each.name]}'>●</span> {each.name}"
+        for each in rungs
+    ]
+    rows = "".join(
+        f"<tr><td>{name}</td>{_cells(each)}</tr>"
+        for name, each in zip(names, rungs, strict=True)
+    )
     return f"{looks.TABLE}<table id='ladder'><tr>{head}</tr>{rows}</table>"
 
 
 def _cells(rung: Rung) -> str:
     if math.isnan(rung.error):
         return f"<td colspan=3 class=words>{html.escape(rung.refusal)}</td>"
-    error = "reference" if rung.name == next(iter(RUNGS)) else f"{100.0 * rung.error:.2f}"
-    return "".join(f"<td>{text}</td>" for text in (f"{rung.states}", error, f"{1e3 * rung.seconds:.2f}"))
+    error = (
+        "reference" if rung.name == next(iter(RUNGS)) else f"{100.0 * rung.error:.2f}"
+    )
+    return "".join(
+        f"<td>{text}</td>"
+        for text in (f"{rung.states}", error, f"{1e3 * rung.seconds:.2f}")
+    )
 
 
 def _chart(source: ColumnDataSource) -> Any:
@@ -110,6 +136,8 @@ def _chart(source: ColumnDataSource) -> Any:
     looks.tidy(plot)
     plot.x_range.range_padding = plot.y_range.range_padding = 0.1
     plot.xaxis.formatter = NumeralTickFormatter(format="0.[00]")
-    plot.xaxis.ticker = FixedTicker(ticks=[digit * 10.0**power for power in range(-2, 4) for digit in (1, 2, 5)])
+    plot.xaxis.ticker = FixedTicker(
+        ticks=[digit * 10.0**power for power in range(-2, 4) for digit in (1, 2, 5)]
+    )
     plot.scatter("seconds", "error", size=12, color="colour", source=source)
     return plot

@@ -29,7 +29,9 @@ class Task:
     """Handle of a piece of work: it calls the page, and checks that the work is still wanted."""
 
     def __init__(self, live: Live, document: Any):
-        self._live, self._document, self._number = live, document, live.newest
+        self._live = live
+        self._document = document
+        self._number = live.newest
 
     def check(self) -> None:
         """Check that the work is still wanted: raise `GivenUp` if another wish has come, or the page was closed."""
@@ -57,13 +59,17 @@ class Live:
     def __init__(self, failed: Callable[[str], None]):
         self.newest = 0
         """Number of the wish that counts."""
-        self._failed, self._one_at_a_time, self._timer = failed, threading.Lock(), None
+        self._failed = failed
+        self._one_at_a_time = threading.Lock()
+        self._timer = None
         sys.setswitchinterval(TURN)
 
     def soon(self, work: Callable[[Task], None]) -> None:
         """Begin the work in the next pause."""
         document = self.stop()
-        self._timer = document.add_timeout_callback(lambda: self._begin(document, work), PAUSE)
+        self._timer = document.add_timeout_callback(
+            lambda: self._begin(document, work), PAUSE
+        )
 
     def now(self, work: Callable[[Task], None]) -> None:
         """Begin the work at once."""
@@ -111,18 +117,26 @@ class Paced:
     """
 
     def __init__(self, draw: Callable[[], None]):
-        self._draw, self._took, self._sent, self._late, self._timer = draw, float("inf"), 0.0, False, None
+        self._draw = draw
+        self._took = float("inf")
+        self._sent = 0.0
+        self._late = False
+        self._timer = None
         self._busy = False
         self.asked: Any = pn.widgets.IntInput(value=0, visible=False)
         self.drawn: Any = pn.widgets.IntInput(value=0, visible=False)
         self.asked.jscallback(value=_ANSWER, args={"drawn": self.drawn})
-        this = weakref.proxy(self)  # as `drawn` is kept with the script as long as `asked` lives
+        this = weakref.proxy(
+            self
+        )  # as `drawn` is kept with the script as long as `asked` lives
         self.drawn.param.watch(lambda _: this._answered(), "value")
 
     def ask(self) -> None:
         """Draw what there is to draw, now or soon."""
         document: Any = pn.state.curdoc
-        if document is None or self.asked.value == 0:  # the first picture comes with the page
+        if (
+            document is None or self.asked.value == 0
+        ):  # the first picture comes with the page
             self._send()
         elif self._took > FLUENT:
             if self._timer is not None:
@@ -134,11 +148,15 @@ class Paced:
             self._send()
 
     def _send(self) -> None:
-        self._timer, self._late, self._busy, self._sent = None, False, True, time.perf_counter()
+        self._timer = None
+        self._late = False
+        self._busy = True
+        self._sent = time.perf_counter()
         self._draw()
         self.asked.value += 1
 
     def _answered(self) -> None:
-        self._took, self._busy = time.perf_counter() - self._sent, False
+        self._took = time.perf_counter() - self._sent
+        self._busy = False
         if self._late:
             self.ask()

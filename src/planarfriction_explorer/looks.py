@@ -45,8 +45,20 @@ CODE = f"""textarea {{font-family: ui-monospace, "DejaVu Sans Mono", monospace; 
 ALERT = "background:#FBE3E0;border:1px solid #C0392B;border-radius:6px;padding:8px 12px;font-size:15px"
 """Style of the line that says what is wrong."""
 
-STAYS = {"position": "fixed", "bottom": "8px", "left": "8px", "right": "8px", "width": "auto", "margin": "0 auto"}
-STAYS |= {"max-width": "760px", "z-index": "20", "box-shadow": "0 2px 10px #0005", "border-radius": "6px"}
+STAYS = {
+    "position": "fixed",
+    "bottom": "8px",
+    "left": "8px",
+    "right": "8px",
+    "width": "auto",
+    "margin": "0 auto",
+}
+STAYS |= {
+    "max-width": "760px",
+    "z-index": "20",
+    "box-shadow": "0 2px 10px #0005",
+    "border-radius": "6px",
+}
 """Styles of a line that is seen wherever the page is scrolled to, and moves nothing."""
 
 HINT = "background:#E8F1F8;border:1px solid #0072B2;border-radius:6px;padding:8px 12px;font-size:15px"
@@ -65,7 +77,9 @@ p {margin: 8px 0 0}
 
 def wrong(words: str) -> str:
     """Return the style of a field whose value is refused, with the reason below it."""
-    reason = json.dumps(words, ensure_ascii=False)  # quotes and backslashes are escaped as in CSS
+    reason = json.dumps(
+        words, ensure_ascii=False
+    )  # quotes and backslashes are escaped as in CSS
     return f"""input, select {{border-color: #C0392B !important; background-color: #FBE3E0 !important}}
 .bk-input-group::after {{content: {reason}; color: #C0392B; font-size: 12px;
   white-space: normal; width: 0; min-width: 100%}}"""

@@ -18,7 +18,14 @@ from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.ladder_tab import LadderTab
 from planarfriction_explorer.live import Paced
 from planarfriction_explorer.scene_tab import SceneTab
-from planarfriction_explorer.state import PRESETS, Answer, State, answer, from_link, to_link
+from planarfriction_explorer.state import (
+    PRESETS,
+    Answer,
+    State,
+    answer,
+    from_link,
+    to_link,
+)
 from planarfriction_explorer.views import MapView, SectionView, legend
 
 FASTEST = 0.1
@@ -52,12 +59,21 @@ class Page:
         self.ladder = LadderTab(lambda: self.state)
         self.scenes = SceneTab(lambda: self.state, self._try)
         self.surface = pn.pane.Plotly(
-            None, config={"displaylogo": False, "responsive": True}, aspect_ratio=0.8, sizing_mode="scale_width"
+            None,
+            config={"displaylogo": False, "responsive": True},
+            aspect_ratio=0.8,
+            sizing_mode="scale_width",
         )
-        self.numbers = pn.pane.HTML("", css_classes=["numbers"], sizing_mode="stretch_width")
+        self.numbers = pn.pane.HTML(
+            "", css_classes=["numbers"], sizing_mode="stretch_width"
+        )
         self.grid = pn.pane.HTML("", sizing_mode="stretch_width")
-        self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width", styles=looks.STAYS)
-        self.python, self.toml, self.mujoco = map(_code_area, ("python", "toml", "mujoco"))
+        self.message = pn.pane.HTML(
+            "", visible=False, sizing_mode="stretch_width", styles=looks.STAYS
+        )
+        self.python, self.toml, self.mujoco = map(
+            _code_area, ("python", "toml", "mujoco")
+        )
         self.tabs = pn.Tabs(
             ("Python", _copied(self.python)),
             ("Scene file (TOML)", _copied(self.toml)),
@@ -80,10 +96,18 @@ class Page:
         controls = self.controls
 
         def on(widget: Any, act: Callable[[Any], Any]) -> None:
-            controls.on(widget, lambda value: self._try(lambda: act(value), field=widget))
+            controls.on(
+                widget, lambda value: self._try(lambda: act(value), field=widget)
+            )
 
-        on(controls.patch, lambda name: self._draw(Drawing.published(name)) if name != OWN else None)
-        on(controls.cell_size, lambda size: self._draw(self.state.drawing.scaled(1e-3 * size)))
+        on(
+            controls.patch,
+            lambda name: self._draw(Drawing.published(name)) if name != OWN else None,
+        )
+        on(
+            controls.cell_size,
+            lambda size: self._draw(self.state.drawing.scaled(1e-3 * size)),
+        )
         on(controls.file, self._read)
         on(controls.law, self._choose_law)
         on(controls.load, lambda load: self._change(normal_force=load))
@@ -92,12 +116,17 @@ class Page:
         for slider in (controls.vx, controls.vy, controls.omega):
             controls.on(slider, lambda _, slider=slider: self._try(self._slide, slider))
             slider.param.watch(lambda _: self._end_step(), "value_throttled")
-        on(controls.example, lambda name: self._restore(PRESETS[name]) if name in PRESETS else None)
+        on(
+            controls.example,
+            lambda name: self._restore(PRESETS[name]) if name in PRESETS else None,
+        )
         controls.undo.on_click(lambda _: self._try(self._undo, controls.undo))
         controls.link.on_click(lambda _: self._put_link())
         controls.clear.on_click(lambda _: self._try(self._clear))
         if pn.state.location is not None:
-            pn.state.location.param.watch(lambda event: self._try(lambda: self._follow_link(event.new)), "hash")
+            pn.state.location.param.watch(
+                lambda event: self._try(lambda: self._follow_link(event.new)), "hash"
+            )
         self._offer_parameters()
 
     # ------------------------------------------------------------------ wishes of the user
@@ -117,7 +146,9 @@ class Page:
     def _put_link(self) -> None:
         location: Any = pn.state.location
         location.hash = to_link(self.state)
-        self._say("The address of this page now holds what is on the screen: keep it or pass it on.")
+        self._say(
+            "The address of this page now holds what is on the screen: keep it or pass it on."
+        )
 
     def _follow_link(self, link: str) -> None:
         """Show what a link holds; the address changes too where the page itself has put it there."""
@@ -125,24 +156,33 @@ class Page:
             self._restore(from_link(link))
 
     def _offer_parameters(self) -> None:
-        self.controls.offer_parameters(self.state.law, lambda field: self._try(self._set_law, field=field))
+        self.controls.offer_parameters(
+            self.state.law, lambda field: self._try(self._set_law, field=field)
+        )
 
     def _choose_law(self, kind: str) -> None:
         self._laws[str(LAWS.name_of(self.state.law))] = self.state.law
         law = self._laws.get(kind)
-        self.state = self.state.with_law(kind) if law is None else self.state.changed(law=law)
+        self.state = (
+            self.state.with_law(kind) if law is None else self.state.changed(law=law)
+        )
         self._offer_parameters()
         self._refresh()
 
     def _set_law(self) -> None:
-        self.state = self.state.with_law(str(self.controls.law.value), **self.controls.law_values())
+        self.state = self.state.with_law(
+            str(self.controls.law.value), **self.controls.law_values()
+        )
         self._refresh()
 
     def _read(self, content: bytes) -> None:
         """Show a map as wide as the one before it, since a file does not say how large its cells are."""
-        before, name = self.state.drawing, self.controls.file.filename or "map"
+        before = self.state.drawing
+        name = self.controls.file.filename or "map"
         found = Drawing.read(name, content, before.cell_size)
-        size = max(before.pressures.shape) / max(found.pressures.shape) * before.cell_size
+        size = (
+            max(before.pressures.shape) / max(found.pressures.shape) * before.cell_size
+        )
         self._draw(found.scaled(size))
         rows, columns = found.pressures.shape
         what = f"{found.name}: {rows} x {columns} cells of {1e3 * size:.3g} mm each"
@@ -153,7 +193,10 @@ class Page:
         self._draw(self.state.drawing.cleared())
 
     def _slide(self) -> None:
-        vx, vy, omega = (each.value for each in (self.controls.vx, self.controls.vy, self.controls.omega))
+        vx, vy, omega = (
+            each.value
+            for each in (self.controls.vx, self.controls.vy, self.controls.omega)
+        )
         self._change(twist=(1e-3 * vx, 1e-3 * vy, omega))
 
     def _dragged(self, x: float, y: float) -> None:
@@ -161,13 +204,15 @@ class Page:
         if self.controls.tool.value in ("brush", "erase"):
             self._try(lambda: self._paint(x, y), self.map)
             return
-        waiting, self._pointer = self._pointer is not None, (x, y)
+        waiting = self._pointer is not None
+        self._pointer = (x, y)
         if not waiting:
             document: Any = pn.state.curdoc
             document.add_next_tick_callback(self._follow)
 
     def _follow(self) -> None:
-        pointer, self._pointer = self._pointer, None
+        pointer = self._pointer
+        self._pointer = None
         if pointer is not None:
             self._try(lambda: self._follow_to(*pointer), self.map)
 
@@ -175,12 +220,15 @@ class Page:
         if self.controls.tool.value == "turn":
             self.state = self.state.turning_about(x, y)
         else:
-            speed = 2.0 * FASTEST / max(self.state.drawing.width, self.state.drawing.height)
+            speed = (
+                2.0 * FASTEST / max(self.state.drawing.width, self.state.drawing.height)
+            )
             self.state = self.state.sliding(speed * x, speed * y)
         self._refresh()
 
     def _paint(self, x: float, y: float) -> None:
-        drawing, controls = self.state.drawing, self.controls
+        drawing = self.state.drawing
+        controls = self.controls
         pressure = 0.0 if controls.tool.value == "erase" else controls.pressure.value
         radius = (controls.brush.value - 0.5) * drawing.cell_size
         self._draw(drawing.painted(x, y, radius=radius, pressure=pressure), quick=True)
@@ -219,7 +267,12 @@ class Page:
                 act()
             except FrictionError as error:
                 pale = field is not None and self.answer is not None
-                self._say(f"{error}. Pale: results of the values before." if pale else str(error), looks.ALERT)
+                self._say(
+                    f"{error}. Pale: results of the values before."
+                    if pale
+                    else str(error),
+                    looks.ALERT,
+                )
                 self._refuse(field if pale else None, str(error))
             if self.state is not before:
                 if step is None or step is not self._step:
@@ -233,7 +286,9 @@ class Page:
             card.css_classes = [] if field is None else ["stale"]
 
     def _say(self, words: str, look: str = looks.HINT) -> None:
-        self.message.object = f"<div id='message' style='{look}'>{html.escape(words)}</div>"
+        self.message.object = (
+            f"<div id='message' style='{look}'>{html.escape(words)}</div>"
+        )
         self.message.visible = True
 
     def _redraw(self, *, quick: bool = False) -> None:
@@ -251,27 +306,40 @@ class Page:
         try:
             self.answer = found = answer(self.state)
         except FrictionError:
-            self.answer, self._figure, self.surface.visible = None, {}, False
+            self.answer = None
+            self._figure = {}
+            self.surface.visible = False
             self.python.value = self.toml.value = self.mujoco.value = ""
             self.numbers.object = self.grid.object = ""
             self.ladder.clear()
             if self.state.drawing.pressures.any():
                 raise
-            raise FrictionError("Nothing presses: paint with the brush, choose a patch or load a map.") from None
+            raise FrictionError(
+                "Nothing presses: paint with the brush, choose a patch or load a map."
+            ) from None
         finally:
             self.map.move(self.state, self.answer)
             self.section.move(self.state, self.answer, quick=quick)
         self.slow.ask()
         self._follow_ladder()
-        self.numbers.object = pictures.numbers_table(self.state, found, time.perf_counter() - begin)
+        self.numbers.object = pictures.numbers_table(
+            self.state, found, time.perf_counter() - begin
+        )
 
     def _show_slow(self) -> None:
         """Show the picture in 3-D and the code, which need not follow a drag."""
         if self.answer is not None:
-            self.surface.param.update(object=pictures.moved(self._figure, self.answer), visible=True)
-            self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
+            self.surface.param.update(
+                object=pictures.moved(self._figure, self.answer), visible=True
+            )
+            self.python.value, self.toml.value = (
+                code.python(self.state),
+                code.toml(self.state),
+            )
             self.mujoco.value = code.mujoco(self.state)
-            self.grid.object = pictures.holding_line(self.state) + pictures.grid_line(self.state)
+            self.grid.object = pictures.holding_line(self.state) + pictures.grid_line(
+                self.state
+            )
 
     def _follow_ladder(self) -> None:
         """Run the comparison of the models while its tab is open."""
@@ -284,12 +352,20 @@ class Page:
         """Return the whole page."""
         words = "<b style='font-size:20px'>planarfriction explorer</b>"
         title = pn.pane.HTML(words, margin=(8, 12, 4, 4))
-        hint = pn.pane.HTML("<b style='font-size:15px'>Drag over the map</b>", margin=(4, 0, 4, 0))
+        hint = pn.pane.HTML(
+            "<b style='font-size:15px'>Drag over the map</b>", margin=(4, 0, 4, 0)
+        )
         plane = pn.Column(
             self.controls.motion(),
             hint,
             self.controls.tool,
-            pn.pane.Bokeh(self.map.figure, css_classes=["map"], sizing_mode="scale_width", aspect_ratio=1.0, margin=0),
+            pn.pane.Bokeh(
+                self.map.figure,
+                css_classes=["map"],
+                sizing_mode="scale_width",
+                aspect_ratio=1.0,
+                margin=0,
+            ),
             pn.pane.HTML(legend(), sizing_mode="stretch_width"),
             self.section.layout,
             stylesheets=[looks.CARD],
@@ -304,7 +380,13 @@ class Page:
         )
         self.cards = (plane, space, self.tabs)
         main = pn.Column(
-            pn.FlexBox(plane, space, gap="10px", align_items="stretch", stylesheets=[looks.FIRST]),
+            pn.FlexBox(
+                plane,
+                space,
+                gap="10px",
+                align_items="stretch",
+                stylesheets=[looks.FIRST],
+            ),
             self.tabs,
             stylesheets=[looks.OPENED],
             styles=looks.grows(600),
@@ -314,7 +396,9 @@ class Page:
             pn.FlexBox(title, self.controls.head(), align_items="flex-end"),
             self.message,
             *hidden,
-            pn.FlexBox(self.controls.layout(), main, gap="10px", align_items="flex-start"),
+            pn.FlexBox(
+                self.controls.layout(), main, gap="10px", align_items="flex-start"
+            ),
             sizing_mode="stretch_width",
             styles={"padding": "0 10px 64px", "box-sizing": "border-box"},
         )
@@ -334,5 +418,7 @@ def _code_area(kind: str) -> Any:
 def _copied(area: Any) -> Any:
     """Return a text with a button that copies it."""
     copy = pn.widgets.Button(label="Copy", css_classes=[f"copy-{area.css_classes[0]}"])
-    copy.js_on_click(args={"area": area}, code="navigator.clipboard.writeText(area.value)")
+    copy.js_on_click(
+        args={"area": area}, code="navigator.clipboard.writeText(area.value)"
+    )
     return pn.Column(copy, area, sizing_mode="stretch_width")

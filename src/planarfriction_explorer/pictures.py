@@ -37,11 +37,18 @@ COLOURS = {"friction": DISTRIBUTED, "surface": EXACT, "ellipsoid": ELLIPSOID}
 
 def pressure_image(drawing: Drawing) -> dict[str, list[Any]]:
     """Return the map as the columns of one image whose rows run from the bottom up [mm]."""
-    width, height = MM * drawing.width, MM * drawing.height
+    width = MM * drawing.width
+    height = MM * drawing.height
     peak = drawing.pressures.max(initial=0.0)
     shown = drawing.pressures[::-1] / (peak if peak > 0.0 else 1.0)
     image = np.where(shown > 0.0, shown, np.nan)  # what does not press is left white
-    return {"image": [image], "x": [-width / 2], "y": [-height / 2], "dw": [width], "dh": [height]}
+    return {
+        "image": [image],
+        "x": [-width / 2],
+        "y": [-height / 2],
+        "dw": [width],
+        "dh": [height],
+    }
 
 
 def slip_arrows(state: State) -> dict[str, list[float]]:
@@ -61,7 +68,11 @@ def slip_arrows(state: State) -> dict[str, list[float]]:
 def wrench_arrows(state: State, answer: Answer | None) -> dict[str, Any]:
     """Return forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one over the other."""
     if answer is None:
-        return {**_arrows(np.zeros((0, 2)), np.zeros((0, 2))), "colour": [], "width": []}
+        return {
+            **_arrows(np.zeros((0, 2)), np.zeros((0, 2))),
+            "colour": [],
+            "width": [],
+        }
     start = np.tile(state.drawing.surface.centre_of_pressure, (3, 1))
     longest = REACH * max(state.drawing.width, state.drawing.height)
     return {
@@ -79,13 +90,20 @@ def _arrows(starts: np.ndarray, ends: np.ndarray) -> dict[str, list[float]]:
     along = ends - starts
     names = zip(("x0", "y0", "x1", "y1"), [*starts.T, *ends.T], strict=True)
     angle = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2
-    return {**{name: (MM * each).tolist() for name, each in names}, "angle": angle.tolist()}
+    return {
+        **{name: (MM * each).tolist() for name, each in names},
+        "angle": angle.tolist(),
+    }
 
 
 def points_of_interest(state: State) -> dict[str, list[float]]:
     """Return the centre of rotation [mm], in no row where there is none."""
     centre = state.centre_of_rotation
-    return {"x": [], "y": []} if centre is None else {"x": [MM * centre[0]], "y": [MM * centre[1]]}
+    return (
+        {"x": [], "y": []}
+        if centre is None
+        else {"x": [MM * centre[0]], "y": [MM * centre[1]]}
+    )
 
 
 def section(surface: LimitSurface, angle: float) -> np.ndarray:
@@ -96,23 +114,34 @@ def section(surface: LimitSurface, angle: float) -> np.ndarray:
     """
     turn = np.linspace(0.0, 2.0 * np.pi, RAYS)
     points = np.stack([np.cos(turn), surface.contact_radius * np.sin(turn)], axis=1)
-    rays = np.stack([np.cos(angle) * points[:, 0], np.sin(angle) * points[:, 0], points[:, 1]], axis=1)
+    rays = np.stack(
+        [np.cos(angle) * points[:, 0], np.sin(angle) * points[:, 0], points[:, 1]],
+        axis=1,
+    )
     rays = geometry.wrench_at(rays, -surface.centre_of_pressure)
     return points / -np.einsum("ij,ij->i", rays, surface.twist(rays))[:, None]
 
 
-def section_lines(state: State, answer: Answer, *, quick: bool = False) -> tuple[float, dict[str, np.ndarray]]:
+def section_lines(
+    state: State, answer: Answer, *, quick: bool = False
+) -> tuple[float, dict[str, np.ndarray]]:
     """Return the direction [deg] of the friction, 0 without a force, and the sections there, `[M, 2]` [N, N mm].
 
     They are `surface`, `ellipsoid` and the single point `friction` of the law; `quick` as in `surface_figure`.
     """
-    drawing, (fx, fy, torque) = state.drawing, answer.points[0]
+    drawing = state.drawing
+    (fx, fy, torque) = answer.points[0]
     force = np.hypot(fx, fy)
     angle = np.arctan2(fy, fx) if force > LEAST else 0.0
-    lines = {"surface": section(_drawn(drawing, quick), angle), "ellipsoid": section(drawing.ellipsoid, angle)}
+    lines = {
+        "surface": section(_drawn(drawing, quick), angle),
+        "ellipsoid": section(drawing.ellipsoid, angle),
+    }
     lines["friction"] = np.array([[force, torque * drawing.surface.contact_radius]])
     strength = state.law.numbers.mu_c * state.normal_force
-    return float(np.degrees(angle)), {name: strength * points * [1.0, MM] for name, points in lines.items()}
+    return float(np.degrees(angle)), {
+        name: strength * points * [1.0, MM] for name, points in lines.items()
+    }
 
 
 def _drawn(drawing: Drawing, quick: bool) -> LimitSurface:
@@ -128,10 +157,13 @@ def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
     """
     drawing = state.drawing
     surface = _drawn(drawing, quick)
-    polar, azimuth = np.linspace(0.0, np.pi, POLAR)[:, None], np.linspace(0.0, 2.0 * np.pi, AZIMUTH)[None]
+    polar = np.linspace(0.0, np.pi, POLAR)[:, None]
+    azimuth = np.linspace(0.0, 2.0 * np.pi, AZIMUTH)[None]
     mesh = scaled_samples(surface, polar, azimuth)[1]
     rings = _wires(scaled_samples(drawing.ellipsoid, polar[::6], azimuth)[1])
-    spokes = _wires(np.swapaxes(scaled_samples(drawing.ellipsoid, polar, azimuth[:, ::6])[1], 0, 1))
+    spokes = _wires(
+        np.swapaxes(scaled_samples(drawing.ellipsoid, polar, azimuth[:, ::6])[1], 0, 1)
+    )
     shell = {
         "type": "surface",
         "name": "limit surface",
@@ -151,12 +183,17 @@ def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
         "line": {"color": COLOURS["ellipsoid"], "width": 2},
         "hoverinfo": "skip",
     }
-    return {"data": [shell, wires, *(_marker(name, np.zeros(3)) for name in COLOURS)], "layout": _layout()}
+    return {
+        "data": [shell, wires, *(_marker(name, np.zeros(3)) for name in COLOURS)],
+        "layout": _layout(),
+    }
 
 
 def moved(figure: dict[str, Any], answer: Answer) -> dict[str, Any]:
     """Return the figure of a limit surface with the wrenches of an answer; what has not changed is the same object."""
-    markers = [_marker(name, point) for name, point in zip(COLOURS, answer.points, strict=True)]
+    markers = [
+        _marker(name, point) for name, point in zip(COLOURS, answer.points, strict=True)
+    ]
     return {**figure, "data": [*figure["data"][:2], *markers]}
 
 
@@ -167,10 +204,17 @@ def _wires(lines: np.ndarray) -> np.ndarray:
 
 
 def _coordinates(points: np.ndarray) -> dict[str, np.ndarray]:
-    return {name: np.ascontiguousarray(each) for name, each in zip("xyz", np.moveaxis(points, -1, 0), strict=True)}
+    return {
+        name: np.ascontiguousarray(each)
+        for name, each in zip("xyz", np.moveaxis(points, -1, 0), strict=True)
+    }
 
 
-_NAMES = {"friction": "friction of the law", "surface": "on the limit surface", "ellipsoid": "on the ellipsoid"}
+_NAMES = {
+    "friction": "friction of the law",
+    "surface": "on the limit surface",
+    "ellipsoid": "on the ellipsoid",
+}
 
 
 def _marker(name: str, point: np.ndarray) -> dict[str, Any]:
@@ -192,7 +236,10 @@ def _layout() -> dict[str, Any]:
         f"{name}axis": {"range": [-limit, limit], "title": {"text": text}}
         for name, text in zip("xyz", ("fx", "fy", "τ/r"), strict=True)
     }
-    camera = {"eye": {"x": 1.7, "y": -2.3, "z": 1.05}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
+    camera = {
+        "eye": {"x": 1.7, "y": -2.3, "z": 1.05},
+        "center": {"x": 0.0, "y": 0.0, "z": -0.12},
+    }
     return {
         "scene": {**axes, "aspectmode": "cube", "camera": camera},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
@@ -217,8 +264,13 @@ def numbers_table(state: State, found: Answer, seconds: float) -> str:
         + "</tr>"
         for name, text in _ROWS.items()
     )
-    (force, angle), centre = state.drawing.largest_errors, state.centre_of_rotation
-    where = "none, no spin" if centre is None else f"({1e3 * centre[0]:.2f}, {1e3 * centre[1]:.2f}) mm"
+    (force, angle) = state.drawing.largest_errors
+    centre = state.centre_of_rotation
+    where = (
+        "none, no spin"
+        if centre is None
+        else f"({1e3 * centre[0]:.2f}, {1e3 * centre[1]:.2f}) mm"
+    )
     return (
         f"{looks.TABLE}<div id='answer'><table><tr><th></th><th>fx [N]</th><th>fy [N]</th><th>τ [N mm]</th></tr>{rows}"
         f"</table><p>Centre of rotation: {where}. Dissipated power: {1e3 * found.power:.4g} mW.</p>"
@@ -234,7 +286,11 @@ def holding_line(state: State) -> str:
         needed = state.needed_load
     except InvalidValueError as error:
         return f"<p id='hold'>{html.escape(str(error))}.</p>"
-    holds = "holds" if state.normal_force > needed else "<span style='color:#C0392B'>slips</span>"
+    holds = (
+        "holds"
+        if state.normal_force > needed
+        else "<span style='color:#C0392B'>slips</span>"
+    )
     what = f"{1e3 * state.mass:g} g, {MM * state.lever:g} mm beside the origin"
     return (
         f"<p id='hold'>Will it hold? A part ({what}) between two such contacts <b>{holds}</b>: each has to press with "

@@ -29,12 +29,18 @@ _PICTURE = "width:100%;min-width:640px;max-width:960px"  # small screens scroll:
 class SceneTab:
     """Tab with the choice of a scene to run, its film and its time histories."""
 
-    def __init__(self, state: Callable[[], State], attempt: Callable[[Callable[[], Any]], None]):
+    def __init__(
+        self, state: Callable[[], State], attempt: Callable[[Callable[[], Any]], None]
+    ):
         self._state = state
         self._loaded: dict[str, Scene] = {}
         self._live = Live(failed=self._fail)
         self.scene = pn.widgets.Select(
-            label="Scene", options=list(SCENES), description=members(SCENES), css_classes=["scene"], width=190
+            label="Scene",
+            options=list(SCENES),
+            description=members(SCENES),
+            css_classes=["scene"],
+            width=190,
         )
         self.model = pn.widgets.Select(
             label="Model",
@@ -44,17 +50,32 @@ class SceneTab:
             css_classes=["model"],
             width=190,
         )
-        self.file = pn.widgets.FileInput(label="Scene file", accept="", css_classes=["scene-file"], width=300)
-        self.button = pn.widgets.Button(label="Run", color="primary", css_classes=["run"], align="end", width=90)
-        self.words = pn.pane.HTML("", css_classes=["run-status"], sizing_mode="stretch_width")
+        self.file = pn.widgets.FileInput(
+            label="Scene file", accept="", css_classes=["scene-file"], width=300
+        )
+        self.button = pn.widgets.Button(
+            label="Run", color="primary", css_classes=["run"], align="end", width=90
+        )
+        self.words = pn.pane.HTML(
+            "", css_classes=["run-status"], sizing_mode="stretch_width"
+        )
         self.result = pn.pane.HTML("", sizing_mode="stretch_width")
         self._running = False
-        self.scene.param.watch(lambda event: self.model.param.update(visible=event.new in SCENES), "value")
-        self.file.param.watch(lambda event: attempt(lambda: self._read(event.new)) if event.new else None, "value")
+        self.scene.param.watch(
+            lambda event: self.model.param.update(visible=event.new in SCENES), "value"
+        )
+        self.file.param.watch(
+            lambda event: attempt(lambda: self._read(event.new)) if event.new else None,
+            "value",
+        )
         self.button.on_click(lambda _: attempt(self._pressed))
-        choices = pn.FlexBox(self.scene, self.model, self.file, self.button, align_items="flex-end")
+        choices = pn.FlexBox(
+            self.scene, self.model, self.file, self.button, align_items="flex-end"
+        )
         note = pn.pane.HTML(_WORDS, sizing_mode="stretch_width")
-        self.layout = pn.Column(note, choices, self.words, self.result, sizing_mode="stretch_width")
+        self.layout = pn.Column(
+            note, choices, self.words, self.result, sizing_mode="stretch_width"
+        )
 
     def _read(self, content: bytes) -> None:
         name = self.file.filename or "scene.toml"
@@ -68,8 +89,12 @@ class SceneTab:
             self._rest("Stopped.")
             return
         name = str(self.scene.value)
-        scene = self._loaded.get(name) or ready_scene(self._state(), name, str(self.model.value))
-        self._running, self.button.label, self.result.object = True, "Stop", ""
+        scene = self._loaded.get(name) or ready_scene(
+            self._state(), name, str(self.model.value)
+        )
+        self._running = True
+        self.button.label = "Stop"
+        self.result.object = ""
         self._say("Simulating (the first time this compiles) ...")
         self._live.now(lambda task: self._work(scene, task))
 
@@ -103,5 +128,6 @@ class SceneTab:
         self.words.object = html.escape(text)
 
     def _rest(self, text: str) -> None:
-        self._running, self.button.label = False, "Run"
+        self._running = False
+        self.button.label = "Run"
         self._say(text)

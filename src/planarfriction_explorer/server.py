@@ -16,7 +16,9 @@ LOOPBACK = "127.0.0.1"
 TITLE = "planarfriction explorer"
 
 
-def serve(port: int = 0, *, browser: bool = True, ready: Callable[[str], None] | None = None) -> None:
+def serve(
+    port: int = 0, *, browser: bool = True, ready: Callable[[str], None] | None = None
+) -> None:
     """Serve the explorer at `port`, any free one for 0, until Ctrl-C.
 
     `browser` opens it there; `ready` is called with its address. Each visitor, and each tab of a browser, has a page

@@ -33,7 +33,9 @@ class State(Checked):
 
     drawing: Drawing = field(default_factory=lambda: Drawing.published(FIRST_PATCH))
     """Pressure map."""
-    law: FrictionLaw = field(default_factory=lambda: LuGre(mu_s=1.2, elasto_plastic=0.9))
+    law: FrictionLaw = field(
+        default_factory=lambda: LuGre(mu_s=1.2, elasto_plastic=0.9)
+    )
     """Friction law."""
     normal_force: float = checked(validation.positive_load, default=1.0)
     """Load [N], which presses the patch."""
@@ -66,7 +68,11 @@ class State(Checked):
     def needed_load(self) -> float:
         """Return the normal force [N] of each of two contacts below which the part slips, with `mu_s`."""
         weight = 0.5 * GRAVITY * self.mass
-        return holding_load((0.0, -weight, -weight * self.lever), self.drawing.patch, self.law.numbers.mu_s)
+        return holding_load(
+            (0.0, -weight, -weight * self.lever),
+            self.drawing.patch,
+            self.law.numbers.mu_s,
+        )
 
     @property
     def centre_of_rotation(self) -> tuple[float, float] | None:
@@ -74,20 +80,31 @@ class State(Checked):
         vx, vy, omega = self.twist
         if omega == 0.0:
             return None
-        x, y = 0.0 - vy / omega, vx / omega
-        return (x, y) if math.isfinite(1e3 * x) and math.isfinite(1e3 * y) else None  # in mm too
+        x = 0.0 - vy / omega
+        y = vx / omega
+        return (
+            (x, y) if math.isfinite(1e3 * x) and math.isfinite(1e3 * y) else None
+        )  # in mm too
 
 
 def law_parameters(law: Any) -> dict[str, float | None]:
     """Return parameters of a law by name, as numbers; None where the default of the law depends on others."""
-    given = {each.name: getattr(law, each.name) for each in dataclasses.fields(law) if each.init}
-    return {name: getattr(value, "breakaway_ratio", value) for name, value in given.items()}
+    given = {
+        each.name: getattr(law, each.name)
+        for each in dataclasses.fields(law)
+        if each.init
+    }
+    return {
+        name: getattr(value, "breakaway_ratio", value) for name, value in given.items()
+    }
 
 
 def _finger() -> Drawing:
     """Return a soft fingertip 14 mm wide, whose pressure falls to the rim as that of Hertz."""
     x = (np.arange(28) + 0.5) / 14.0 - 1.0
-    return Drawing(np.sqrt(np.clip(1.0 - x[:, None] ** 2 - x**2, 0.0, None)).round(3), 0.5e-3)
+    return Drawing(
+        np.sqrt(np.clip(1.0 - x[:, None] ** 2 - x**2, 0.0, None)).round(3), 0.5e-3
+    )
 
 
 def _foot() -> Drawing:
@@ -105,10 +122,19 @@ def _box() -> Drawing:
 PRESETS = {
     "two pads of a gripper": State(),
     "disc of a soft fingertip": State(
-        _finger(), LuGre(mu_c=0.8, mu_s=1.0, elasto_plastic=0.9), 3.0, (0.004, 0.0, 1.0), 0.1, 0.015
+        _finger(),
+        LuGre(mu_c=0.8, mu_s=1.0, elasto_plastic=0.9),
+        3.0,
+        (0.004, 0.0, 1.0),
+        0.1,
+        0.015,
     ),
-    "L-shaped foot": State(_foot(), LuGre(mu_c=0.6, mu_s=0.7), 20.0, (0.0, 0.02, 0.8), 0.5, 0.0),
-    "box pushed over a table": State(_box(), LuGre(mu_c=0.3, mu_s=0.4), 10.0, (0.05, 0.0, 0.5), 0.5, 0.0),
+    "L-shaped foot": State(
+        _foot(), LuGre(mu_c=0.6, mu_s=0.7), 20.0, (0.0, 0.02, 0.8), 0.5, 0.0
+    ),
+    "box pushed over a table": State(
+        _box(), LuGre(mu_c=0.3, mu_s=0.4), 10.0, (0.05, 0.0, 0.5), 0.5, 0.0
+    ),
 }
 """States by name; the first is that of a new page."""
 
@@ -121,7 +147,8 @@ _PLAIN = ("normal_force", "twist", "mass", "lever")
 
 def to_json(state: State) -> str:
     """Return the state as one line of JSON; a map that was painted or loaded is written out, without its name."""
-    drawing, law = state.drawing, {"kind": LAWS.name_of(state.law), **law_parameters(state.law)}
+    drawing = state.drawing
+    law = {"kind": LAWS.name_of(state.law), **law_parameters(state.law)}
     cells = {"cell_size": drawing.cell_size, "pressures": drawing.pressures.tolist()}
     data = {
         "patch": drawing.name if drawing.origin == "published" else cells,
@@ -137,11 +164,18 @@ def from_link(link: str) -> State:
     Raises `FrictionError` in one line for all else, also for a link that is too long.
     """
     if len(link) > MOST_TEXT:
-        raise InvalidValueError("the link", f"have at most {MOST_TEXT} characters", len(link))
+        raise InvalidValueError(
+            "the link", f"have at most {MOST_TEXT} characters", len(link)
+        )
     try:
         data = json.loads(unquote(link.removeprefix("#")))
-    except (ValueError, RecursionError) as error:  # ValueError: also a number of more digits than Python converts
-        raise InvalidValueError("the link", "hold a state as JSON", shown(str(error).partition(";")[0])) from None
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # ValueError: also a number of more digits than Python converts
+        raise InvalidValueError(
+            "the link", "hold a state as JSON", shown(str(error).partition(";")[0])
+        ) from None
     validation.keys("the link", data, (), ("patch", "law", *_PLAIN))
     given = {name: data[name] for name in _PLAIN if name in data}
     if "patch" in data:
@@ -155,7 +189,9 @@ def _drawing(patch: Any) -> Drawing:
     if isinstance(patch, str):
         return Drawing.published(patch)
     validation.keys("patch", patch, ("cell_size", "pressures"))
-    pressures = validation.non_negative_array("pressures", patch["pressures"], (None, None))
+    pressures = validation.non_negative_array(
+        "pressures", patch["pressures"], (None, None)
+    )
     if not 0 < min(pressures.shape) <= max(pressures.shape) <= MOST_SIDE:
         rule = f"have from 1 to {MOST_SIDE} rows and columns"
         raise InvalidValueError("pressures", rule, "{} x {}".format(*pressures.shape))
@@ -192,18 +228,34 @@ class Answer:
 
 def answer(state: State) -> Answer:
     """Return the friction of a state. Raises `InvalidValueError` where nothing presses, or a single point alone."""
-    surface, ellipsoid = state.drawing.surface, state.drawing.ellipsoid
-    twist, mu_c = np.array(state.twist), state.law.numbers.mu_c
+    surface = state.drawing.surface
+    ellipsoid = state.drawing.ellipsoid
+    twist = np.array(state.twist)
+    mu_c = state.law.numbers.mu_c
     scale = np.array([1.0, 1.0, surface.contact_radius])
-    units = np.stack([steady_wrench(state) / mu_c, surface.wrench(twist), ellipsoid.wrench(twist)])
+    units = np.stack(
+        [steady_wrench(state) / mu_c, surface.wrench(twist), ellipsoid.wrench(twist)]
+    )
     points = geometry.wrench_at(units, surface.centre_of_pressure) / scale
-    friction, of_surface, of_ellipsoid = mu_c * state.normal_force * units  # last: 0 under a load near 5e-324 N
+    friction, of_surface, of_ellipsoid = (
+        mu_c * state.normal_force * units
+    )  # last: 0 under a load near 5e-324 N
     angle = 0.0
     if units[1].any():
         both = np.stack([twist, ellipsoid.twist(units[1])])
-        angle = float(angles(*(geometry.twist_at(both, surface.centre_of_pressure) * scale)))
+        angle = float(
+            angles(*(geometry.twist_at(both, surface.centre_of_pressure) * scale))
+        )
     error = float(np.linalg.norm(points[2] - points[1]))
-    return Answer(friction, of_surface, of_ellipsoid, points, error, angle, float(-friction @ twist))
+    return Answer(
+        friction,
+        of_surface,
+        of_ellipsoid,
+        points,
+        error,
+        angle,
+        float(-friction @ twist),
+    )
 
 
 def steady_wrench(state: State) -> np.ndarray:
@@ -212,6 +264,8 @@ def steady_wrench(state: State) -> np.ndarray:
     x, y = patch.positions.T
     vx, vy, _ = geometry.twist_at(np.array(state.twist), patch.positions).T
     speed = np.hypot(vx, vy)
-    friction, speed = -patch.weights() * state.law.steady_friction(speed), np.where(speed > 0.0, speed, 1.0)
-    fx, fy = friction * (vx / speed), friction * (vy / speed)
+    friction = -patch.weights() * state.law.steady_friction(speed)
+    speed = np.where(speed > 0.0, speed, 1.0)
+    fx = friction * (vx / speed)
+    fy = friction * (vy / speed)
     return np.array([fx.sum(), fy.sum(), (x * fy - y * fx).sum()])

@@ -23,8 +23,12 @@ ROOM = 0.6
 class MapView:
     """The picture of the map, as `figure`; `dragged` is called with a place [m], `released` at the end of a drag."""
 
-    def __init__(self, dragged: Callable[[float, float], None], released: Callable[[], None]):
-        self._sources: dict[str, Any] = {name: ColumnDataSource() for name in ("map", "slip", "wrench", "centre")}
+    def __init__(
+        self, dragged: Callable[[float, float], None], released: Callable[[], None]
+    ):
+        self._sources: dict[str, Any] = {
+            name: ColumnDataSource() for name in ("map", "slip", "wrench", "centre")
+        }
         plot: Any = figure(
             name="map",
             sizing_mode="scale_width",
@@ -46,8 +50,19 @@ class MapView:
         looks.tidy(plot)
         plot.toolbar.logo = None
         plot.grid.visible = False
-        shades = LinearColorMapper(palette=Cividis256, low=0.0, high=1.0, nan_color="#FFFFFF00")
-        plot.image("image", "x", "y", "dw", "dh", source=self._sources["map"], color_mapper=shades, alpha=0.85)
+        shades = LinearColorMapper(
+            palette=Cividis256, low=0.0, high=1.0, nan_color="#FFFFFF00"
+        )
+        plot.image(
+            "image",
+            "x",
+            "y",
+            "dw",
+            "dh",
+            source=self._sources["map"],
+            color_mapper=shades,
+            alpha=0.85,
+        )
         arrows = (  # those of slip with a pale rim, so that they show on dark cells too
             ("slip", "#FFFFFF", 3, 10),
             ("slip", "#333333", 1, 6),
@@ -55,9 +70,24 @@ class MapView:
         )
         for name, colour, width, size in arrows:
             source = self._sources[name]
-            plot.segment("x0", "y0", "x1", "y1", source=source, color=colour, line_width=width)
-            plot.scatter("x1", "y1", angle="angle", marker="triangle", size=size, source=source, color=colour)
-        centre = {"source": self._sources["centre"], "size": 18, "line_width": 3, "color": "#D00000"}
+            plot.segment(
+                "x0", "y0", "x1", "y1", source=source, color=colour, line_width=width
+            )
+            plot.scatter(
+                "x1",
+                "y1",
+                angle="angle",
+                marker="triangle",
+                size=size,
+                source=source,
+                color=colour,
+            )
+        centre = {
+            "source": self._sources["centre"],
+            "size": 18,
+            "line_width": 3,
+            "color": "#D00000",
+        }
         plot.scatter("x", "y", marker="circle_cross", fill_alpha=0.0, **centre)
         for kind in (events.PanStart, events.Pan, events.Tap):
             plot.on_event(kind, lambda event: dragged(1e-3 * event.x, 1e-3 * event.y))
@@ -81,9 +111,8 @@ class MapView:
 
 def legend() -> str:
     """Return what the shades and marks of the map stand for."""
-    bar = (
-        f"display:inline-block;width:70px;height:10px;background:linear-gradient(90deg, {', '.join(Cividis256[::51])})"
-    )
+    colours = ", ".join(Cividis256[::51])
+    bar = f"display:inline-block;width:70px;height:10px;background:linear-gradient(90deg, {colours})"
     return (
         f"<div style='font-size:13px'>0 <span style='{bar}'></span> 1 of the highest pressure. Thin arrows: slip. "
         "Thick arrows: forces, as in the table. <span style='color:#D00000'>⊕</span>: centre of rotation.</div>"
@@ -97,7 +126,9 @@ class SectionView:
     """Chart of the section with its heading, as `layout`; neither is seen where nothing presses."""
 
     def __init__(self) -> None:
-        self._sources: dict[str, Any] = {name: ColumnDataSource({"force": [], "torque": []}) for name in COLOURS}
+        self._sources: dict[str, Any] = {
+            name: ColumnDataSource({"force": [], "torque": []}) for name in COLOURS
+        }
         plot: Any = figure(
             name="section",
             height=240,
@@ -108,9 +139,17 @@ class SectionView:
             y_axis_label="torque [N mm]",
         )
         looks.tidy(plot)
-        names = ("surface", "limit surface", "solid"), ("ellipsoid", "ellipsoid", "dashed")
+        names = (
+            ("surface", "limit surface", "solid"),
+            ("ellipsoid", "ellipsoid", "dashed"),
+        )
         for name, words, dash in names:
-            look = {"color": COLOURS[name], "line_dash": dash, "line_width": 2, "legend_label": words}
+            look = {
+                "color": COLOURS[name],
+                "line_dash": dash,
+                "line_width": 2,
+                "legend_label": words,
+            }
             plot.line("force", "torque", source=self._sources[name], **look)
         look = {"color": COLOURS["friction"], "size": 11, "legend_label": "friction"}
         plot.scatter("force", "torque", source=self._sources["friction"], **look)
@@ -126,7 +165,9 @@ class SectionView:
         self._plot = plot
         self.layout: Any = pn.Column(
             pn.pane.HTML(_WORDS, margin=(10, 0, 0, 0)),
-            pn.pane.Bokeh(plot, css_classes=["section"], sizing_mode="stretch_width", margin=0),
+            pn.pane.Bokeh(
+                plot, css_classes=["section"], sizing_mode="stretch_width", margin=0
+            ),
             sizing_mode="stretch_width",
         )
 
@@ -137,4 +178,7 @@ class SectionView:
             angle, lines = pictures.section_lines(state, answer, quick=quick)
             self._plot.xaxis.axis_label = f"force at {angle:.0f}° to x [N]"
             for name, points in lines.items():
-                self._sources[name].data = {"force": points[:, 0].tolist(), "torque": points[:, 1].tolist()}
+                self._sources[name].data = {
+                    "force": points[:, 0].tolist(),
+                    "torque": points[:, 1].tolist(),
+                }

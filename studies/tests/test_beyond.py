@@ -41,7 +41,9 @@ def test_a_drift_without_a_grain_is_straight_down(monkeypatch):
 @pytest.mark.slow
 def test_the_staircase_of_a_line_has_steps_of_two_cells(result):
     jumps = result.numbers["jumps"]
-    assert jumps["Line/sum"] == pytest.approx(2.0 / 21.0, rel=1e-9)  # a cell of 1/21 of the load turns its force round
+    assert jumps["Line/sum"] == pytest.approx(
+        2.0 / 21.0, rel=1e-9
+    )  # a cell of 1/21 of the load turns its force round
     assert jumps["Line/exact"] < 2.0 / beyond_surfaces.STAIRS
 
 
@@ -73,7 +75,9 @@ def test_the_exact_surface_is_the_limit_of_ever_finer_sums():
     exact = LimitSurfaceExact(patch)
     twists = beyond_surfaces.random_twists(exact, 300)
     misses = [
-        beyond_surfaces.difference(LimitSurfaceCells(patch.refined(parts)), exact, twists)[0].mean()
+        beyond_surfaces.difference(
+            LimitSurfaceCells(patch.refined(parts)), exact, twists
+        )[0].mean()
         for parts in (1, 3, 9)
     ]
     assert misses[1] < misses[0] / 2.0 and misses[2] < misses[1] / 2.0
@@ -83,7 +87,11 @@ def test_discs_are_nearer_than_the_published_model(result):
     assert set(result.numbers["driven"]) == set(beyond.QUICK_SHAPES)
     for ratios in result.numbers["driven ratios"].values():
         # 1 is a model that is no better: a thin line slides on the published table within 4 mN of 1 N most of the time
-        assert ratios["maximum"] < 0.6 and ratios["torque maximum"] < 0.6 and ratios["torque third quartile"] < 0.25
+        assert (
+            ratios["maximum"] < 0.6
+            and ratios["torque maximum"] < 0.6
+            and ratios["torque third quartile"] < 0.25
+        )
 
 
 def test_a_disc_for_every_cell_errs_less_than_points(result):
@@ -99,20 +107,30 @@ def test_discs_beat_the_published_model_on_patches_of_no_table(result):
 
 
 def test_errors_fall_at_every_doubling_of_discs(result):
-    found = [result.numbers["few discs"][name] for name in (*(f"{n} discs" for n in cells.RUNGS), "all")]
+    found = [
+        result.numbers["few discs"][name]
+        for name in (*(f"{n} discs" for n in cells.RUNGS), "all")
+    ]
     for words in ("force, median run", "rms", "load of slip, median"):
         assert (np.diff([each[words] for each in found]) < 0.0).all(), words
 
 
 def test_the_default_is_far_below_the_published_model(result):
-    few, published = (result.numbers["few discs"][name] for name in (f"{ladder.DEFAULT} discs", "published"))
-    assert few["force, median run"] < 2.0 and few["worst run"] < 0.3 * published["worst run"]
+    few, published = (
+        result.numbers["few discs"][name]
+        for name in (f"{ladder.DEFAULT} discs", "published")
+    )
+    assert (
+        few["force, median run"] < 2.0
+        and few["worst run"] < 0.3 * published["worst run"]
+    )
     assert few["steady, force"] < 1.0 and few["largest"] < 0.35
 
 
 def test_contacts_that_hold_creep_with_few_discs_as_with_fine_cells(result):
     for level, found in result.numbers["creep"]["disc"].items():
-        few, fine = found[f"{ladder.DEFAULT} discs"], found["refined(2)"]
+        few = found[f"{ladder.DEFAULT} discs"]
+        fine = found["refined(2)"]
         assert abs(few - fine) < (1e-9 if float(level) < 0.7 else 2e-8), level
 
 
@@ -133,7 +151,8 @@ def test_a_table_of_the_exact_surface_is_nearer_than_the_sum_over_cells(result):
 def test_plateaus(result):
     angles = result.numbers["plateaus"]
     patch = PUBLISHED_PATCHES["Circle"](width=0.05)
-    radius, moment = patch.contact_radius(), patch.second_moment()
+    radius = patch.contact_radius()
+    moment = patch.second_moment()
     # the published torsional stiffness is sigma_0 r^2
     expected = angles["closed form"] * moment / radius**2
     assert angles["published reduced"] == pytest.approx(expected, rel=0.03)
@@ -143,9 +162,13 @@ def test_plateaus(result):
 
 def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
     found = result.numbers["grooves"]
-    wrong = found | {"distributed": [angle + np.radians(0.1) for angle in found["distributed"]]}
+    wrong = found | {
+        "distributed": [angle + np.radians(0.1) for angle in found["distributed"]]
+    }
     rows = contacts.grooves_comparisons(wrong)
-    assert [row.quantity for row in rows if not row.holds] == ["drift on grooves, distributed, all slopes"]
+    assert [row.quantity for row in rows if not row.holds] == [
+        "drift on grooves, distributed, all slopes"
+    ]
 
 
 def test_soft_finger(result):
@@ -159,9 +182,13 @@ def test_soft_finger(result):
 def test_in_hand_ends_are_those_of_two_simulations(result):
     case = Case("LineGrad", 2)
     ends = result.numbers["in hand"][case.words]
-    assert ends["reduced"] == ends[ladder.ALL] < ends["published"]  # 21 cells are 21 discs
+    assert (
+        ends["reduced"] == ends[ladder.ALL] < ends["published"]
+    )  # 21 cells are 21 discs
     rows = ladder.in_hand_rows((case,))
-    assert {row.model: row.errors["end"] for row in rows}["reduced"] == pytest.approx(ends["reduced"], rel=1e-9)
+    assert {row.model: row.errors["end"] for row in rows}["reduced"] == pytest.approx(
+        ends["reduced"], rel=1e-9
+    )
     assert ends[ladder.SHIFT] == pytest.approx(ladder.friction_shift(case), rel=1e-9)
 
 
@@ -181,9 +208,16 @@ def test_few_discs_are_a_rung_between_three_bristles_and_the_grid(result):
 
 
 def test_score_counts_by_load():
-    ends = {"a, load 1": {"reduced": 2.0, "published": 1.0}, "a, load 2": {"reduced": 1.0, "published": 4.0}}
+    ends = {
+        "a, load 1": {"reduced": 2.0, "published": 1.0},
+        "a, load 2": {"reduced": 1.0, "published": 4.0},
+    }
     assert ladder.score(ends, 1, "reduced")["nearer"] == 0
-    assert ladder.score(ends, 2, "reduced") == {"runs": 1, "nearer": 1, "ratios": {"a, load 2": 0.25}}
+    assert ladder.score(ends, 2, "reduced") == {
+        "runs": 1,
+        "nearer": 1,
+        "ratios": {"a, load 2": 0.25},
+    }
 
 
 def test_references_are_finer_than_the_grids():
@@ -206,17 +240,24 @@ def test_tables_of_the_pages_are_those_of_the_report(result):
     if not docs.is_dir():
         pytest.skip("no docs beside these tests")
     make_tables = runpy.run_path(str(docs / "make_tables.py"))
-    with_tables, markdown, mark = (make_tables[name] for name in ("with_tables", "markdown", "MARK"))
+    with_tables, markdown, mark = (
+        make_tables[name] for name in ("with_tables", "markdown", "MARK")
+    )
     tables = {table.title: dataclasses.asdict(table) for table in result.tables}
     shown = 0
     for path in docs.glob("*.md"):
         page = with_tables(path.read_text(encoding="utf-8"), tables)
         # tables of costs are on a page of their own
-        assert path.name == "benchmarks.md" or {found["title"] for found in mark.finditer(page)} <= set(tables)
+        assert path.name == "benchmarks.md" or {
+            found["title"] for found in mark.finditer(page)
+        } <= set(tables)
         assert with_tables(page, tables) == page
         shown += page.count("<!-- table: ")
     assert shown >= 4
-    assert markdown({"headings": ("a", "b"), "rows": [("x", 0.123)]}) == "| a | b |\n| --- | --- |\n| x | 0.12 |\n"
+    assert (
+        markdown({"headings": ("a", "b"), "rows": [("x", 0.123)]})
+        == "| a | b |\n| --- | --- |\n| x | 0.12 |\n"
+    )
 
 
 def test_the_ladder_tells_cells_medians_and_errors():
@@ -224,12 +265,19 @@ def test_the_ladder_tells_cells_medians_and_errors():
     rows = []
     for shape, count, few in (("disc", 317, "64 discs"), ("two pads", 100, "8 discs")):
         for load, off in (("load 2", 1e-3), ("load 2", 3e-3), ("load 1", 1e-3)):
-            rows.append(ladder.Row(f"{shape}, {load}", "full", 2 * count, {"end": 0.0}, 1.0))
+            rows.append(
+                ladder.Row(f"{shape}, {load}", "full", 2 * count, {"end": 0.0}, 1.0)
+            )
             rows.append(ladder.Row(f"{shape}, {load}", few, 16, {"end": off}, 0.1))
     axes = draw_ladder(rows).axes
-    assert [each.get_xlabel().split("\n")[1] for each in axes[4:]] == ["patches of 317 cells", "patches of 100 cells"]
+    assert [each.get_xlabel().split("\n")[1] for each in axes[4:]] == [
+        "patches of 317 cells",
+        "patches of 100 cells",
+    ]
     for each in axes[2:4]:
-        reference, medians = sorted(each.get_lines(), key=lambda line: -line.get_xdata()[0])
+        reference, medians = sorted(
+            each.get_lines(), key=lambda line: -line.get_xdata()[0]
+        )
         assert reference.get_xdata()[0] == 1.0
         assert medians.get_xydata()[0] == pytest.approx([0.1, 2.0])
         assert each.collections[-1].get_segments()[0][:, 1] == pytest.approx([1.0, 3.0])
@@ -237,16 +285,33 @@ def test_the_ladder_tells_cells_medians_and_errors():
 
 def test_the_cases_of_a_shape_are_its_own():
     each = [ladder.cases_of(shape) for shape in beyond.SHAPES]
-    assert [{case.shape for case in cases} for cases in each] == [{shape} for shape in beyond.SHAPES]
+    assert [{case.shape for case in cases} for cases in each] == [
+        {shape} for shape in beyond.SHAPES
+    ]
     assert sum(map(len, each)) == len(ladder.CASES)
 
 
 def test_the_ladder_draws_every_family_that_was_run(result):
-    figure = next(picture.figure for picture in result.pictures if picture.name == "ladder")
-    assert len(figure.axes) == 6  # patches of many cells and of few; velocity-driven, and two loads in hand
+    figure = next(
+        picture.figure for picture in result.pictures if picture.name == "ladder"
+    )
+    assert (
+        len(figure.axes) == 6
+    )  # patches of many cells and of few; velocity-driven, and two loads in hand
     shown = {text.get_text() for axes in figure.axes for text in axes.texts}
-    assert shown == {"", *(words for family in FAMILIES for words in family.rungs.values())}
-    for column in (figure.axes[0::2], figure.axes[1::2]):  # which share their axis of times
-        first, last = (find(axes.dataLim.intervalx[i] for axes in column) for i, find in enumerate((min, max)))
+    assert shown == {
+        "",
+        *(words for family in FAMILIES for words in family.rungs.values()),
+    }
+    for column in (
+        figure.axes[0::2],
+        figure.axes[1::2],
+    ):  # which share their axis of times
+        first, last = (
+            find(axes.dataLim.intervalx[i] for axes in column)
+            for i, find in enumerate((min, max))
+        )
         left, right = column[0].get_xlim()
-        assert np.log(right / left) < 2.0 * np.log(last / first)  # an axis of times without an empty half
+        assert np.log(right / left) < 2.0 * np.log(
+            last / first
+        )  # an axis of times without an empty half

@@ -16,7 +16,9 @@ def test_tables_of_the_pages_are_those_of_the_stored_numbers():
     kept = json.loads(made.KEPT.read_text(encoding="utf-8"))
     pages = [path.read_text(encoding="utf-8") for path in made.DOCS.glob("*.md")]
     assert sum(len(made.MARK.findall(page)) for page in pages) == len(made.TABLES)
-    assert [made.with_tables(page, kept) == page for page in pages] == [True] * len(pages)
+    assert [made.with_tables(page, kept) == page for page in pages] == [True] * len(
+        pages
+    )
     assert {key for key, _ in made.measures()} == set(kept)
 
 
@@ -33,4 +35,6 @@ def test_a_patch_lets_go_where_it_is_said_to():
 def test_loads_are_on_the_limit_surface():
     patch = made.SHAPES["T"]()
     wrench = made.wrench_at_limit(patch, np.random.default_rng(0))
-    assert made.highest_level(patch, wrench[None]) == pytest.approx(1.0, abs=0.01)  # cells beside the continuous patch
+    assert made.highest_level(patch, wrench[None]) == pytest.approx(
+        1.0, abs=0.01
+    )  # cells beside the continuous patch

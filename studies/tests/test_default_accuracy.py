@@ -26,7 +26,9 @@ def test_two_pads_end_where_they_should(kind):
     32 to 80 um; the published one by 10 to 23 um.
     """
     model = accuracy.MODELS[kind](PUBLISHED_PATCHES["NonConvex1"]())
-    errors = accuracy.end_errors(next(accuracy.scenes("NonConvex1", model)), (0.5, 1.0, 1.2, 1.25, 1.5))
+    errors = accuracy.end_errors(
+        next(accuracy.scenes("NonConvex1", model)), (0.5, 1.0, 1.2, 1.25, 1.5)
+    )
     assert (errors < MOST).all(), errors
 
 
@@ -48,11 +50,17 @@ def test_relative_tolerance_alone_may_change(kind):
         model = accuracy.MODELS[kind](PUBLISHED_PATCHES[shape]())
         for scene in accuracy.scenes(shape, model):
             ends = []
-            for rtol, atol in ((1e-9, None), *((factor * scene.rtol, scene.atol) for factor in accuracy.FACTORS)):
+            for rtol, atol in (
+                (1e-9, None),
+                *((factor * scene.rtol, scene.atol) for factor in accuracy.FACTORS),
+            ):
                 data = pf.simulate(scene, rtol=rtol, atol=atol).histories
                 ends.append([data[name].values[-1] for name in ("x", "y", "theta")])
             errors = np.array(ends[1:]) - ends[0]
-            assert (np.hypot(errors[:, 0], errors[:, 1]) < MOST[0]).all(), (shape, errors)
+            assert (np.hypot(errors[:, 0], errors[:, 1]) < MOST[0]).all(), (
+                shape,
+                errors,
+            )
             assert (np.abs(errors[:, 2]) < MOST[1]).all(), (shape, errors)
 
 
@@ -65,8 +73,12 @@ def test_tables_of_the_page_are_made(capsys):
 
 
 def test_absolute_tolerance_follows_the_relative_one():
-    scene = pf.scenes.in_hand(pf.ReducedModel(PUBLISHED_PATCHES["NonConvex1"](), LAW), normal_force=8.0)
-    given = pf.simulate(scene, t_end=0.1, rtol=10.0 * scene.rtol, atol=10.0 * scene.atol)
+    scene = pf.scenes.in_hand(
+        pf.ReducedModel(PUBLISHED_PATCHES["NonConvex1"](), LAW), normal_force=8.0
+    )
+    given = pf.simulate(
+        scene, t_end=0.1, rtol=10.0 * scene.rtol, atol=10.0 * scene.atol
+    )
     followed = pf.simulate(scene, t_end=0.1, rtol=10.0 * scene.rtol)
     assert followed.statistics.steps == given.statistics.steps
     np.testing.assert_array_equal(followed.data.y, given.data.y)
@@ -78,10 +90,16 @@ def test_velocities_are_measured_against_the_slowest_creep():
     from planarfriction.scenes.packing import SegmentBatches
 
     patch = PUBLISHED_PATCHES["Circle"]()
-    models = {"fine": pf.ReducedModelPublished(patch, LAW), "plain": pf.DistributedModel(patch, LAW)}
+    models = {
+        "fine": pf.ReducedModelPublished(patch, LAW),
+        "plain": pf.DistributedModel(patch, LAW),
+    }
     natural = {}
     for name, kinds in {"plain": ["plain"], "both": ["plain", "fine"]}.items():
-        contacts = [pf.Contact(models[kind], pf.Signal.constant(1.0), name=kind) for kind in kinds]
+        contacts = [
+            pf.Contact(models[kind], pf.Signal.constant(1.0), name=kind)
+            for kind in kinds
+        ]
         scene = pf.Scene(pf.Body(0.2, 5e-4), contacts, 1.0)
         natural[name] = SegmentBatches(scene, 1.0).state_scale[-6:-3]
     np.testing.assert_allclose(natural["plain"][:2], 0.1 * LAW.v_s, rtol=1e-12)

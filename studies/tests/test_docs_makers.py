@@ -20,7 +20,9 @@ ELSEWHERE = {"make_breakaway", "make_referee", "make_tables"}
 
 def beside(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
-    monkeypatch.setattr(made, "truth", lambda load: made.in_mujoco(load, None))  # its finer cells take long
+    monkeypatch.setattr(
+        made, "truth", lambda load: made.in_mujoco(load, None)
+    )  # its finer cells take long
 
     def last(path: Path, file: Any, frame: Any, count: int, fps: float) -> None:
         assert count > 20 and fps == 20.0
@@ -34,7 +36,9 @@ def coverage(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(made, "DURATION", 0.5)
     log = made.observed(made.ROWS["delay"], made.truth(made.ROWS["delay"]), 0)
     assert log.time[-1] == pytest.approx(0.495)
-    assert "| 7 of 8 | 1 of 6 |" in made.table({"exact": made.Count(6, 1, told={"mu_c": 8}, inside_told={"mu_c": 7})})
+    assert "| 7 of 8 | 1 of 6 |" in made.table(
+        {"exact": made.Count(6, 1, told={"mu_c": 8}, inside_told={"mu_c": 7})}
+    )
 
 
 def explorer(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,7 +55,9 @@ def house(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def images(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     simulate = pf.simulate
-    monkeypatch.setattr(made, "grip_plan", made.bristle)  # tests of grips make that plan
+    monkeypatch.setattr(
+        made, "grip_plan", made.bristle
+    )  # tests of grips make that plan
     monkeypatch.setattr(pf, "simulate", lambda scene: simulate(scene, t_end=0.05))
     for name, figure in made.figures().items():
         figure.savefig(folder / f"{name}.png", dpi=20)
@@ -60,24 +66,45 @@ def images(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def measured(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     task = next(iter(TASKS))
     key = TASKS[task].measures[0].key
-    stored = {"models": {"mine": {"scores": {key: {"value": 1.234, "interval_95": [1.0, 1.5]}}}}}
-    stored |= {"minus": {"models": {"mine": {key: [0.2, 0.1, 0.3]}}}, "published": {"theirs": {key: 2.0}}}
-    page = made.with_tables(f"<!-- measured: {task} -->\n\n| old |\n\nNext.\n", {task: stored})
-    assert "| mine | 1.23* [1.00, 1.50] |" in page and "| theirs | 2.00 |" in page and page.endswith("|\n\nNext.\n")
+    stored = {
+        "models": {
+            "mine": {"scores": {key: {"value": 1.234, "interval_95": [1.0, 1.5]}}}
+        }
+    }
+    stored |= {
+        "minus": {"models": {"mine": {key: [0.2, 0.1, 0.3]}}},
+        "published": {"theirs": {key: 2.0}},
+    }
+    page = made.with_tables(
+        f"<!-- measured: {task} -->\n\n| old |\n\nNext.\n", {task: stored}
+    )
+    assert (
+        "| mine | 1.23* [1.00, 1.50] |" in page
+        and "| theirs | 2.00 |" in page
+        and page.endswith("|\n\nNext.\n")
+    )
     assert "old" not in page
 
 
 def moving(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     animate = pf.Solution.animate
     few = {"fps": 2.0, "dpi": 30.0}
-    monkeypatch.setattr(pf.Solution, "animate", lambda run, path, **given: animate(run, path, **given | few))
+    monkeypatch.setattr(
+        pf.Solution,
+        "animate",
+        lambda run, path, **given: animate(run, path, **given | few),
+    )
     made.main(folder)
 
 
 def pushing(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    single, in_time = replayed_pushes.single_pushes(), replayed_pushes.pushes_in_time()
+    single = replayed_pushes.single_pushes()
+    in_time = replayed_pushes.pushes_in_time()
     one = next(each for each in in_time if each.name.endswith("3out_2 108"))
-    few = [next(each for each in [*single, *in_time] if each.board == board) for board in made.BOARDS]
+    few = [
+        next(each for each in [*single, *in_time] if each.board == board)
+        for board in made.BOARDS
+    ]
     (folder / "images").mkdir()
     monkeypatch.setattr(made, "__file__", str(folder / "make_pushing.py"))
     monkeypatch.setattr(made, "PAGE", folder / "pushing.md")
@@ -90,15 +117,24 @@ def pushing(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def joint(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(made, "T_END", 1.0)
-    made.holds().savefig(folder / "joint-holds.png")  # the other picture is that of a fit, which test_joints makes
+    made.holds().savefig(
+        folder / "joint-holds.png"
+    )  # the other picture is that of a fit, which test_joints makes
 
 
-MAKERS = {f"make_{make.__name__}": make for make in (beside, coverage, house, images, joint, measured, moving, pushing)}
+MAKERS = {
+    f"make_{make.__name__}": make
+    for make in (beside, coverage, house, images, joint, measured, moving, pushing)
+}
 SLOW = {"make_explorer": explorer}
 
 
 @pytest.mark.parametrize(
-    "name", [*MAKERS, pytest.param("make_explorer", marks=[pytest.mark.explore, pytest.mark.slow])]
+    "name",
+    [
+        *MAKERS,
+        pytest.param("make_explorer", marks=[pytest.mark.explore, pytest.mark.slow]),
+    ],
 )
 def test_a_maker_of_pages_makes_them(name, tmp_path, monkeypatch):
     if name == "make_explorer":
@@ -110,9 +146,17 @@ def test_a_maker_of_pages_makes_them(name, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(DOCS)
     made: ModuleType = script(f"docs/{name}.py")
     {**MAKERS, **SLOW}[name](made, tmp_path, monkeypatch)
-    for picture in [*tmp_path.glob("*.png"), *tmp_path.glob("images/*.png"), *tmp_path.glob("*.gif")]:
+    for picture in [
+        *tmp_path.glob("*.png"),
+        *tmp_path.glob("images/*.png"),
+        *tmp_path.glob("*.gif"),
+    ]:
         assert picture.stat().st_size >= 100
 
 
 def test_no_maker_of_pages_is_left_out():
-    assert {each.stem for each in DOCS.glob("make_*.py")} <= {*MAKERS, *SLOW, *ELSEWHERE}
+    assert {each.stem for each in DOCS.glob("make_*.py")} <= {
+        *MAKERS,
+        *SLOW,
+        *ELSEWHERE,
+    }

@@ -35,7 +35,9 @@ def made(seed: int) -> dict[str, np.ndarray]:
 
 
 def has(line, x, y) -> None:
-    np.testing.assert_allclose(line.get_xydata(), np.stack([x, y], -1), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        line.get_xydata(), np.stack([x, y], -1), rtol=1e-12, atol=1e-12
+    )
 
 
 def is_published(line, name: str, factor: float, part=slice(None)) -> None:
@@ -46,10 +48,18 @@ def is_published(line, name: str, factor: float, part=slice(None)) -> None:
 def box_of(axes, number: int) -> list[float]:
     """Place, low whisker, first quartile, median, third quartile and high whisker of a box; crosses are left out."""
     lines = [line for line in axes.lines if line.get_marker() != "x"]
-    whiskers, median = lines[5 * number : 5 * number + 2], lines[5 * number + 4]
+    whiskers = lines[5 * number : 5 * number + 2]
+    median = lines[5 * number + 4]
     box = axes.patches[number].get_path().vertices[:, 1]
     low, high = (line.get_ydata() for line in whiskers)
-    return [median.get_xdata().mean(), low.min(), box.min(), median.get_ydata()[0], box.max(), high.max()]
+    return [
+        median.get_xdata().mean(),
+        low.min(),
+        box.min(),
+        median.get_ydata()[0],
+        box.max(),
+        high.max(),
+    ]
 
 
 # ---------------------------------------------------------------------- parts of all
@@ -62,31 +72,53 @@ def test_boxes_and_vertices_are_where_their_numbers_say():
     assert axes.lines[-1].get_xydata().tolist() == [[1.5, 9.0]]
     curve = facts.published_curve("staircase/plain/tau")
     looks.vertices(axes, "staircase/plain/tau", 1e3, "0.5", (0.5, 0.9))
-    is_published(axes.lines[-1], "staircase/plain/tau", 1e3, (curve.time >= 0.5) & (curve.time <= 0.9))
+    is_published(
+        axes.lines[-1],
+        "staircase/plain/tau",
+        1e3,
+        (curve.time >= 0.5) & (curve.time <= 0.9),
+    )
 
 
 # ---------------------------------------------------------------------- in hand
 
 
 def test_histories_of_two_runs_and_published_vertices():
-    panels = {"load 1": {"distributed": made(0), "reduced": made(1)}, "load 2": {"reduced": made(2)}}
+    panels = {
+        "load 1": {"distributed": made(0), "reduced": made(1)},
+        "load 2": {"reduced": made(2)},
+    }
     published = {"load 2": {"reduced": "in_hand/Circle/r2"}}
-    figure = figures.histories(panels, ("normal_force", "x", "theta", "tau"), published=published)
+    figure = figures.histories(
+        panels, ("normal_force", "x", "theta", "tau"), published=published
+    )
     grid = np.reshape(figure.axes, (4, 2))
     has(grid[0, 0].lines[0], TIME, made(0)["normal_force"])
     is_published(grid[0, 1].lines[1], "in_hand/load/2", 1.0)
     for row, name in enumerate(("x", "theta", "tau"), start=1):
         first = 1 if name == "tau" else 0
-        for line, run in zip((*grid[row, 0].lines, grid[row, 1].lines[0]), map(made, range(3)), strict=True):
+        for line, run in zip(
+            (*grid[row, 0].lines, grid[row, 1].lines[0]),
+            map(made, range(3)),
+            strict=True,
+        ):
             has(line, TIME[first:], UNITS[name] * run[name][first:])
         is_published(grid[row, 1].lines[1], f"in_hand/Circle/r2/{name}", UNITS[name])
-    assert [axes.get_ylabel() for axes in grid[1:, 0]] == ["$x$ [mm]", "$\\theta$ [deg]", "$\\tau$ [N mm]"]
+    assert [axes.get_ylabel() for axes in grid[1:, 0]] == [
+        "$x$ [mm]",
+        "$\\theta$ [deg]",
+        "$\\tau$ [N mm]",
+    ]
 
 
 def test_distances_and_shifts_are_in_millimetres():
     lines = {"one": (TIME, 1e-3 * TIME), "two": (TIME, 2e-3 * TIME)}
-    figure = figures.distances({"left": lines, "right": {"one": lines["two"]}}, "apart [mm]")
-    for line, factor in zip((*figure.axes[0].lines, *figure.axes[1].lines), (1.0, 2.0, 2.0), strict=True):
+    figure = figures.distances(
+        {"left": lines, "right": {"one": lines["two"]}}, "apart [mm]"
+    )
+    for line, factor in zip(
+        (*figure.axes[0].lines, *figure.axes[1].lines), (1.0, 2.0, 2.0), strict=True
+    ):
         has(line, TIME, factor * TIME)
     rows = {"a": {"friction": 1e-3, "grid": 2e-3}, "b": {"grid": 5e-3}}
     axes = figures.end_shifts(rows, {"grid": "0.5"}, "shift [mm]").axes[0]
@@ -100,7 +132,10 @@ def test_distances_and_shifts_are_in_millimetres():
 
 @pytest.mark.parametrize("load", ["tangential", "normal"])
 def test_drifts_are_in_nanometres_and_microradians(load):
-    found = {(load, kind + law): made(i) for i, (kind, law) in enumerate((k, w) for k in "dr" for w in drift.LAWS)}
+    found = {
+        (load, kind + law): made(i)
+        for i, (kind, law) in enumerate((k, w) for k in "dr" for w in drift.LAWS)
+    }
     figure = drift._motion(load, found)
     grid = np.reshape(figure.axes[:6], (3, 2))
     for column, kind in enumerate("dr"):
@@ -111,7 +146,8 @@ def test_drifts_are_in_nanometres_and_microradians(load):
                 if load == "tangential":
                     is_published(lines.pop(0), f"drift/{kind}{law}/{name}", factor)
             assert not lines
-    above, beside = grid[0, 1], figure.axes[-1]
+    above = grid[0, 1]
+    beside = figure.axes[-1]
     time = np.arange(0.0, 5.0, 1e-3)
     has(above.lines[0], time, drift.drift_force(load)(time)[:, 0])
     if load == "tangential":
@@ -123,31 +159,50 @@ def test_drifts_are_in_nanometres_and_microradians(load):
 
 
 def test_plateaus_are_drawn_for_a_second_beside_their_closed_forms():
-    found = {("normal", model): made(i) for i, model in enumerate(("d_ep", "r_ep", "e_ep"))}
+    found = {
+        ("normal", model): made(i) for i, model in enumerate(("d_ep", "r_ep", "e_ep"))
+    }
     closed = {"d_ep": {"x": 2e-9, "theta": 3e-6}}
     figure = drift._plateaus(found, made(7), closed)
     part = TIME <= 1.0
-    for axes, (name, factor, level) in zip(figure.axes, (("x", 1e9, 2.0), ("theta", 1e6, 3.0)), strict=True):
+    for axes, (name, factor, level) in zip(
+        figure.axes, (("x", 1e9, 2.0), ("theta", 1e6, 3.0)), strict=True
+    ):
         runs = [*found.values(), made(7)]
-        drawn, (line,) = [each for each in axes.lines if len(each.get_xdata()) > 2], axes.lines[1:2]
+        drawn = [each for each in axes.lines if len(each.get_xdata()) > 2]
+        (line,) = axes.lines[1:2]
         for each, run in zip(drawn, runs, strict=True):
             has(each, TIME[part], factor * run[name][part])
         assert line.get_ydata() == pytest.approx([level] * 2)
 
 
 def test_the_staircase_is_drawn_within_its_limits():
-    time, random = np.linspace(0.0, 5.0, 1001), np.random.default_rng(0)
-    found = {name: random.normal(size=(1001, 3)) for name in ("plain", "bilinear", "rod")}
+    time = np.linspace(0.0, 5.0, 1001)
+    random = np.random.default_rng(0)
+    found = {
+        name: random.normal(size=(1001, 3)) for name in ("plain", "bilinear", "rod")
+    }
     figure = staircase._zoom(time, found, {"high": {"time": 1.2}, "low": {"time": 3.7}})
-    expected = ((0, (0.79, 0.97)), (2, (0.79, 0.97)), (0, (1.155, 1.23)), (1, (3.64, 3.74)))
+    expected = (
+        (0, (0.79, 0.97)),
+        (2, (0.79, 0.97)),
+        (0, (1.155, 1.23)),
+        (1, (3.64, 3.74)),
+    )
     for axes, (column, (low, high)) in zip(figure.axes, expected, strict=True):
         part = (time >= low) & (time <= high)
         for line, values in zip(axes.lines, found.values(), strict=False):
             has(line, time[part], (1.0, 1.0, 1e3)[column] * values[part, column])
         assert axes.get_xlim() == pytest.approx((low, high))
-        curve = facts.published_curve(f"staircase/bilinear/{('fx', 'fy', 'tau')[column]}")
+        curve = facts.published_curve(
+            f"staircase/bilinear/{('fx', 'fy', 'tau')[column]}"
+        )
         shown = (curve.time >= low) & (curve.time <= high)
-        has(axes.lines[4], curve.time[shown], (1.0, 1.0, 1e3)[column] * curve.values[shown])
+        has(
+            axes.lines[4],
+            curve.time[shown],
+            (1.0, 1.0, 1e3)[column] * curve.values[shown],
+        )
     whole = staircase._overview(time, found)
     has(whole.axes[2].lines[2], time, 1e3 * found["rod"][:, 2])
 
@@ -157,13 +212,18 @@ def test_the_staircase_is_drawn_within_its_limits():
 
 def wrenches(seed: int) -> dict[str, np.ndarray]:
     random = np.random.default_rng(seed)
-    return {"time": TIME, **{kind: random.normal(size=(len(TIME), 3)) for kind in "dre"}}
+    return {
+        "time": TIME,
+        **{kind: random.normal(size=(len(TIME), 3)) for kind in "dre"},
+    }
 
 
 def test_driven_curves_are_drawn_beside_the_published_ones():
     found = wrenches(0)
     figure = driven._page({"Circle": found}, "dr", 3.4, {"d": "", "r": ""})
-    for column, (axes, name) in enumerate(zip(figure.axes, ("fx", "fy", "tau"), strict=True)):
+    for column, (axes, name) in enumerate(
+        zip(figure.axes, ("fx", "fy", "tau"), strict=True)
+    ):
         for line, kind in zip(axes.lines, "dr", strict=False):
             has(line, TIME, UNITS[name] * found[kind][:, column])
         for line, kind in zip(axes.lines[2:], "dr", strict=True):
@@ -171,22 +231,36 @@ def test_driven_curves_are_drawn_beside_the_published_ones():
     above, below = np.reshape(driven._profile(found).axes, (2, 3))
     time = np.arange(0.0, 5.0, 1e-3)
     for column, factor in enumerate((1e3, 1e3, 1.0)):
-        has(above[column].lines[0], time, factor * driven.published_velocity()(time)[:, column])
-        has(below[column].lines[0], TIME, (1.0, 1.0, 1e3)[column] * found["d"][:, column])
+        has(
+            above[column].lines[0],
+            time,
+            factor * driven.published_velocity()(time)[:, column],
+        )
+        has(
+            below[column].lines[0],
+            TIME,
+            (1.0, 1.0, 1e3)[column] * found["d"][:, column],
+        )
 
 
 def test_boxes_of_errors_stand_beside_the_published_ones():
     errors = {"Circle": boxes.errors(wrenches(0)), "Line": boxes.errors(wrenches(1))}
     figure = driven._box_plots(errors)
-    for axes, (quantity, factor) in zip(figure.axes, (("ft", 1.0), ("tau", 1e3)), strict=True):
+    for axes, (quantity, factor) in zip(
+        figure.axes, (("ft", 1.0), ("tau", 1e3)), strict=True
+    ):
         number = 0
         for place, (shape, each) in enumerate(errors.items()):
             for offset, model in ((-0.28, "corrected"), (0.12, "ellipsoid")):
                 ours = np.array([*boxes.statistics(each[quantity][model]).values()])
-                assert box_of(axes, number) == pytest.approx([place + offset, *(factor * ours[:5])])
+                assert box_of(axes, number) == pytest.approx(
+                    [place + offset, *(factor * ours[:5])]
+                )
                 theirs = facts.published_table("box")[f"{quantity}/{shape}/{model}"]
                 beside = [factor * theirs[name] for name in boxes.COLUMNS[:5]]
-                assert box_of(axes, number + 1) == pytest.approx([place + offset + 0.16, *beside])
+                assert box_of(axes, number + 1) == pytest.approx(
+                    [place + offset + 0.16, *beside]
+                )
                 number += 2
 
 
@@ -194,15 +268,20 @@ def test_boxes_of_errors_stand_beside_the_published_ones():
 
 
 def test_cuts_and_moments_of_a_soft_finger():
-    patch, loads = load_dependent.soft_patch(1), np.array([1.0, 3.0])
+    patch = load_dependent.soft_patch(1)
+    loads = np.array([1.0, 3.0])
     figure = load_dependent._profiles({1: "one"}, loads)
     cut, radius, moment = figure.axes
     grid = patch.grid
     middle = np.abs(patch.positions[:, 1]) < 1e-9
-    for stairs, line, load in zip(cut.patches, cut.lines, (1.0, load_dependent.MEAN_LOAD, 3.0), strict=True):
+    for stairs, line, load in zip(
+        cut.patches, cut.lines, (1.0, load_dependent.MEAN_LOAD, 3.0), strict=True
+    ):
         values, edges, _ = stairs.get_data()
         assert values == pytest.approx(1e-3 * patch.pressure_values(load)[middle])
-        assert edges[:-1] == pytest.approx(1e3 * (patch.positions[middle, 0] - 0.5 * grid.cell_width))
+        assert edges[:-1] == pytest.approx(
+            1e3 * (patch.positions[middle, 0] - 0.5 * grid.cell_width)
+        )
         assert edges[-1] - edges[-2] == pytest.approx(1e3 * grid.cell_width)
         x, pressure = line.get_xydata().T
         assert pressure.max() == pytest.approx(values.max(), rel=1e-9)
@@ -225,36 +304,67 @@ def test_points_of_a_section_are_those_of_its_twists(column):
         twist = np.array([0.0, 0.0, np.cos(angle) / surface.contact_radius])
         twist[column] = np.sin(angle)
         centre = surface.centre_of_pressure
-        wrench = pf.geometry.wrench_at(surface.wrench(pf.geometry.twist_at(twist, -centre)), centre)
-        assert point == pytest.approx([wrench[column], wrench[2] / surface.contact_radius], abs=1e-6), angle
+        wrench = pf.geometry.wrench_at(
+            surface.wrench(pf.geometry.twist_at(twist, -centre)), centre
+        )
+        assert point == pytest.approx(
+            [wrench[column], wrench[2] / surface.contact_radius], abs=1e-6
+        ), angle
 
 
 # ---------------------------------------------------------------------- beyond the paper
 
 
 def test_errors_of_surfaces_are_boxes_in_newtons_and_newton_millimetres():
-    random, kinds = np.random.default_rng(0), list(tables.KINDS)[:2]
-    errors = {"Circle": {f"{kind}/{what}": random.random(50) for kind in kinds for what in ("force", "torque")}}
-    for axes, (what, factor) in zip(tables.surface_errors(errors).axes, (("force", 1.0), ("torque", 1e3)), strict=True):
+    random = np.random.default_rng(0)
+    kinds = list(tables.KINDS)[:2]
+    errors = {
+        "Circle": {
+            f"{kind}/{what}": random.random(50)
+            for kind in kinds
+            for what in ("force", "torque")
+        }
+    }
+    for axes, (what, factor) in zip(
+        tables.surface_errors(errors).axes,
+        (("force", 1.0), ("torque", 1e3)),
+        strict=True,
+    ):
         for i, kind in enumerate(kinds):
-            parts = factor * np.percentile(errors["Circle"][f"{kind}/{what}"], [5, 25, 50, 75, 95])
+            parts = factor * np.percentile(
+                errors["Circle"][f"{kind}/{what}"], [5, 25, 50, 75, 95]
+            )
             assert box_of(axes, i) == pytest.approx([0.15 * (i - 0.5), *parts])
 
 
 def test_the_spin_of_line_and_disc_and_the_drift_on_grooves():
-    place, random = np.linspace(0.0, 0.01, 11), np.random.default_rng(0)
-    shapes, kinds = ("Line", "Circle"), ("sum", "exact")
-    names = [f"{shape}/{kind}{end}" for shape in shapes for kind in kinds for end in ("", ", force")]
+    place = np.linspace(0.0, 0.01, 11)
+    random = np.random.default_rng(0)
+    shapes = ("Line", "Circle")
+    kinds = ("sum", "exact")
+    names = [
+        f"{shape}/{kind}{end}"
+        for shape in shapes
+        for kind in kinds
+        for end in ("", ", force")
+    ]
     stairs = {"place": place, **{name: random.random(11) for name in names}}
     line, disc = np.reshape(tables.staircase(stairs).axes, (2, 2))
     for column, (end, factor) in enumerate((("", 1e3), (", force", 1.0))):
         has(line[column].lines[0], 1e3 * place, factor * stairs[f"Line/sum{end}"])
         has(line[column].lines[1], 1e3 * place, factor * stairs[f"Line/exact{end}"])
-        apart = 1e3 * factor * (stairs[f"Circle/sum{end}"] - stairs[f"Circle/exact{end}"])
+        apart = (
+            1e3 * factor * (stairs[f"Circle/sum{end}"] - stairs[f"Circle/exact{end}"])
+        )
         has(disc[column].lines[0], 1e3 * place, apart)
-    numbers = {"slope": np.radians([31.0, 35.0, 40.0]), **{kind: [0.1, 0.2, 0.3] for kind in contacts.GROOVED_MODELS}}
+    numbers = {
+        "slope": np.radians([31.0, 35.0, 40.0]),
+        **{kind: [0.1, 0.2, 0.3] for kind in contacts.GROOVED_MODELS},
+    }
     closed, *models = tables.grooves(numbers).axes[0].lines
-    assert closed.get_xydata()[-1] == pytest.approx([40.0, np.degrees(contacts.closed_drift(np.radians(40.0)))])
+    assert closed.get_xydata()[-1] == pytest.approx(
+        [40.0, np.degrees(contacts.closed_drift(np.radians(40.0)))]
+    )
     for each in models:
         has(each, [31.0, 35.0, 40.0], np.degrees([0.1, 0.2, 0.3]))
 
@@ -272,16 +382,28 @@ def test_the_profile_of_velocities_is_drawn_in_centimetres_and_radians():
 
 
 def test_errors_over_counts_are_drawn_beside_the_published_ones():
-    counts, random = [5, 7, 11], np.random.default_rng(0)
-    family, case = convergence_runs.FAMILIES[0], ("LineGrad", "p1")
+    counts = [5, 7, 11]
+    random = np.random.default_rng(0)
+    family = convergence_runs.FAMILIES[0]
+    case = ("LineGrad", "p1")
     errors = {case: {name: random.random((3, 2)) for name in convergence_runs.FAMILIES}}
     figure = convergence._errors_over_counts(family, counts, errors)
-    for i, (axes, quantity) in enumerate(zip(figure.axes[:2], convergence.QUANTITIES, strict=True)):
+    for i, (axes, quantity) in enumerate(
+        zip(figure.axes[:2], convergence.QUANTITIES, strict=True)
+    ):
         has(axes.lines[0], counts, errors[case][family][:, i])
         is_published(axes.lines[1], f"convergence/{family}/LineGrad/p1/{quantity}", 1.0)
     radii = {"mask": np.array([-0.1, 0.2, -0.3]), "cut": np.array([0.01, -0.02, 0.03])}
-    lines = convergence._radius_errors(counts, radii, np.array([0.5, 0.6, 0.7])).axes[0].lines
-    for line, values in zip(lines, (np.abs(radii["mask"]), [0.5, 0.6, 0.7], np.abs(radii["cut"])), strict=True):
+    lines = (
+        convergence._radius_errors(counts, radii, np.array([0.5, 0.6, 0.7]))
+        .axes[0]
+        .lines
+    )
+    for line, values in zip(
+        lines,
+        (np.abs(radii["mask"]), [0.5, 0.6, 0.7], np.abs(radii["cut"])),
+        strict=True,
+    ):
         has(line, counts, values)
 
 
@@ -292,13 +414,20 @@ def test_the_classics_are_drawn_in_the_units_of_their_axes():
     names = ["stick-slip", "presliding"]
     names += [f"break-away, {rate:g} N/s" for rate in classics.RATES]
     names += [f"lag, {frequency:g} rad/s" for frequency in classics.FREQUENCIES]
-    found = {name: made(i) | {"vx": np.random.default_rng(90 + i).random(501)} for i, name in enumerate(names)}
+    found = {
+        name: made(i) | {"vx": np.random.default_rng(90 + i).random(501)}
+        for i, name in enumerate(names)
+    }
     hunted = {"time": TIME, "x": np.sin(TIME), "force": np.cos(TIME)}
     slip, loop, away, lag, hunting, force = classics._figure(found, hunted).axes
     has(slip.lines[0], TIME, found["stick-slip"]["x"])
     has(slip.lines[1], TIME, classics.PULL * TIME)
     has(loop.lines[0], 1e6 * found["presliding"]["x"], -found["presliding"]["fx"])
-    has(away.lines[0], classics.RATES, [-found[f"break-away, {rate:g} N/s"]["fx"].min() for rate in classics.RATES])
+    has(
+        away.lines[0],
+        classics.RATES,
+        [-found[f"break-away, {rate:g} N/s"]["fx"].min() for rate in classics.RATES],
+    )
     last = TIME >= 2.5
     for line, frequency in zip(lag.lines, classics.FREQUENCIES, strict=True):
         run = found[f"lag, {frequency:g} rad/s"]
@@ -311,15 +440,22 @@ def test_the_classics_are_drawn_in_the_units_of_their_axes():
 def test_times_over_errors_have_bars_from_quartile_to_quartile():
     entry = {"tolerance": 1e-6, "error": 2e-7, "evaluations": 321.0, "repeats": 5}
     entry |= dict(zip(timing.TIMES, (0.02, 0.018, 0.025), strict=True))
-    problem = type("Problem", (), {"name": "case", "window": SimpleNamespace(states=12)})()
+    problem = type(
+        "Problem", (), {"name": "case", "window": SimpleNamespace(states=12)}
+    )()
     (axes,) = timing._figure({problem: {"RODAS4": [entry]}}).axes
     has(axes.lines[0], [2e-7], [0.02])
     (bar,) = axes.collections[0].get_segments()
     assert bar[:, 1] == pytest.approx([0.018, 0.025])
     table = timing._points_table(problem, {"RODAS4": [entry]})
-    assert list(table.rows[0]) == ["RODAS4, 1e-06", "2.0e-07", "20 (18 to 25)", 321, 5] and "12 states" in table.note
+    assert (
+        list(table.rows[0]) == ["RODAS4, 1e-06", "2.0e-07", "20 (18 to 25)", 321, 5]
+        and "12 states" in table.note
+    )
     data = timing._dataset({"RODAS4": [entry]})
-    assert float(data["time"][0]) == 0.02 and data["solver"].values.tolist() == ["RODAS4"]
+    assert float(data["time"][0]) == 0.02 and data["solver"].values.tolist() == [
+        "RODAS4"
+    ]
 
 
 def test_errors_of_few_discs_are_drawn_over_their_number():
@@ -328,5 +464,9 @@ def test_errors_of_few_discs_are_drawn_over_their_number():
     errors = {name: {words: random.random() for words in cells.LINES} for name in names}
     lines = cells.figure(errors).axes[0].lines
     for i, words in enumerate(cells.LINES):
-        has(lines[2 * i], [8, 16], [errors["8 discs"][words], errors["16 discs"][words]])
-        assert lines[2 * i + 1].get_ydata() == pytest.approx([errors["published"][words]] * 2)
+        has(
+            lines[2 * i], [8, 16], [errors["8 discs"][words], errors["16 discs"][words]]
+        )
+        assert lines[2 * i + 1].get_ydata() == pytest.approx(
+            [errors["published"][words]] * 2
+        )

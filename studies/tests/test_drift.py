@@ -25,12 +25,28 @@ def test_everything_holds(result):
 
 
 def test_published_and_converged_curves_are_compared_at_all_samples(result):
-    published = [name for name in facts._published()["curves"] if name.startswith("drift/")]
-    rows = [row for row in result.comparisons if row.reference == "published" and row.ours is None]
+    published = [
+        name for name in facts._published()["curves"] if name.startswith("drift/")
+    ]
+    rows = [
+        row
+        for row in result.comparisons
+        if row.reference == "published" and row.ours is None
+    ]
     assert len(rows) == len(published) == 15
-    assert sum(row.samples for row in rows) == sum(len(facts.published_curve(name).time) for name in published)
-    solutions = {name.rpartition("/")[0] for name in facts._converged() if name.startswith("drift/")}
-    rows = [row for row in result.comparisons if row.reference == "converged" and row.ours is None]
+    assert sum(row.samples for row in rows) == sum(
+        len(facts.published_curve(name).time) for name in published
+    )
+    solutions = {
+        name.rpartition("/")[0]
+        for name in facts._converged()
+        if name.startswith("drift/")
+    }
+    rows = [
+        row
+        for row in result.comparisons
+        if row.reference == "converged" and row.ours is None
+    ]
     assert len(rows) == 3 * len(solutions) == 12
     assert {row.samples for row in rows} == {500}
 
@@ -43,13 +59,17 @@ def test_exact_plateaus(result):
 
 
 def test_the_reduced_model_is_too_soft_by_what_its_equations_say(result):
-    plateaus, patch = result.numbers["plateaus"], result.numbers["patch"]
-    measured, closed = plateaus["measured"], plateaus["closed form"]
+    plateaus = result.numbers["plateaus"]
+    patch = result.numbers["patch"]
+    measured = plateaus["measured"]
+    closed = plateaus["closed form"]
     true = measured["d_ep"]
     assert measured["r_ep"]["x"] / true["x"] == pytest.approx(1.24, abs=0.01)
     assert measured["r_ep"]["theta"] / true["theta"] == pytest.approx(1.13, abs=0.01)
     radius = patch["contact radius of the ellipsoid"]
-    assert measured["e_ep"]["theta"] / true["theta"] == pytest.approx(patch["second moment"] / radius**2, rel=1e-5)
+    assert measured["e_ep"]["theta"] / true["theta"] == pytest.approx(
+        patch["second moment"] / radius**2, rel=1e-5
+    )
     # neither the spring nor the ellipsoid explains the table: the straight path does, the stepped one is 2 % off it
     assert measured["straight"] == pytest.approx(closed["straight"], rel=5e-4)
     assert abs(measured["r_ep"]["x"] / closed["straight"]["x"] - 1.0) > 0.01
@@ -73,10 +93,13 @@ def test_the_patch_is_as_wide_as_the_article_says_its_radius_is(result):
 
 def test_a_sample_late_or_a_wrong_stiffness_would_be_noticed(result):
     data = result.data["tangential"].sel(model="distributed", bristles="elasto-plastic")
-    time, theta = data["time"].to_numpy(), data["theta"].to_numpy()
+    time = data["time"].to_numpy()
+    theta = data["theta"].to_numpy()
     allowance = drift.QUICK[2] * float(np.ptp(theta))
     for wrong in (np.append(theta[1:], theta[-1]), 1.001 * theta):
-        row = compare_curve("theta", time, wrong, "drift/d_ep/theta", allowance=allowance, cause="wrong")
+        row = compare_curve(
+            "theta", time, wrong, "drift/d_ep/theta", allowance=allowance, cause="wrong"
+        )
         assert not row.holds, row
 
 

@@ -12,24 +12,36 @@ ALL = faults.expected()
 
 def wrong(task: str, found: np.ndarray, kinds: list[faults.Fault]) -> list[str]:
     """Return the faults that ended otherwise than expected, each with the numbers of parts that did so."""
-    ends, said = faults.ends(task, found), []
+    ends = faults.ends(task, found)
+    said = []
     for number, fault in enumerate(kinds):
         own = found[:, 2] == number
         may = faults.TASKS[task] in fault.end
-        silent, lost = own & ~ends.kept & ~ends.flagged, own & ~ends.kept
+        silent = own & ~ends.kept & ~ends.flagged
+        lost = own & ~ends.kept
         if (silent if may else lost).any():
-            said.append(f"{fault.channel} {fault.kind}: {lost.sum()} of {own.sum()}, {silent.sum()} without a flag")
+            said.append(
+                f"{fault.channel} {fault.kind}: {lost.sum()} of {own.sum()}, {silent.sum()} without a flag"
+            )
     return said
 
 
 def test_the_table_names_every_channel_and_fault_once():
     assert len(set(ALL)) == len(ALL) == 66
     assert {fault.channel for fault in ALL} == set(faults.CHANNELS)
-    assert set("".join(fault.end for fault in ALL if fault.end != "kept")) <= set(faults.TASKS.values())
+    assert set("".join(fault.end for fault in ALL if fault.end != "kept")) <= set(
+        faults.TASKS.values()
+    )
 
 
 def test_held_parts_stay_where_the_load_the_clock_or_the_slip_sensor_dies():
-    names = {("load", "0"), ("load", "nan"), ("time", "nan"), ("slip", "frozen"), ("slip_y", "0")}
+    names = {
+        ("load", "0"),
+        ("load", "nan"),
+        ("time", "nan"),
+        ("slip", "frozen"),
+        ("slip_y", "0"),
+    }
     kinds = [fault for fault in ALL if (fault.channel, fault.kind) in names]
     found = faults.run_faults("hold", 2, 1, [1], kinds)
     assert len(found) == 2 + 2 * len(kinds) * len(faults.MOMENTS)

@@ -18,8 +18,12 @@ FARTHEST = 2.5e-4
 
 def miss(case: Case) -> float:
     """Return the distance of the ends, at tolerances that leave less than a micrometre."""
-    patch, scene = PUBLISHED_PATCHES[case.shape](), ladder.scenes_of(case.shape)[case.words]
-    few, whole = (simulated(scene(kind(patch, LAW)), **ladder.CLOSE) for kind in (pf.ReducedModel, pf.DistributedModel))
+    patch = PUBLISHED_PATCHES[case.shape]()
+    scene = ladder.scenes_of(case.shape)[case.words]
+    few, whole = (
+        simulated(scene(kind(patch, LAW)), **ladder.CLOSE)
+        for kind in (pf.ReducedModel, pf.DistributedModel)
+    )
     return end_distance(few, whole)
 
 
@@ -44,21 +48,35 @@ def test_in_hand_few_discs_end_where_the_cells_do(case):
 def test_few_discs_moved_at_random(shape):
     """Twenty motions with stops, and without: found 0.69 of the published model's largest error, and 3.8 % (a line)."""
     patch = cells.SHAPES[shape]()
-    models = {"few": pf.ReducedModel(patch, LAW), "published": pf.ReducedModelPublished(patch, LAW)}
+    models = {
+        "few": pf.ReducedModel(patch, LAW),
+        "published": pf.ReducedModelPublished(patch, LAW),
+    }
     stops = cells.driven(patch, models, cells.stopping, 20)
     assert (stops["few"][:, 0] / stops["published"][:, 0]).max() < 0.75
-    assert cells.driven(patch, {"few": models["few"]}, cells.wandering, 20)["few"][:, :2].max() < 0.04
+    assert (
+        cells.driven(patch, {"few": models["few"]}, cells.wandering, 20)["few"][
+            :, :2
+        ].max()
+        < 0.04
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_motions_turn_within_the_patch_or_stop(seed):
     """Spins whose rim moves at 20 mm/s after a fortieth of the time; reversals with stops; 1.4 r at most."""
-    r, t = 0.01, np.linspace(0.0, 1.0, cells.SAMPLES)
+    r = 0.01
+    t = np.linspace(0.0, 1.0, cells.SAMPLES)
     twist = cells.wandering(np.random.default_rng(seed), r)
-    np.testing.assert_allclose(np.abs(twist[:, 2]) * r, 0.02 * np.minimum(40.0 * t, 1.0), rtol=1e-12)
+    np.testing.assert_allclose(
+        np.abs(twist[:, 2]) * r, 0.02 * np.minimum(40.0 * t, 1.0), rtol=1e-12
+    )
     assert len(np.unique(np.sign(twist[1:, 2]))) == 1
     centre = np.stack([-twist[1:, 1], twist[1:, 0]], -1) / twist[1:, 2:]
-    assert 0.7 * r < np.abs(centre).max() <= 1.4 * r and np.ptp(centre, axis=0).min() > 0.3 * r
+    assert (
+        0.7 * r < np.abs(centre).max() <= 1.4 * r
+        and np.ptp(centre, axis=0).min() > 0.3 * r
+    )
     stops = cells.stopping(np.random.default_rng(seed), r)
     still = np.sin(3.0 * np.pi * t) + 0.6 <= 0.0
     assert not stops[still].any() and not stops[0].any() and stops[~still][1:].all()
@@ -69,10 +87,14 @@ def test_twists_of_the_centre_of_pressure_are_those_of_its_patch():
     patch = cells.SHAPES["Gaussian off centre"]()
     twist = np.array([[0.01, -0.02, 3.0]])
     found = cells.about_centre(patch, twist)
-    np.testing.assert_allclose(pf.geometry.twist_at(found, patch.centre_of_pressure()), twist, atol=1e-15)
+    np.testing.assert_allclose(
+        pf.geometry.twist_at(found, patch.centre_of_pressure()), twist, atol=1e-15
+    )
     assert np.abs(found - twist).max() > 1e-3
     arms = patch.positions - patch.centre_of_pressure()
-    assert cells.gyration(patch) == pytest.approx(np.sqrt(patch.weights() @ (arms**2).sum(axis=1)), rel=0.02)
+    assert cells.gyration(patch) == pytest.approx(
+        np.sqrt(patch.weights() @ (arms**2).sum(axis=1)), rel=0.02
+    )
     reference = cells.fine(cells.SHAPES["square"]()).patch
     assert reference.cells == 4 * cells.SHAPES["square"]().cells
 
@@ -80,7 +102,9 @@ def test_twists_of_the_centre_of_pressure_are_those_of_its_patch():
 def test_a_load_slips_at_the_limit_of_mu_s():
     """A force through the middle of a square that grows in 0.1 s: mu_s f_N, and 3 bent bristles beyond that."""
     model = pf.DistributedModel(pf.ContactPatch.rectangle(0.02, cells=3), LAW)
-    found = cells.load_of_slip(model, np.array([0.6 * LAW.mu_s, -0.8 * LAW.mu_s, 0.0]), 0.1)
+    found = cells.load_of_slip(
+        model, np.array([0.6 * LAW.mu_s, -0.8 * LAW.mu_s, 0.0]), 0.1
+    )
     assert found == pytest.approx(1.0, abs=0.02)
 
 
@@ -94,7 +118,9 @@ def test_errors_on_three_feet_are_far_below_those_of_one_threshold():
 @pytest.mark.parametrize("shape", list(new_shapes.SHAPES))
 def test_the_largest_errors_on_new_shapes_are_below_the_published_models(shape):
     ratios = new_shapes.ratios(new_shapes.largest_errors(shape))["reduced"]
-    assert max(max(each) for each in ratios.values()) < 0.8  # found 0.72 in the worst of ten motions
+    assert (
+        max(max(each) for each in ratios.values()) < 0.8
+    )  # found 0.72 in the worst of ten motions
 
 
 def test_twists_are_smooth_and_start_from_rest():

@@ -17,11 +17,21 @@ def record(rows=40) -> GripRecord:
     share = np.linspace(0.0, 1.0, rows)
     zero = 0.0 * share
     slip = np.stack([zero, -0.01 * share, 0.5 * np.pi * share], axis=-1)
-    lever = np.stack([0.01 * np.cos(slip[:, 2]), 0.01 * np.sin(slip[:, 2]) - 0.01 * share], axis=-1)
+    lever = np.stack(
+        [0.01 * np.cos(slip[:, 2]), 0.01 * np.sin(slip[:, 2]) - 0.01 * share], axis=-1
+    )
     mu = np.stack([0.6 + zero, 0.4 + zero, 0.8 + zero], axis=-1)
     parts = Parts([0.2], [3e-4], [(0.01, 0.0)], [0.7])
     return GripRecord(
-        parts, 0.01 * np.arange(rows), slip, lever, zero, 5.0 - share, 0.005 + zero, mu, 1.0 * (share > 0.5)
+        parts,
+        0.01 * np.arange(rows),
+        slip,
+        lever,
+        zero,
+        5.0 - share,
+        0.005 + zero,
+        mu,
+        1.0 * (share > 0.5),
     )
 
 
@@ -38,7 +48,9 @@ def test_a_picture_shows_part_grip_and_band():
 def test_the_cross_stays_where_the_part_was_gripped():
     # it slid by 10 mm downwards and turned about the grip: the cross is 10 mm below
     part = plot_grip(record()).axes[0]
-    assert np.ravel(part.lines[-1].get_xydata()) == pytest.approx((0.0, -10.0), abs=1e-9)
+    assert np.ravel(part.lines[-1].get_xydata()) == pytest.approx(
+        (0.0, -10.0), abs=1e-9
+    )
     assert part.get_title() == "slip 10.00 mm, 90.0 deg"
 
 

@@ -17,15 +17,25 @@ QUIET = Sensors(force_noise=0.0, torque_noise=0.0)
 def parts(count=1, **changes):
     lever = changes.pop("lever", 0.02)
     given = {"mass": 0.2, "inertia": 3e-4, "mu_c": 0.5} | changes
-    full = {name: np.broadcast_to(given.pop(name), (count,)) for name in ("mass", "inertia", "mu_c")}
-    return Parts(full["mass"], full["inertia"], np.tile([lever, 0.0], (count, 1)), full["mu_c"], **given)
+    full = {
+        name: np.broadcast_to(given.pop(name), (count,))
+        for name in ("mass", "inertia", "mu_c")
+    }
+    return Parts(
+        full["mass"],
+        full["inertia"],
+        np.tile([lever, 0.0], (count, 1)),
+        full["mu_c"],
+        **given,
+    )
 
 
 def run(gripper, command, seconds):
     """Run with a constant command; the samples as arrays of columns."""
     samples = [gripper.step(command) for _ in range(round(1e3 * seconds))]
     return [
-        np.array([getattr(s, name) for s in samples]) for name in ("time", "wrench", "normal_force", "slip_velocity")
+        np.array([getattr(s, name) for s in samples])
+        for name in ("time", "wrench", "normal_force", "slip_velocity")
     ]
 
 
@@ -33,7 +43,9 @@ def test_a_strong_grip_carries_the_load_and_does_not_move():
     gripper = Gripper(parts(), 20.0, sensors=QUIET)
     _, wrench, force, slip = run(gripper, 20.0, 0.2)
     weight = 0.5 * 0.2 * 9.81
-    assert wrench[-1, 0] == pytest.approx([0.0, weight, 0.02 * weight], abs=1e-5 * weight)
+    assert wrench[-1, 0] == pytest.approx(
+        [0.0, weight, 0.02 * weight], abs=1e-5 * weight
+    )
     assert force[-1] == pytest.approx(20.0)
     assert not np.nan_to_num(slip).any()
     assert abs(gripper.slip).max() < 1e-7
@@ -41,7 +53,9 @@ def test_a_strong_grip_carries_the_load_and_does_not_move():
 
 def test_the_slip_begins_at_the_holding_load():
     # cells are coarse, and a fall in half a second needs a little more (docs/grip-planning.md): 3 %
-    gripper = Gripper(parts(radius=6e-3, growth=0.0, mu_ratio=1.0), 12.0, sensors=QUIET, cells=11)
+    gripper = Gripper(
+        parts(radius=6e-3, growth=0.0, mu_ratio=1.0), 12.0, sensors=QUIET, cells=11
+    )
     finger = pf.ContactPatch.disc(6e-3, 21, pressure=pf.SoftFinger(c=6e-3, k=4.0))
     expected = holding_load(gripper.load()[0], finger, mu=0.5)
     for k in range(900):
@@ -55,11 +69,22 @@ def test_the_scaled_patch_is_the_distributed_model_of_the_finger():
     # mu and radius are symmetries: the same motion as a model with its own patch and law, solved accurately
     held = parts(radius=6e-3, growth=0.0, mu_ratio=1.0, lever=0.01)
     gripper = Gripper(held, 3.0, sensors=QUIET, cells=7)
-    gripper._bristles[:], gripper._scaled_wrench[:] = 0.0, 0.0  # relaxed, as the scene starts
+    gripper._bristles[:] = 0.0
+    gripper._scaled_wrench[:] = 0.0  # relaxed, as the scene starts
     for _ in range(80):
         gripper.step(3.0)
-    law = pf.LuGre(mu_c=0.5, mu_s=0.5, v_s=2e-3, sigma_0=1e5, sigma_1=50.0, sigma_2=0.1, elasto_plastic=0.9)
-    finger = pf.DistributedModel(pf.ContactPatch.disc(6e-3, 7, pressure=pf.SoftFinger(c=6e-3, k=4.0)), law)
+    law = pf.LuGre(
+        mu_c=0.5,
+        mu_s=0.5,
+        v_s=2e-3,
+        sigma_0=1e5,
+        sigma_1=50.0,
+        sigma_2=0.1,
+        elasto_plastic=0.9,
+    )
+    finger = pf.DistributedModel(
+        pf.ContactPatch.disc(6e-3, 7, pressure=pf.SoftFinger(c=6e-3, k=4.0)), law
+    )
     body = pf.Body(0.2, 3e-4, position=(0.01, 0.0))
     scene = pf.Scene(body, pf.Contact(finger, 3.0, count=2), 0.08)
     end = pf.simulate(scene).data.isel(time=-1)
@@ -88,9 +113,13 @@ def test_sensors_are_late_biased_and_noisy():
 
 
 def test_an_empty_hand_shows_the_bias():
-    gripper = Gripper(parts(2, delay=0.02, bias=((0.05, 0.0, 1e-3), (0.0, -0.02, 0.0))), 20.0, seed=3)
+    gripper = Gripper(
+        parts(2, delay=0.02, bias=((0.05, 0.0, 1e-3), (0.0, -0.02, 0.0))), 20.0, seed=3
+    )
     samples = list(gripper.empty_hand(400))
-    assert np.mean([each.wrench for each in samples], axis=0) == pytest.approx(gripper.parts.bias, abs=4e-3)
+    assert np.mean([each.wrench for each in samples], axis=0) == pytest.approx(
+        gripper.parts.bias, abs=4e-3
+    )
     assert abs(np.mean([each.normal_force for each in samples])) < 4e-3
     assert samples[-1].time.max() < gripper.measurement.time.min()
 
@@ -111,11 +140,15 @@ def test_the_slip_sensor_counts_and_loses_nothing():
     time, _, _, slip = run(gripper, 1.5, 0.1)
     seen = ~np.isnan(slip[:, 0, 0])
     assert seen.sum() == 12
-    places = (slip[seen] * np.diff(time[seen, 0], prepend=0.0)[:, None, None]).sum(axis=0)
+    places = (slip[seen] * np.diff(time[seen, 0], prepend=0.0)[:, None, None]).sum(
+        axis=0
+    )
     unit = 0.95e-3 / 120.0
     last = round(1e3 * time[seen, 0][-1])
     assert last >= 99
-    assert abs(places[0, 1] - gripper.slip[0, 1]) < unit + 1e-3 * abs(gripper.twist[0, 1])
+    assert abs(places[0, 1] - gripper.slip[0, 1]) < unit + 1e-3 * abs(
+        gripper.twist[0, 1]
+    )
 
 
 def test_a_part_that_is_let_go_falls():
@@ -126,14 +159,25 @@ def test_a_part_that_is_let_go_falls():
 
 
 def test_taps_and_tilts_load_the_part():
-    gripper = Gripper(parts(tap=(1.0, 0.0, 0.0), tap_time=0.01, tilt=0.5, tilt_time=0.05, tilt_duration=0.01), 40.0)
+    gripper = Gripper(
+        parts(
+            tap=(1.0, 0.0, 0.0),
+            tap_time=0.01,
+            tilt=0.5,
+            tilt_time=0.05,
+            tilt_duration=0.01,
+        ),
+        40.0,
+    )
     loads = []
     for _ in range(80):
         gripper.step(40.0)
         loads.append(gripper.load()[0])
     weight = 0.5 * 0.2 * 9.81
     assert max(load[0] for load in loads) == pytest.approx(0.5, rel=1e-2)
-    assert loads[-1][:2] == pytest.approx([-weight * np.sin(0.5), -weight * np.cos(0.5)])
+    assert loads[-1][:2] == pytest.approx(
+        [-weight * np.sin(0.5), -weight * np.cos(0.5)]
+    )
 
 
 def test_bad_parts_and_commands_are_refused():

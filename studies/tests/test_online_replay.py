@@ -13,7 +13,10 @@ from tests.support import online_replay
 
 @pytest.mark.parametrize(
     ("streams", "apart"),
-    [(online_replay.push_streams, 0.03), (online_replay.slide_streams, 0.05)],  # measured: medians of 1 % and 2 %
+    [
+        (online_replay.push_streams, 0.03),
+        (online_replay.slide_streams, 0.05),
+    ],  # measured: medians of 1 % and 2 %
     ids=["pushes", "slides"],
 )
 def test_friction_on_the_way_is_that_of_the_whole_log(streams, apart):
@@ -28,10 +31,14 @@ def test_friction_on_the_way_is_that_of_the_whole_log(streams, apart):
 
 
 def test_friction_of_a_slide_is_what_brakes_the_cube(tmp_path):
-    time, mu = np.arange(30) / 148.0, 0.3
+    time = np.arange(30) / 148.0
+    mu = 0.3
     speed = 1.2 - mu * online_replay.GRAVITY * time
     names = "toss,unique_id,t_s,yaw_rad,vx_mps,vy_mps,wz_radps,sliding"
-    rows = [f"1,1,{t},1.5707963267948966,0.0,{v},0.0,1" for t, v in zip(time, speed, strict=True)]  # along its own x
+    rows = [
+        f"1,1,{t},1.5707963267948966,0.0,{v},0.0,1"
+        for t, v in zip(time, speed, strict=True)
+    ]  # along its own x
     (tmp_path / "contactnets_slides.csv").write_text("\n".join([names, *rows]))
 
     packed = gzip.compress((tmp_path / "contactnets_slides.csv").read_bytes())

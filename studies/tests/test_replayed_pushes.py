@@ -17,18 +17,25 @@ def test_measured_pushes_end_nearer_on_feet_than_on_an_ellipsoid():
     assert len(measured) == 51
     named = [each for each in measured if "3out" in each.name]
     still = np.array([each.error(each.start) for each in named])
-    feet, ellipsoid = (replayed_pushes.errors(named, make) for make in (pf.LimitSurfaceExact, pf.LimitSurfaceEllipsoid))
+    feet, ellipsoid = (
+        replayed_pushes.errors(named, make)
+        for make in (pf.LimitSurfaceExact, pf.LimitSurfaceEllipsoid)
+    )
     # nothing fitted: means over 18 pushes, 1.1 mm and 1.0 deg on the feet, 1.1 mm and 1.7 deg on the ellipsoid
     assert feet[:, 0].mean() < 0.15 * still[:, 0].mean()
     assert feet[:, 1].mean() < 0.8 * ellipsoid[:, 1].mean() < 0.5 * still[:, 1].mean()
 
 
 def test_single_pushes_begin_outside_and_end_near():
-    measured = [each for each in replayed_pushes.single_pushes() if each.board == "hardboard"][::10]
+    measured = [
+        each for each in replayed_pushes.single_pushes() if each.board == "hardboard"
+    ][::10]
     assert len(measured) == 10
     errors = replayed_pushes.errors(measured, pf.LimitSurfaceExact)
     still = np.array([each.error(each.start) for each in measured])
-    assert errors[:, 0].mean() < 0.3 * still[:, 0].mean() and np.median(errors[:, 1]) < 0.2 * np.median(still[:, 1])
+    assert errors[:, 0].mean() < 0.3 * still[:, 0].mean() and np.median(
+        errors[:, 1]
+    ) < 0.2 * np.median(still[:, 1])
 
 
 def test_a_push_is_that_of_least_power_in_small_steps():
@@ -50,5 +57,9 @@ def test_the_example_reaches_its_pose():
 
 def test_a_push_at_the_edge_of_its_motion_cone_goes_on():
     # on three feet one of these pushes would change its mode without end
-    measured = [each for each in replayed_pushes.single_pushes() if each.name.startswith("wood_30_63_43")]
+    measured = [
+        each
+        for each in replayed_pushes.single_pushes()
+        if each.name.startswith("wood_30_63_43")
+    ]
     assert np.isfinite(replayed_pushes.errors(measured, pf.LimitSurfaceExact)).all()

@@ -31,16 +31,33 @@ from planarfriction_studies.experiments.experiment import (
     dataset,
     table,
 )
-from planarfriction_studies.experiments.report import WIDEST, _image, name_to_html, to_html, write_report
+from planarfriction_studies.experiments.report import (
+    WIDEST,
+    _image,
+    name_to_html,
+    to_html,
+    write_report,
+)
 from planarfriction_studies.experiments.reproduction import Reproduction
-from planarfriction_studies.experiments.wording import environment, fmt, number, power, report, short, span
+from planarfriction_studies.experiments.wording import (
+    environment,
+    fmt,
+    number,
+    power,
+    report,
+    short,
+    span,
+)
 
 
 class Made:
     """An experiment that counts what it does, can be interrupted once, and can miss its reference."""
 
     def __init__(self, name: str, *, interrupt_at: str = "", theirs: float = 2.0):
-        self.name, self.title, self.interrupt_at, self.theirs = name, f"About <{name}>", interrupt_at, theirs
+        self.name = name
+        self.title = f"About <{name}>"
+        self.interrupt_at = interrupt_at
+        self.theirs = theirs
         self.done: list[str] = []
 
     def run(self, work: Work) -> Result:
@@ -48,15 +65,32 @@ class Made:
 
         from planarfriction.plots.style import new_figure
 
-        values = work.pieces({f"{self.name} {letter}": lambda letter=letter: self.compute(letter) for letter in "ab"})
+        values = work.pieces(
+            {
+                f"{self.name} {letter}": lambda letter=letter: self.compute(letter)
+                for letter in "ab"
+            }
+        )
         figure = new_figure(3.0, 2.0)
         figure.subplots().plot([0.0, 1.0], [0.0, 1.0])
         ours = float(values[f"{self.name} b"]["value"])
         row = compare("one", ours, self.theirs, "published", 1e-3, "m", "none & all")
-        table = Table("Some", ["name", "value"], [["first", np.float64(0.123456)], ["second", 3]], note="a note")
+        table = Table(
+            "Some",
+            ["name", "value"],
+            [["first", np.float64(0.123456)], ["second", 3]],
+            note="a note",
+        )
         data = {"curves": xr.Dataset({"x": ("time", np.arange(3.0))})}
         exact = compare("two, fx", ours, 2.0, "closed form", 1e-3, "m^2", "rounding")
-        stored = dataclasses.replace(row, quantity="three", theirs=2.0, difference=0.0, cause="the figure", paper=1e-4)
+        stored = dataclasses.replace(
+            row,
+            quantity="three",
+            theirs=2.0,
+            difference=0.0,
+            cause="the figure",
+            paper=1e-4,
+        )
         picture = Picture("line", "A line.", figure)
         return Result(
             ["Found $x^2$."],
@@ -81,7 +115,9 @@ class Made:
 @pytest.fixture
 def made(monkeypatch):
     """Two made-up experiments instead of the real ones."""
-    for name in reversed(list(experiments.EXPERIMENTS)):  # put back in their order, the last one first
+    for name in reversed(
+        list(experiments.EXPERIMENTS)
+    ):  # put back in their order, the last one first
         monkeypatch.delitem(experiments.EXPERIMENTS, name)
     pair = Made("first"), Made("second")
     for each in pair:
@@ -94,7 +130,12 @@ def test_results_are_stored_and_not_done_again(made, tmp_path):
     assert [record["name"] for record in reproduction.run()] == ["first", "second"]
     assert sorted(made[0].done) == ["a", "b"]
     files = {path.name for path in (tmp_path / "first").iterdir()}
-    assert files == {"line.png", "line.svg", "curves.nc", "result.json"}  # pieces are gone
+    assert files == {
+        "line.png",
+        "line.svg",
+        "curves.nc",
+        "result.json",
+    }  # pieces are gone
     assert len(list(reproduction.run())) == 2
     assert sorted(made[0].done) == ["a", "b"]
     list(reproduction.run(["first"], again=True))
@@ -141,12 +182,17 @@ def test_a_piece_that_was_cut_off_or_is_of_other_code_is_computed_again(tmp_path
 
 
 def test_a_piece_keeps_what_is_nested(tmp_path):
-    values = {"run": {"one": {"x": np.arange(3.0), "count": 3}, "two": {"x": np.zeros(1)}}, "seconds": 0.5}
+    values = {
+        "run": {"one": {"x": np.arange(3.0), "count": 3}, "two": {"x": np.zeros(1)}},
+        "seconds": 0.5,
+    }
     work = Work(folder=tmp_path, fingerprint="one")
     work.piece("nested", lambda: values)
     for found in (work.piece("nested", dict), Work().piece("nested", lambda: values)):
         np.testing.assert_equal(found, values)
-        assert isinstance(found["seconds"], float) and isinstance(found["run"]["one"]["count"], int)
+        assert isinstance(found["seconds"], float) and isinstance(
+            found["run"]["one"]["count"], int
+        )
 
 
 def test_pieces_by_key_have_labels(tmp_path):
@@ -154,11 +200,15 @@ def test_pieces_by_key_have_labels(tmp_path):
     found = Work(progress=told.append).pieces(
         {("a", 1): lambda: {"x": 1.0}, ("b", 2): lambda: {"x": 2.0}}, "{0[0]}".format
     )
-    assert found == {("a", 1): {"x": 1.0}, ("b", 2): {"x": 2.0}} and sorted(told) == ["a", "b"]
+    assert found == {("a", 1): {"x": 1.0}, ("b", 2): {"x": 2.0}} and sorted(told) == [
+        "a",
+        "b",
+    ]
 
 
 def test_pieces_that_have_not_begun_are_left_out_after_an_interrupt():
-    begun, goes_on = [], threading.Event()
+    begun = []
+    goes_on = threading.Event()
 
     def waits(number):
         begun.append(number)
@@ -170,30 +220,57 @@ def test_pieces_that_have_not_begun_are_left_out_after_an_interrupt():
     timer = threading.Timer(0.5, goes_on.set)
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        Work().pieces({number: lambda number=number: waits(number) for number in range(20)})
+        Work().pieces(
+            {number: lambda number=number: waits(number) for number in range(20)}
+        )
     timer.join()
     assert len(begun) <= 4  # two at a time
 
 
 def test_curves_by_their_labels():
     time = np.linspace(0.0, 1.0, 3)
-    runs = {(a, b): {"x": time * n, "left out": time} for n, (a, b) in enumerate(("ps", "pt", "qs", "qt"))}
+    runs = {
+        (a, b): {"x": time * n, "left out": time}
+        for n, (a, b) in enumerate(("ps", "pt", "qs", "qt"))
+    }
     data = dataset(runs, {"x": "m"}, ("one", "two"), ("time", time, "s"))
-    assert dict(data.sizes) == {"one": 2, "two": 2, "time": 3} and set(data.data_vars) == {"x"}
+    assert dict(data.sizes) == {"one": 2, "two": 2, "time": 3} and set(
+        data.data_vars
+    ) == {"x"}
     np.testing.assert_array_equal(data.x.sel(one="q", two="s"), 2.0 * time)
     assert data.x.attrs["units"] == "m" and data.time.attrs["units"] == "s"
 
 
 def test_a_table_has_a_row_for_each_item():
-    made = table("Some", {"a": 2.0, "b": 3.0}, {"x": lambda value: value, "square": lambda value: value**2}, "name")
-    assert made.headings == ["name", "x", "square"] and made.rows == [["a", 2.0, 4.0], ["b", 3.0, 9.0]]
+    made = table(
+        "Some",
+        {"a": 2.0, "b": 3.0},
+        {"x": lambda value: value, "square": lambda value: value**2},
+        "name",
+    )
+    assert made.headings == ["name", "x", "square"] and made.rows == [
+        ["a", 2.0, 4.0],
+        ["b", 3.0, 9.0],
+    ]
 
 
 def test_numbers_and_arrays_are_compared():
     one = compare("one", 1.0, 3.0, "published", 1.0, "m", "")
-    assert (one.ours, one.theirs, one.difference, one.samples, one.holds) == (1.0, 3.0, 2.0, 1, False)
+    assert (one.ours, one.theirs, one.difference, one.samples, one.holds) == (
+        1.0,
+        3.0,
+        2.0,
+        1,
+        False,
+    )
     many = compare("many", np.array([1.0, -2.0]), 0.0, "closed form", 2.0, "m", "")
-    assert (many.ours, many.theirs, many.difference, many.samples, many.holds) == (None, None, 2.0, 2, True)
+    assert (many.ours, many.theirs, many.difference, many.samples, many.holds) == (
+        None,
+        None,
+        2.0,
+        2,
+        True,
+    )
 
 
 def test_the_command_writes_a_report_and_all_numbers(made, tmp_path, capsys):
@@ -204,11 +281,18 @@ def test_the_command_writes_a_report_and_all_numbers(made, tmp_path, capsys):
     assert numbers["experiments"]["first"]["numbers"] == {"value": 2.0}
     assert numbers["experiments"]["second"]["comparisons"][0]["holds"] is True
     page = (tmp_path / "report.html").read_text()
-    assert "About &lt;first&gt;" in page and "none &amp; all" in page and "0.1235" in page and "a note" in page
+    assert (
+        "About &lt;first&gt;" in page
+        and "none &amp; all" in page
+        and "0.1235" in page
+        and "a note" in page
+    )
     # self-contained: each figure and each formula is inside, nothing is loaded from elsewhere
     sources = re.findall(r'(?:src|href)="([^"]*)"', page)
     assert sum(source.startswith("data:image/png;base64,") for source in sources) == 2
-    assert sum(source.startswith("data:image/svg+xml;base64,") for source in sources) == 2
+    assert (
+        sum(source.startswith("data:image/svg+xml;base64,") for source in sources) == 2
+    )
     assert all(source.startswith(("data:image/", "#")) for source in sources)
 
 
@@ -219,18 +303,37 @@ def test_the_report_begins_with_its_verdict_and_separates_the_papers(made, tmp_p
     # what is left out is said where the count stands, and its section named
     assert "that of the red curve (section 2)." in head
     assert "The verdict of first." in head and "The verdict of second." in head
-    titles = ("Converged solutions and", "The paper, with", "s curves, stored comparisons")
-    places = [first.index(each) for each in ("Why?", "<figure>", "Found ", "Some", *titles)]
+    titles = (
+        "Converged solutions and",
+        "The paper, with",
+        "s curves, stored comparisons",
+    )
+    places = [
+        first.index(each) for each in ("Why?", "<figure>", "Found ", "Some", *titles)
+    ]
     assert places == sorted(places)
-    ours, papers, stored = (first[begin:end] for begin, end in zip(places[-3:], [*places[-2:], None], strict=True))
-    assert "<i>f<sub>x</sub></i>" in ours and "m²" in ours and "none &amp; all" not in ours
-    assert "none &amp; all" in papers and "<th>tolerance</th>" in papers and "three" not in papers
+    ours, papers, stored = (
+        first[begin:end]
+        for begin, end in zip(places[-3:], [*places[-2:], None], strict=True)
+    )
+    assert (
+        "<i>f<sub>x</sub></i>" in ours and "m²" in ours and "none &amp; all" not in ours
+    )
+    assert (
+        "none &amp; all" in papers
+        and "<th>tolerance</th>" in papers
+        and "three" not in papers
+    )
     # the distance of a published curve from the converged solution limits a comparison, but is no tolerance
-    assert "three" in stored and "<th>limit</th>" in stored and "tolerance" not in stored
+    assert (
+        "three" in stored and "<th>limit</th>" in stored and "tolerance" not in stored
+    )
     assert "The limit is no tolerance" in head
 
 
-def test_a_number_out_of_tolerance_is_shown_and_sets_the_exit_code(made, tmp_path, capsys):
+def test_a_number_out_of_tolerance_is_shown_and_sets_the_exit_code(
+    made, tmp_path, capsys
+):
     made[1].theirs = 2.1
     assert main(["reproduce", "--out", str(tmp_path)]) == 1
     assert "out of tolerance: one" in capsys.readouterr().err
@@ -273,16 +376,36 @@ def test_the_list_names_every_experiment_and_each_has_its_module(capsys):
 
 
 def test_numbers_as_text():
-    assert [number(value) for value in (None, 3, 0.123456, "x", True)] == ["", "3", "0.1235", "x", "True"]
-    assert [fmt(value, "+.2f") for value in (-1e-9, 0.0, 0.2, -0.2)] == ["0.00", "0.00", "+0.20", "-0.20"]
+    assert [number(value) for value in (None, 3, 0.123456, "x", True)] == [
+        "",
+        "3",
+        "0.1235",
+        "x",
+        "True",
+    ]
+    assert [fmt(value, "+.2f") for value in (-1e-9, 0.0, 0.2, -0.2)] == [
+        "0.00",
+        "0.00",
+        "+0.20",
+        "-0.20",
+    ]
     assert [short(value) for value in (1043.7, 0.0012345)] == ["1040", "0.00123"]
-    assert [power(1e-8), power(3.14e-5, 1), power(0.0)] == ["$10^{-8}$", r"$3.1 \times 10^{-5}$", "0"]
+    assert [power(1e-8), power(3.14e-5, 1), power(0.0)] == [
+        "$10^{-8}$",
+        r"$3.1 \times 10^{-5}$",
+        "0",
+    ]
     assert [span([2.0, 1.0], ".1f"), span([3, 3], "d")] == ["1.0 to 2.0", "3"]
 
 
 def test_markdown_with_formulas():
     page = to_html("A *word*, `code`, <b>, $\\sigma_0 < 1$ and 5 $.")
-    assert "<em>word</em>" in page and "<code>code</code>" in page and "&lt;b&gt;" in page and "and 5 $." in page
+    assert (
+        "<em>word</em>" in page
+        and "<code>code</code>" in page
+        and "&lt;b&gt;" in page
+        and "and 5 $." in page
+    )
     (picture,) = re.findall(r'<img[^>]*alt="([^"]*)"', page)
     assert picture == r"\sigma_0 &lt; 1"
 
@@ -303,8 +426,12 @@ def test_symbols_in_names():
 def test_every_experiment_has_a_template_that_is_complete():
     """Each can be read; what a template names and a run does not give is an error in the run."""
     for name in experiments.EXPERIMENTS:
-        source, *_ = environment().loader.get_source(environment(), f"{name.replace('-', '_')}/findings.md.j2")
-        assert [f"## {part}\n" in source for part in ("verdict", "asked", "found")] == [True] * 3, name
+        source, *_ = environment().loader.get_source(
+            environment(), f"{name.replace('-', '_')}/findings.md.j2"
+        )
+        assert [f"## {part}\n" in source for part in ("verdict", "asked", "found")] == [
+            True
+        ] * 3, name
         assert "aimed" not in source and "promise" not in source
     with pytest.raises(UndefinedError):
         report("drift", {}, {})
@@ -318,19 +445,30 @@ def test_a_curve_is_compared_at_the_vertices_of_the_figure_only():
     time = np.round(np.arange(201) * 0.01, 6)
     values = np.full_like(time, 7.0)
     values[np.rint(curve.time / 0.01).astype(int)] = curve.values
-    row = compare_curve("x", time, values, "in_hand/Circle/d1/x", allowance=1e-9, cause="")
+    row = compare_curve(
+        "x", time, values, "in_hand/Circle/d1/x", allowance=1e-9, cause=""
+    )
     assert row.difference == 0.0 and row.samples == len(curve.time) and row.holds
     assert row.tolerance == pytest.approx(curve.deviation + curve.reading + 1e-9)
     values[np.rint(curve.time[3] / 0.01).astype(int)] += 1e-3
-    assert not compare_curve("x", time, values, "in_hand/Circle/d1/x", allowance=1e-9, cause="").holds
+    assert not compare_curve(
+        "x", time, values, "in_hand/Circle/d1/x", allowance=1e-9, cause=""
+    ).holds
 
 
 def test_a_converged_solution_is_compared_at_all_its_times():
     reference = facts.converged("in_hand/Circle/d1")
     row = compare_converged(
-        "y", reference["time"], reference["y"] + 1e-4, "in_hand/Circle/d1/y", allowance=1e-6, cause=""
+        "y",
+        reference["time"],
+        reference["y"] + 1e-4,
+        "in_hand/Circle/d1/y",
+        allowance=1e-6,
+        cause="",
     )
-    assert row.difference == pytest.approx(1e-4) and not row.holds and row.samples == 200
+    assert (
+        row.difference == pytest.approx(1e-4) and not row.holds and row.samples == 200
+    )
 
 
 def test_unknown_facts_are_named():
@@ -350,8 +488,15 @@ def test_published_and_converged_agree_to_the_stated_deviation():
         reference = facts.converged(solution)
         index = np.rint(curve.time / 0.01).astype(int) - 1
         inside = index < len(reference["time"])
-        difference = np.abs(reference[column][index[inside]] - curve.values[inside]).max()
-        assert difference <= 1.02 * curve.deviation + 2.0 * curve.reading + 1e-7 * np.ptp(curve.values), name
+        difference = np.abs(
+            reference[column][index[inside]] - curve.values[inside]
+        ).max()
+        assert (
+            difference
+            <= 1.02 * curve.deviation
+            + 2.0 * curve.reading
+            + 1e-7 * np.ptp(curve.values)
+        ), name
         checked += 1
     assert checked > 60
 
@@ -362,23 +507,34 @@ def test_a_full_disk_ends_in_one_line_and_keeps_what_was_there(tmp_path, monkeyp
     from planarfriction.errors import FileError
     from planarfriction_studies.experiments.experiment import Work
 
-    kept = Work(folder=tmp_path, fingerprint="one").piece("a piece", lambda: {"x": np.arange(3.0)})
+    kept = Work(folder=tmp_path, fingerprint="one").piece(
+        "a piece", lambda: {"x": np.arange(3.0)}
+    )
 
     def full(number):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(writing.os, "fsync", full)
-    with pytest.raises(FileError, match=r"cannot be written: No space left on device") as caught:
-        Work(folder=tmp_path, fingerprint="two").piece("a piece", lambda: {"x": np.zeros(3)})
+    with pytest.raises(
+        FileError, match=r"cannot be written: No space left on device"
+    ) as caught:
+        Work(folder=tmp_path, fingerprint="two").piece(
+            "a piece", lambda: {"x": np.zeros(3)}
+        )
     assert "\n" not in str(caught.value)
     assert len(list(tmp_path.iterdir())) == 1
     again = Work(folder=tmp_path, fingerprint="one").piece("a piece", dict)
     assert np.array_equal(again["x"], kept["x"])
 
 
-@pytest.mark.parametrize(("pixels", "share"), [(WIDEST // 2, 50), (WIDEST // 3, 33), (2000, 100)])
+@pytest.mark.parametrize(
+    ("pixels", "share"), [(WIDEST // 2, 50), (WIDEST // 3, 33), (2000, 100)]
+)
 def test_pictures_of_the_report_have_letters_of_one_size(pixels, share, tmp_path):
     Image.new("1", (pixels, 10)).save(tmp_path / "picture.png")
     shown = _image(tmp_path / "picture.png")
     assert shown["width"] == share
-    assert base64.b64decode(shown["source"].partition(",")[2]) == (tmp_path / "picture.png").read_bytes()
+    assert (
+        base64.b64decode(shown["source"].partition(",")[2])
+        == (tmp_path / "picture.png").read_bytes()
+    )

@@ -27,9 +27,15 @@ def test_all_that_it_shows_is_as_recorded(result):
 
 def test_everything_published_is_compared_and_holds(result):
     assert [row.quantity for row in result.comparisons if not row.holds] == []
-    curves = {row.quantity: row.samples for row in result.comparisons if "steady state" in row.quantity}
+    curves = {
+        row.quantity: row.samples
+        for row in result.comparisons
+        if "steady state" in row.quantity
+    }
     expected = {
-        f"steady state of the line, {words}, {name}": len(facts.published_curve(f"staircase/{key}/{name}").time)
+        f"steady state of the line, {words}, {name}": len(
+            facts.published_curve(f"staircase/{key}/{name}").time
+        )
         for key, words in (("plain", "plain sum"), ("bilinear", "bilinear smoothing"))
         for name in ("fx", "fy", "tau")
     }
@@ -48,7 +54,9 @@ def test_the_smoothing_is_not_continuous_at_the_edge_of_its_grid(result):
     edge = result.numbers["edge"]
     # vx/omega reaches the half-width at 1.2 s; -vy/omega the half-width and a cell at 3.6713 s
     assert edge["high"]["time"] == pytest.approx(1.2, abs=1.01e-4)
-    assert edge["low"]["time"] == pytest.approx(3.4 + 0.6 * (1.0 - 0.006 / (0.01 + 0.02 / 21)), abs=1.01e-4)
+    assert edge["low"]["time"] == pytest.approx(
+        3.4 + 0.6 * (1.0 - 0.006 / (0.01 + 0.02 / 21)), abs=1.01e-4
+    )
     assert edge["high"]["jump"] > 0.01
     assert edge["low"]["jump"] > 0.001
 
@@ -63,14 +71,28 @@ def test_the_wrong_sum_would_be_noticed(result):
     time = staircase.sample_times(5.0, staircase.SAMPLE_TIME)
     twist = dataclasses.replace(staircase.published_velocity(), hold="linear")(time)
     wrong = LimitSurfaceCells(PUBLISHED_PATCHES["Line"](cells=23)).wrench(twist)
-    row = compare_curve("tau", time, wrong[:, 2], "staircase/plain/tau", allowance=1e-12, cause="23 cells")
+    row = compare_curve(
+        "tau",
+        time,
+        wrong[:, 2],
+        "staircase/plain/tau",
+        allowance=1e-12,
+        cause="23 cells",
+    )
     assert not row.holds
     assert all(variable.attrs["units"] for variable in data.data_vars.values())
 
 
 @pytest.mark.parametrize(
     "twist",
-    [(0.0, 0.0, 1.0), (0.004, 0.003, 1.0), (-0.02, 1e-3, -0.7), (0.005, 0.0, 1.0), (0.0, 0.01, 2e-3), (0.3, -0.4, 0.0)],
+    [
+        (0.0, 0.0, 1.0),
+        (0.004, 0.003, 1.0),
+        (-0.02, 1e-3, -0.7),
+        (0.005, 0.0, 1.0),
+        (0.0, 0.01, 2e-3),
+        (0.3, -0.4, 0.0),
+    ],
 )
 def test_rod_against_quadrature(twist):
     vx, vy, omega = twist
@@ -81,7 +103,9 @@ def test_rod_against_quadrature(twist):
 
     middle = [vx / omega] if omega and abs(vx / omega) < half else None
     parts = [
-        integrate.quad(density, -half, half, points=middle, epsabs=1e-13, epsrel=1e-12)[0]
+        integrate.quad(density, -half, half, points=middle, epsabs=1e-13, epsrel=1e-12)[
+            0
+        ]
         for density in (
             lambda y: -(vx - omega * y) / speed(y),
             lambda y: -vy / speed(y),
@@ -89,7 +113,9 @@ def test_rod_against_quadrature(twist):
         )
     ]
     found = staircase.rod_wrench(np.array(twist), half)
-    np.testing.assert_allclose(found, np.array(parts) / (2 * half), rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(
+        found, np.array(parts) / (2 * half), rtol=1e-9, atol=1e-11
+    )
 
 
 def test_rod_at_rest_and_in_rows():
@@ -104,4 +130,6 @@ def test_smoothing_and_plain_sum_agree_outside_the_grid():
     patch = PUBLISHED_PATCHES["Line"]()
     twists = np.array([[0.011, 0.0, 1.0], [0.0, 0.02, 1.0], [0.01, 0.01, 0.0]])
     plain = LimitSurfaceCells(patch).wrench(twists)
-    np.testing.assert_allclose(staircase.smoothed_wrench(twists, patch), plain, rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(
+        staircase.smoothed_wrench(twists, patch), plain, rtol=0.0, atol=1e-15
+    )

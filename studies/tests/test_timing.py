@@ -30,7 +30,11 @@ def reduced_scene():
 
 
 def test_all_comparisons_hold(result):
-    failed = [(c.quantity, c.difference, c.tolerance) for c in result.comparisons if not c.holds]
+    failed = [
+        (c.quantity, c.difference, c.tolerance)
+        for c in result.comparisons
+        if not c.holds
+    ]
     assert not failed
 
 
@@ -54,7 +58,9 @@ def test_a_quick_look_quotes_no_ratio(result):
 
 
 def test_machine_is_stated(result):
-    assert {"cpus", "platform", "numpy", "scipy", "numba"} <= result.numbers["machine"].keys()
+    assert {"cpus", "platform", "numpy", "scipy", "numba"} <= result.numbers[
+        "machine"
+    ].keys()
 
 
 def test_window_continues_the_run():
@@ -63,21 +69,31 @@ def test_window_continues_the_run():
     part = Window.of(reduced_scene(), 0.4, 0.45)
     expected, _ = whole.ours(rtol=1e-8, atol=1e-7)
     found, _ = part.ours(rtol=1e-8, atol=1e-7)
-    np.testing.assert_allclose(found.poses, expected.poses[-len(part.ends) :], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(
+        found.poses, expected.poses[-len(part.ends) :], rtol=0.0, atol=1e-9
+    )
     assert abs(found.poses[-1, 1] - found.poses[0, 1]) > 1e-3  # it slips
 
 
 def test_window_is_what_simulate_does():
     scene = reduced_scene()
-    found, statistics = Window.of(scene, 0.0, 0.4).ours(rtol=scene.rtol, atol=scene.atol)
+    found, statistics = Window.of(scene, 0.0, 0.4).ours(
+        rtol=scene.rtol, atol=scene.atol
+    )
     solution = pf.simulate(scene, t_end=0.4)
-    np.testing.assert_allclose(found.poses[-1, :2], [solution.data.x[-1], solution.data.y[-1]], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        found.poses[-1, :2],
+        [solution.data.x[-1], solution.data.y[-1]],
+        rtol=0.0,
+        atol=1e-12,
+    )
     assert statistics.steps == solution.statistics.steps
 
 
 def test_published_baseline_finds_the_same_motion():
     window = Window.of(reduced_scene(), *runs.BREAKAWAY)
-    general, reference = window.general(**LSODA), window.ours(rtol=1e-9, atol=1e-8)[0]
+    general = window.general(**LSODA)
+    reference = window.ours(rtol=1e-9, atol=1e-8)[0]
     # its absolute tolerance of 1e-8 m is a percent of a bristle
     assert runs.position_error(general.poses, reference.poses) < 1e-6
     assert general.evaluations > 0
@@ -86,7 +102,10 @@ def test_published_baseline_finds_the_same_motion():
 def test_errors_fall_with_the_tolerance():
     problem = runs.problems(Work(quick=True))[0]
     reference = runs.reference(problem, Work())
-    errors = [runs.position_error(runs.solve(problem, "RODAS4", t).poses, reference) for t in (1e-3, 1e-5, 1e-7)]
+    errors = [
+        runs.position_error(runs.solve(problem, "RODAS4", t).poses, reference)
+        for t in (1e-3, 1e-5, 1e-7)
+    ]
     assert errors[0] > errors[1] > errors[2]
 
 

@@ -22,15 +22,29 @@ MODELS = {
 def test_rollouts_of_all_models_add_to_what_comes_in(name):
     twist = np.tile([1e-3, 0.0, 0.1], (2, 4, 1))
     inputs = checked(MODELS[name], None, twist, [1.0, 1.0, 0.0, 1.0], 1e-3, None)
-    family, compiled, found = inputs.model.family, inputs.compiled(), []
+    family = inputs.model.family
+    compiled = inputs.compiled()
+    found = []
     for start in (0.0, 5.0):
         wrenches = np.full(twist.shape, start)
-        family.rollout(compiled, (0, 2), inputs.state.copy(), wrenches, np.empty((2, 0, inputs.state.shape[1])))
+        family.rollout(
+            compiled,
+            (0, 2),
+            inputs.state.copy(),
+            wrenches,
+            np.empty((2, 0, inputs.state.shape[1])),
+        )
         found.append(wrenches - start)
     np.testing.assert_allclose(found[1], found[0], atol=1e-14)  # rounding of 5 N
     assert np.abs(found[0]).max() > 0.1
-    wrenches = derivatives.rollout_jacobian(MODELS[name], None, twist, 1.0, 1e-3).wrenches  # one pass a parameter
-    np.testing.assert_allclose(wrenches, derivatives.rollout(MODELS[name], None, twist, 1.0, 1e-3).wrenches, atol=1e-12)
+    wrenches = derivatives.rollout_jacobian(
+        MODELS[name], None, twist, 1.0, 1e-3
+    ).wrenches  # one pass a parameter
+    np.testing.assert_allclose(
+        wrenches,
+        derivatives.rollout(MODELS[name], None, twist, 1.0, 1e-3).wrenches,
+        atol=1e-12,
+    )
 
 
 def test_a_slope_that_does_not_rise_at_its_start_shortens_no_displacement():

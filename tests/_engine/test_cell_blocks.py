@@ -12,16 +12,33 @@ from planarfriction._engine.cells.cell_blocks import LANES, VECTOR, divided
 from planarfriction.derivatives import rollout, rollout_vjp
 
 LAW = pf.LuGre(mu_c=0.8, mu_s=1.1, elasto_plastic=0.9)
-COUNTS = [1, VECTOR - 1, VECTOR, VECTOR + 1, LANES - 1, LANES, LANES + 1, 2 * LANES + 1, 3 * LANES - 7]
+COUNTS = [
+    1,
+    VECTOR - 1,
+    VECTOR,
+    VECTOR + 1,
+    LANES - 1,
+    LANES,
+    LANES + 1,
+    2 * LANES + 1,
+    3 * LANES - 7,
+]
 """Numbers of cells around those that fill a vector and a block."""
 
 
 @given(st.integers(1, 20_000))
 def test_cells_are_spread_evenly_in_whole_vectors(count):
     blocks, lanes = divided.py_func(count)
-    assert (blocks - 1) * LANES < count <= blocks * lanes and lanes <= LANES and lanes % VECTOR == 0
+    assert (
+        (blocks - 1) * LANES < count <= blocks * lanes
+        and lanes <= LANES
+        and lanes % VECTOR == 0
+    )
     assert blocks * lanes - count < blocks * VECTOR
-    assert divided.py_func(blocks * lanes) == (blocks, lanes)  # that of what is filled up
+    assert divided.py_func(blocks * lanes) == (
+        blocks,
+        lanes,
+    )  # that of what is filled up
 
 
 def patch_of(positions: np.ndarray, weights: np.ndarray) -> pf.ContactPatch:
@@ -32,9 +49,13 @@ def patch_of(positions: np.ndarray, weights: np.ndarray) -> pf.ContactPatch:
 def test_a_step_of_many_cells_is_that_of_each_alone(count):
     """To rounding: sums of tractions are ordered otherwise."""
     draw = np.random.default_rng(count)
-    positions, weights = draw.normal(scale=5e-3, size=(count, 2)), draw.uniform(0.5, 1.0, count)
-    state, twist = draw.normal(scale=5e-7, size=(2, count)), np.array([0.002, -0.001, 0.4])
-    new, wrench = pf.DistributedModel(patch_of(positions, weights), LAW).step(state, twist, 2.0, 1e-4)
+    positions = draw.normal(scale=5e-3, size=(count, 2))
+    weights = draw.uniform(0.5, 1.0, count)
+    state = draw.normal(scale=5e-7, size=(2, count))
+    twist = np.array([0.002, -0.001, 0.4])
+    new, wrench = pf.DistributedModel(patch_of(positions, weights), LAW).step(
+        state, twist, 2.0, 1e-4
+    )
     total = np.zeros(3)
     for i, share in enumerate(2.0 * weights / weights.sum()):
         alone = pf.DistributedModel(patch_of(positions[i : i + 1], np.ones(1)), LAW)
@@ -48,10 +69,13 @@ def test_a_step_of_many_cells_is_that_of_each_alone(count):
 def test_rollouts_of_many_cells_take_the_steps_of_the_model(count):
     """So do the states and gradients that are read from blocks: those of a sum do not depend on the order of cells."""
     draw = np.random.default_rng(count)
-    positions, weights = draw.normal(scale=5e-3, size=(count, 2)), draw.uniform(0.5, 1.0, count)
-    twists, order = draw.normal(scale=(2e-3, 2e-3, 0.3), size=(6, 3)), draw.permutation(count)
+    positions = draw.normal(scale=5e-3, size=(count, 2))
+    weights = draw.uniform(0.5, 1.0, count)
+    twists = draw.normal(scale=(2e-3, 2e-3, 0.3), size=(6, 3))
+    order = draw.permutation(count)
     model = pf.DistributedModel(patch_of(positions, weights), LAW)
-    state, wrenches = model.rest(), []
+    state = model.rest()
+    wrenches = []
     for twist in twists:
         state, wrench = model.step(state, twist, 2.0, 1e-4)
         wrenches.append(wrench)
@@ -61,4 +85,6 @@ def test_rollouts_of_many_cells_take_the_steps_of_the_model(count):
     given = None, twists, 2.0, 1e-4, np.ones((6, 3))
     slopes, others = (rollout_vjp(each, *given) for each in (model, turned))
     np.testing.assert_allclose(slopes.twist, others.twist, rtol=1e-7, atol=1e-9)
-    np.testing.assert_allclose(slopes.state[:, order], others.state, rtol=1e-7, atol=1e-9)
+    np.testing.assert_allclose(
+        slopes.state[:, order], others.state, rtol=1e-7, atol=1e-9
+    )

@@ -24,7 +24,8 @@ LAW = LawNumbers(1e5, 300.0, 0.4, 0.5, 0.8, 1e-3, 1.7, 1.0, 0.3, 0.0)
 @kernel
 def _traction(law, z, u):
     """A cell's friction while its bristle moves."""
-    speed, size = norm(u), norm(z)
+    speed = norm(u)
+    size = norm(z)
     grip = law.sigma_0 / formulas.stribeck(xp, speed, law)
     along = dot(z, u) * per(size)
     k = formulas.bristle_decay(xp, size * grip, along, speed, grip, law)
@@ -33,17 +34,26 @@ def _traction(law, z, u):
     return (x - law.sigma_2 * u[0], y - law.sigma_2 * u[1]), k
 
 
-BY = "z", "u", "law.sigma_0", "law.sigma_1", "law.mu_c", "law.mu_s", "law.v_s", "law.gamma", "law.breakaway_ratio"
+BY = (
+    "z",
+    "u",
+    "law.sigma_0",
+    "law.sigma_1",
+    "law.mu_c",
+    "law.mu_s",
+    "law.v_s",
+    "law.gamma",
+    "law.breakaway_ratio",
+)
 TRACTION = derive(_traction, BY, ("z", "u"))
 
 
 def test_derivatives_are_those_of_60_digits():
-    rng, worst = np.random.default_rng(0), 0.0
+    rng = np.random.default_rng(0)
+    worst = 0.0
     for _ in range(100):
-        (size, speed), (of_bristle, of_velocity) = (
-            10.0 ** rng.uniform([-12.0, -12.0], [-4.0, 0.0]),
-            rng.uniform(0, 6.28, 2),
-        )
+        (size, speed) = 10.0 ** rng.uniform([-12.0, -12.0], [-4.0, 0.0])
+        (of_bristle, of_velocity) = rng.uniform(0, 6.28, 2)
         z = float(size * math.cos(of_bristle)), float(size * math.sin(of_bristle))
         u = float(speed * math.cos(of_velocity)), float(speed * math.sin(of_velocity))
         worst = max(worst, misfit(TRACTION, (LAW, z, u)))
@@ -53,12 +63,23 @@ def test_derivatives_are_those_of_60_digits():
 def test_at_kinks_the_conventions_hold():
     @kernel
     def kinks(x, y):
-        return xp.minimum(x, y) + 10.0 * xp.maximum(x, y), xp.power(x, y), norm((x, x)), per(x), math.sqrt(x)
+        return (
+            xp.minimum(x, y) + 10.0 * xp.maximum(x, y),
+            xp.power(x, y),
+            norm((x, x)),
+            per(x),
+            math.sqrt(x),
+        )
 
     derived = derive(kinks, ("x", "y"))
 
     def pull(x, y, i):
-        return pulled(derived.forth, derived.back, (x, y), tuple(1.0 if i == k else 0.0 for k in range(5)))
+        return pulled(
+            derived.forth,
+            derived.back,
+            (x, y),
+            tuple(1.0 if i == k else 0.0 for k in range(5)),
+        )
 
     assert pull(2.0, 2.0, 0) == (11.0, 0.0)  # of equal numbers the first counts
     assert pull(0.0, 2.0, 1) == (0.0, 0.0)
@@ -75,7 +96,10 @@ def test_no_dust_where_a_bristle_sticks_or_is_fully_deflected():
     """Long steps multiply the slope by 1e9, small deflections by one over them: rounding of a cosine would show."""
     derived = derive(_decay, ("deflection", "law.breakaway_ratio"))
     for deflection in (0.0, 0.1, LAW.breakaway_ratio, 1.0, 1.5):
-        assert pulled(derived.forth, derived.back, (deflection, LAW), (1.0,)) == (0.0, 0.0)
+        assert pulled(derived.forth, derived.back, (deflection, LAW), (1.0,)) == (
+            0.0,
+            0.0,
+        )
     assert pulled(derived.forth, derived.back, (0.6, LAW), (1.0,))[0] > 1e3
 
 
@@ -88,7 +112,10 @@ def test_a_rule_goes_before_the_source():
     def scaled(x, y):
         return rounded(x) * y
 
-    with pytest.raises(NotStraightError, match=r"floor.* has no source to write derivatives from: give it a `rule`"):
+    with pytest.raises(
+        NotStraightError,
+        match=r"floor.* has no source to write derivatives from: give it a `rule`",
+    ):
         derive(scaled, ("x",))
     rule(rounded, "s", {0: "5.0"})
     derived = derive(scaled, ("x", "y"))
@@ -168,7 +195,12 @@ print(derived.source, derived.forth.py_func.__code__.co_filename)
 
 def test_generated_text_is_the_same_in_every_process():
     texts = [
-        subprocess.run([sys.executable, "-c", PROGRAM % (n, n)], capture_output=True, text=True, check=True).stdout
+        subprocess.run(
+            [sys.executable, "-c", PROGRAM % (n, n)],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
         for n in (0, 7)
     ]
     assert texts[0] == texts[1] and "slip_fraction" in texts[0]

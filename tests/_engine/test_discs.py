@@ -13,19 +13,32 @@ from planarfriction._engine.cells import cell_passes, cells
 from planarfriction._engine.cells.cell_blocks import LANES
 from planarfriction._engine.codegen.twins import twin
 
-LAW = LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9).numbers
-PLAIN = LuGre(mu_c=0.4, mu_s=0.6, v_s=1e-3, sigma_0=1e5, sigma_1=3e2, sigma_2=0.1).numbers
+LAW = LuGre(
+    mu_c=1.0,
+    mu_s=1.2,
+    v_s=1e-3,
+    sigma_0=1e6,
+    sigma_1=8e2,
+    sigma_2=0.2,
+    elasto_plastic=0.9,
+).numbers
+PLAIN = LuGre(
+    mu_c=0.4, mu_s=0.6, v_s=1e-3, sigma_0=1e5, sigma_1=3e2, sigma_2=0.1
+).numbers
 KAPPA = math.sqrt(0.5)
 SPEEDS = st.floats(-1.0, 1.0).map(lambda x: 0.05 * x)
 
-sliding, evaluate, step, point_step = map(twin, (discs.sliding, discs.evaluate, discs.step, points.step))
+sliding, evaluate, step, point_step = map(
+    twin, (discs.sliding, discs.evaluate, discs.step, points.step)
+)
 
 
 def _mean_speed(q):
     """Return the mean speed of a disc of radius 1 that spins at 1 and slides at q, by quadrature."""
     radius = np.sqrt((np.arange(600) + 0.5) / 600)  # rings of equal area
     angle = 2.0 * np.pi * (np.arange(720) + 0.5) / 720
-    x, y = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
+    x = radius[:, None] * np.cos(angle)
+    y = radius[:, None] * np.sin(angle)
     return np.hypot(q - y, x).mean()
 
 
@@ -58,20 +71,26 @@ def test_slopes_at_pure_spin_and_far_from_the_disc_are_exact():
 
 @given(SPEEDS, SPEEDS, SPEEDS)
 def test_friction_is_the_gradient_of_the_mean_speed(x, y, s):
-    u, h = np.array([x, y, s]), 1e-7
+    u = np.array([x, y, s])
+    h = 1e-7
     size = np.abs(u).max()
     if size < 1e-4:  # differences of numbers near rounding
         return
     _, _, speed, pull = sliding(tuple(u))
     for k, unit in enumerate(np.eye(3)):
-        above, below = (sliding(tuple(u + sign * h * size * unit))[2] for sign in (1.0, -1.0))
-        assert (above - below) / (2.0 * h * size) == pytest.approx(pull[k] / speed, abs=1e-6)
+        above, below = (
+            sliding(tuple(u + sign * h * size * unit))[2] for sign in (1.0, -1.0)
+        )
+        assert (above - below) / (2.0 * h * size) == pytest.approx(
+            pull[k] / speed, abs=1e-6
+        )
     assert np.dot(pull, u) == pytest.approx(speed * speed, rel=1e-13)
 
 
 @pytest.mark.parametrize("law", [LAW, PLAIN])
 def test_a_disc_without_a_radius_is_a_point(law):
-    z, u = (3e-7, -5e-7), (2e-3, 1e-3)
+    z = (3e-7, -5e-7)
+    u = (2e-3, 1e-3)
     flat = (*z, 0.0), (*u, 0.0)
     point, pull = point_step(law, z, u, 1e-4)
     new, traction = step(law, *flat, 1e-4)
@@ -91,7 +110,8 @@ def test_bristles_settle_where_sliding_is_steady(law):
 
 def test_a_step_is_of_second_order_in_dt():
     """From z half bent: errors of 40, 80 and 160 steps beside 5120 fall by four at each doubling."""
-    u, ends = (1e-3, 4e-4, 8e-4), {}
+    u = (1e-3, 4e-4, 8e-4)
+    ends = {}
     for count in (40, 80, 160, 5120):
         z = (2e-7, 0.0, -3e-7)
         for _ in range(count):
@@ -114,21 +134,34 @@ def test_numbers_stay_finite_at_any_speed(speed):
 def test_passes_step_as_the_function_they_come_from(count):
     """Sums run in another order, and functions are polynomials: 1e-12 of the largest term."""
     rng = np.random.default_rng(count)
-    law = LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
-    places, radii, pressure = (
-        rng.normal(size=(count, 2)) * 5e-3,
-        rng.uniform(size=count) * 3e-3,
-        rng.uniform(size=count),
+    law = LuGre(
+        mu_c=1.0,
+        mu_s=1.2,
+        v_s=1e-3,
+        sigma_0=1e6,
+        sigma_1=8e2,
+        sigma_2=0.2,
+        elasto_plastic=0.9,
     )
+    places = rng.normal(size=(count, 2)) * 5e-3
+    radii = rng.uniform(size=count) * 3e-3
+    pressure = rng.uniform(size=count)
     patch = ContactPatch(places, np.full(count, 1e-6), pressure, radii=radii)
-    twist, z = tuple(rng.normal(size=3) * (1e-3, 1e-3, 0.2)), rng.normal(size=(3, count)) * 5e-7
+    twist = tuple(rng.normal(size=3) * (1e-3, 1e-3, 0.2))
+    z = rng.normal(size=(3, count)) * 5e-7
     new, wrench = DistributedModel(patch, law).step(z, twist, 2.0, 1e-4)
     total = np.zeros(3)
     for i, (x, y) in enumerate(places):
         cell = x, y, KAPPA * radii[i]
-        expected, traction = step(LAW, tuple(z[:, i]), twin(cells.DISC_POSITIONS.seen)(cell, twist), 1e-4)
+        expected, traction = step(
+            LAW, tuple(z[:, i]), twin(cells.DISC_POSITIONS.seen)(cell, twist), 1e-4
+        )
         assert new[:, i] == pytest.approx(expected, rel=1e-11, abs=1e-18)
-        total += 2.0 * patch.weights()[i] * np.array(twin(cells.DISC_POSITIONS.wrench)(cell, traction))
+        total += (
+            2.0
+            * patch.weights()[i]
+            * np.array(twin(cells.DISC_POSITIONS.wrench)(cell, traction))
+        )
     assert wrench == pytest.approx(total, rel=1e-11, abs=1e-13)
 
 

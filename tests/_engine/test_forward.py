@@ -25,24 +25,37 @@ def _both(law, z, u, dt, dz, du, bar_new, bar_pull):
     new, pull, d_new, d_pull = _pushed(law, z, u, dt, dz, du)
     found, tape = _forth(law, z, u, dt)
     by_z, by_u = _back(tape, (bar_new, bar_pull))
-    return (new, pull), found, dot(bar_new, d_new) + dot(bar_pull, d_pull), dot(by_z, dz) + dot(by_u, du)
+    return (
+        (new, pull),
+        found,
+        dot(bar_new, d_new) + dot(bar_pull, d_pull),
+        dot(by_z, dz) + dot(by_u, du),
+    )
 
 
 def test_forwards_and_reverse_agree_on_the_step_of_a_bristle():
     rng = np.random.default_rng(0)
     for _ in range(200):
-        z, u, dz, du = (tuple(scale * rng.normal(size=2)) for scale in (3e-6, 5e-3, 1e-6, 1e-3))
+        z, u, dz, du = (
+            tuple(scale * rng.normal(size=2)) for scale in (3e-6, 5e-3, 1e-6, 1e-3)
+        )
         dt = 10.0 ** rng.uniform(-6.0, -2.0)
-        step, found, forwards, reverse = _both(LAW, z, u, dt, dz, du, (1e6, -2e6), (1.0, 0.5))
+        step, found, forwards, reverse = _both(
+            LAW, z, u, dt, dz, du, (1e6, -2e6), (1.0, 0.5)
+        )
         for one, other in zip(step, found, strict=True):
-            assert one == pytest.approx(other, rel=1e-13, abs=1e-14 * max(map(abs, other)))
+            assert one == pytest.approx(
+                other, rel=1e-13, abs=1e-14 * max(map(abs, other))
+            )
         assert forwards == pytest.approx(reverse, rel=1e-9, abs=1e-9)
 
 
 @kernel
 def _curved(z, k):
     x, y = z
-    return times(xp.exp(-x / k) / norm(z), (square(z), x * xp.sin(y))), -xp.power(y, k) + xp.log(y) * xp.cos(x)
+    return times(xp.exp(-x / k) / norm(z), (square(z), x * xp.sin(y))), -xp.power(
+        y, k
+    ) + xp.log(y) * xp.cos(x)
 
 
 _once = forward(_curved, ("z",), ("z",))
@@ -66,7 +79,12 @@ def _curvature(z, k, d, a, b):
 
 
 def test_a_change_is_differentiated_once_more():
-    z, k, d, a, b, h = np.array([0.4, 0.9]), 1.5, (0.3, -0.7), (0.6, 1.1), -0.8, 1e-5
+    z = np.array([0.4, 0.9])
+    k = 1.5
+    d = (0.3, -0.7)
+    a = (0.6, 1.1)
+    b = -0.8
+    h = 1e-5
 
     def cost(x) -> float:
         (one, other), _ = _curvature(tuple(x), k, d, a, b)
@@ -89,16 +107,26 @@ def test_what_is_no_straight_line_is_named():
 def test_several_directions_skip_what_does_not_change():
     """`sigma_1` and `sigma_2` move no bristle; other changes are those along one direction."""
     names = "sigma_0", "sigma_1", "sigma_2", "v_s"
-    directions = tuple((f"law.{name}", "z")[: 1 if name in ("sigma_1", "sigma_2") else 2] for name in names)
+    directions = tuple(
+        (f"law.{name}", "z")[: 1 if name in ("sigma_1", "sigma_2") else 2]
+        for name in names
+    )
     many, moved = forwards(cell, directions, ("z", "u"))
     assert moved == ((True, True), (False, True), (False, True), (True, True))
     first, second, third, fourth = (forward(cell, by, ("z", "u")) for by in directions)
 
     @njit
     def both(law, z, u, dt, dz):
-        one, two = first(law, z, u, dt, 1.0, dz), fourth(law, z, u, dt, 1.0, dz)
-        three, four = second(law, z, u, dt, 1.0), third(law, z, u, dt, 1.0)
-        return many(law, z, u, dt, 1.0, dz, 1.0, 1.0, 1.0, dz), (*one, *three[2:], *four[2:], *two[2:])
+        one = first(law, z, u, dt, 1.0, dz)
+        two = fourth(law, z, u, dt, 1.0, dz)
+        three = second(law, z, u, dt, 1.0)
+        four = third(law, z, u, dt, 1.0)
+        return many(law, z, u, dt, 1.0, dz, 1.0, 1.0, 1.0, dz), (
+            *one,
+            *three[2:],
+            *four[2:],
+            *two[2:],
+        )
 
     found, expected = both(LAW, (2e-6, -1e-6), (4e-3, 1e-3), 1e-4, (1e-6, 2e-6))
     np.testing.assert_allclose(found, expected, rtol=1e-12)

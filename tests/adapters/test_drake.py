@@ -11,7 +11,9 @@ import pytest
 
 import planarfriction as pf
 
-pytest.importorskip("pydrake", reason="Drake is not installed: pip install 'planarfriction[drake]'")
+pytest.importorskip(
+    "pydrake", reason="Drake is not installed: pip install 'planarfriction[drake]'"
+)
 
 from pydrake.common.value import Value
 from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, Sphere
@@ -21,13 +23,25 @@ from pydrake.multibody.plant import CoulombFriction, ExternallyAppliedSpatialFor
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import EventStatus
-from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource, LogVectorOutput
+from pydrake.systems.primitives import (
+    ConstantValueSource,
+    ConstantVectorSource,
+    LogVectorOutput,
+)
 
 from planarfriction.adapters.drake import Friction, PatchContact, prepare
 from planarfriction.adapters.drake.friction import EXPECTED
 from planarfriction.errors import InvalidValueError, MissingExtraError
 from planarfriction_studies.bench.coulomb_disc import stop
-from tests.support.drake_scenes import CONTACTS, bare, gripped, gripper, on_the_floor, running, sliding
+from tests.support.drake_scenes import (
+    CONTACTS,
+    bare,
+    gripped,
+    gripper,
+    on_the_floor,
+    running,
+    sliding,
+)
 
 pytestmark = pytest.mark.drake
 
@@ -52,7 +66,8 @@ def _patches(box: str = "box") -> list[PatchContact]:
 @pytest.mark.parametrize("dt", [2e-3, 1e-2])
 def test_a_box_on_an_incline_does_not_creep(contact, dt):
     """From the touch-down on: mean places in two times of 0.3 s, which the noise of Drake's solver does not reach."""
-    run, places = sliding("box", contact, dt, BOX, tilt=0.3), []
+    run = sliding("box", contact, dt, BOX, tilt=0.3)
+    places = []
     for i in range(round(0.9 / dt)):
         run.to((i + 1) * dt)
         report = run.friction.GetReport(run.own)
@@ -60,7 +75,8 @@ def test_a_box_on_an_incline_does_not_creep(contact, dt):
         places.append(run.plant.GetPositions(run.context)[4])
     early, late = np.split(np.array(places[round(0.3 / dt) :]), 2)
     assert abs(late.mean() - early.mean()) < 0.3 * 1e-9
-    force, load = run.friction.get_wrenches_output_port().Eval(run.own), run.friction.get_loads_output_port()
+    force = run.friction.get_wrenches_output_port().Eval(run.own)
+    load = run.friction.get_loads_output_port()
     np.testing.assert_allclose(force[:2], [-0.2 * 9.81 * np.sin(0.3), 0.0], atol=1e-4)
     np.testing.assert_allclose(load.Eval(run.own), 0.2 * 9.81 * np.cos(0.3), atol=1e-4)
 
@@ -68,7 +84,8 @@ def test_a_box_on_an_incline_does_not_creep(contact, dt):
 @pytest.mark.parametrize("contact", CONTACTS)
 @pytest.mark.parametrize("dt", [2e-3, 1e-2])
 def test_a_grip_beside_the_centre_of_mass_holds(contact, dt):
-    run, places = gripped(contact, dt, PAD), []
+    run = gripped(contact, dt, PAD)
+    places = []
     block = run.plant.GetBodyByName("block")
     for i in range(round(0.6 / dt)):
         run.to((i + 1) * dt)
@@ -89,21 +106,35 @@ def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness():
     """Press with 3 N +- 20 % at 2 Hz: the published law lets the part swing by more."""
     swings = []
     for reference in (3.0, None):
-        law = dataclasses.replace(LAW, sigma_0=1e4, sigma_1=20.0, reference_load=reference)
+        law = dataclasses.replace(
+            LAW, sigma_0=1e4, sigma_1=20.0, reference_load=reference
+        )
         builder, plant, scene_graph, press = gripper("point", 2e-3)
         patches = [
-            PatchContact(PAD.with_law(law), frame=side, geometries=(side + " pad", "block"), centre="contact")
+            PatchContact(
+                PAD.with_law(law),
+                frame=side,
+                geometries=(side + " pad", "block"),
+                centre="contact",
+            )
             for side in ("left", "right")
         ]
         prepare(plant, scene_graph, patches)
-        run, places = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)), []
+        run = running(
+            builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+        )
+        places = []
         source = press.GetMyMutableContextFromRoot(run.simulator.get_mutable_context())
         for i in range(500):
             load = 3.0 * (1.0 + 0.2 * np.sin(4.0 * np.pi * 2e-3 * i))
             press.get_mutable_source_value(source).set_value([load, load])
             run.to((i + 1) * 2e-3)
             assert run.friction.GetReport(run.own).converged
-            places.append(run.plant.EvalBodyPoseInWorld(run.context, plant.GetBodyByName("block")).translation()[2])
+            places.append(
+                run.plant.EvalBodyPoseInWorld(
+                    run.context, plant.GetBodyByName("block")
+                ).translation()[2]
+            )
         swings.append(np.ptp(places[250:]))
     assert swings[0] < 0.01 * swings[1]
 
@@ -112,10 +143,15 @@ STARTS = ((1.0, 10.0), (1.0, 20.0), (1.0, 3.0))
 """Speed [m/s] and spin [rad/s]."""
 
 
-@pytest.mark.parametrize(("start", "contact"), [(start, "point") for start in STARTS] + [((1.0, 10.0), "hydroelastic")])
+@pytest.mark.parametrize(
+    ("start", "contact"),
+    [(start, "point") for start in STARTS] + [((1.0, 10.0), "hydroelastic")],
+)
 def test_a_disc_slides_and_spins_to_rest_where_theory_says(contact, start):
     """Less the stepper's own `v dt / 2`."""
-    dt, (speed, spin), (_, distance, angle) = 2e-3, start, stop(*start)
+    dt = 2e-3
+    (speed, spin) = start
+    (_, distance, angle) = stop(*start)
     run = sliding("disc", contact, dt, DISC)
     run.to(0.2)
     run.plant.SetVelocities(run.context, [0.0, 0.0, spin, speed, 0.0, 0.0])
@@ -124,17 +160,25 @@ def test_a_disc_slides_and_spins_to_rest_where_theory_says(contact, start):
         run.to(0.2 + (i + 1) * dt)
         poses.append(run.plant.GetPositions(run.context))
     assert abs(run.plant.GetVelocities(run.context)).max() < 1e-5
-    halves, x = np.unwrap([np.arctan2(pose[3], pose[0]) for pose in poses], period=np.pi), [pose[4] for pose in poses]
+    halves = np.unwrap([np.arctan2(pose[3], pose[0]) for pose in poses], period=np.pi)
+    x = [pose[4] for pose in poses]
     assert x[-1] - x[0] + 0.5 * speed * dt == pytest.approx(distance, rel=5e-4)
-    assert 2.0 * (halves[-1] - halves[0]) + 0.5 * spin * dt == pytest.approx(angle, rel=2e-3)
+    assert 2.0 * (halves[-1] - halves[0]) + 0.5 * spin * dt == pytest.approx(
+        angle, rel=2e-3
+    )
 
 
-@pytest.mark.parametrize("options", [{"sampled": False}, {"solver": "sap"}, {"solver": "similar"}])
+@pytest.mark.parametrize(
+    "options", [{"sampled": False}, {"solver": "sap"}, {"solver": "similar"}]
+)
 def test_other_kinds_of_discrete_plants_slide_alike(options):
     """Live output ports; other approximations of contact, which without friction are of the same normal forces."""
 
     def slid(sampled: bool = True, solver: str = "lagged") -> np.ndarray:
-        kind = {"use_sampled_output_ports": sampled, "discrete_contact_approximation": solver}
+        kind = {
+            "use_sampled_output_ports": sampled,
+            "discrete_contact_approximation": solver,
+        }
         run = sliding("disc", "point", 2e-3, DISC, **kind)
         run.to(0.1)
         run.plant.SetVelocities(run.context, [0.0, 0.0, 10.0, 1.0, 0.0, 0.0])
@@ -153,7 +197,8 @@ def test_other_kinds_of_discrete_plants_slide_alike(options):
 def test_free_bodies_answer_as_the_joints_are_damped():
     """Differences of steps of the copy: no contact, pads on slides with damping, which Drake takes implicitly."""
     run = gripped("point", 2e-3, PAD)
-    shadow, size = run.friction._shadow, run.plant.num_velocities()
+    shadow = run.friction._shadow
+    size = run.plant.num_velocities()
     state = run.plant.GetPositionsAndVelocities(run.context)
     state[run.plant.num_positions() - 2 : run.plant.num_positions()] = -0.1
     shadow.begin(state, {})
@@ -167,16 +212,25 @@ def test_free_bodies_answer_as_the_joints_are_damped():
 def test_answers_learnt_are_differences_of_steps():
     """A box on four feet, each a patch: what pulls at one shifts the loads of all."""
     builder, plant, scene_graph = on_the_floor("box", "point", 2e-3)
-    patches = [PatchContact(PAD, frame="bottom", geometries=("floor", f"foot {i}"), centre="contact") for i in range(4)]
+    patches = [
+        PatchContact(
+            PAD, frame="bottom", geometries=("floor", f"foot {i}"), centre="contact"
+        )
+        for i in range(4)
+    ]
     prepare(plant, scene_graph, patches)
-    run = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    run = running(
+        builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    )
     run.to(0.3)
-    asking, shadow = run.friction._asking, run.friction._shadow
+    asking = run.friction._asking
+    shadow = run.friction._shadow
     shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
     asking._forget()
 
     def came_out(wrench):
-        velocity, pushes = shadow.step(wrench @ asking._rows), shadow.pushes(first=True)
+        velocity = shadow.step(wrench @ asking._rows)
+        pushes = shadow.pushes(first=True)
         asking._touch(pushes, np.zeros(asking._coupled.state_shape), *np.zeros((3, 12)))
         return asking._rows @ velocity, (asking._normals * pushes[:, :3]).sum(axis=1)
 
@@ -185,10 +239,17 @@ def test_answers_learnt_are_differences_of_steps():
     free = asking._row.response.copy()
     pull = np.tile([0.03, 0.01, 0.0], 4)
     other_twist, other_load = came_out(pull)
-    assert abs(other_load - load).max() > 5e-3 and abs(free @ pull - (other_twist - twist)).max() > 1e-4
+    assert (
+        abs(other_load - load).max() > 5e-3
+        and abs(free @ pull - (other_twist - twist)).max() > 1e-4
+    )
     asking._learn(pull, other_twist - twist, other_load - load)
-    np.testing.assert_allclose(asking._row.response @ pull, other_twist - twist, atol=1e-12)
-    np.testing.assert_allclose(asking._row.load_response @ pull, other_load - load, atol=1e-12)
+    np.testing.assert_allclose(
+        asking._row.response @ pull, other_twist - twist, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        asking._row.load_response @ pull, other_load - load, atol=1e-12
+    )
     np.testing.assert_allclose(asking._row.response, asking._row.response.T, atol=1e-15)
     assert np.linalg.eigvalsh(free - asking._row.response)[0] > -1e-12
 
@@ -198,39 +259,54 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     run = sliding("box", "point", 2e-3, BOX, tilt=0.3)
     run.to(0.02)
     run.plant.SetVelocities(run.context, [1.0, 0.0, 0.0, 0.1, 0.0, -0.1])
-    asking, shadow, given = run.friction._asking, run.friction._shadow, np.array([1e-4, 0.0, 0.0])
+    asking = run.friction._asking
+    shadow = run.friction._shadow
+    given = np.array([1e-4, 0.0, 0.0])
     parts = run.friction._parts
     own = run.own.get_discrete_state_vector().value().copy()
     before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
     monkeypatch.setattr("planarfriction.adapters.drake.asking.MISFIT", 1.0)
     shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
-    asked = asking.step(np.zeros(6), *before, given, own[parts["axes"]], own[parts["answers"]])
+    asked = asking.step(
+        np.zeros(6), *before, given, own[parts["axes"]], own[parts["answers"]]
+    )
     came_out = asking._twists(shadow.step(asked.force))
     assert abs(asked.owed).max() > 1e-5
     np.testing.assert_allclose(asked.twists, came_out, atol=1e-9)
-    np.testing.assert_allclose(asking._row.twist + asked.owed, came_out + given, atol=1e-9)
+    np.testing.assert_allclose(
+        asking._row.twist + asked.owed, came_out + given, atol=1e-9
+    )
     monkeypatch.undo()
     run = sliding("box", "point", 2e-3, BOX)
     run.to(0.3)
     own = run.own.get_discrete_state_vector().value().copy()
-    before = [own[run.friction._parts[name]] for name in ("bristles", "wrenches", "force")]
+    before = [
+        own[run.friction._parts[name]] for name in ("bristles", "wrenches", "force")
+    ]
     run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
     rest = given, own[run.friction._parts["axes"]], own[run.friction._parts["answers"]]
     asked = run.friction._asking.step(np.zeros(6), *before, *rest)
-    np.testing.assert_allclose(asked.twists, -given, atol=2e-6)  # pulled back, but for what bristles give
+    np.testing.assert_allclose(
+        asked.twists, -given, atol=2e-6
+    )  # pulled back, but for what bristles give
 
 
 def test_answers_that_lead_away_are_forgotten():
     """Answers of the last step that are far too stiff, as where a contact has gone: each pass would overshoot."""
     run = sliding("box", "point", 2e-3, BOX, tilt=0.3)
     run.to(0.3)
-    own, parts = run.own.get_discrete_state_vector().value().copy(), run.friction._parts
+    own = run.own.get_discrete_state_vector().value().copy()
+    parts = run.friction._parts
     answers = own[parts["answers"]]
     answers[1:10] *= 0.02
     run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
     before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
     asked = run.friction._asking.step(
-        np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0]), *before, np.zeros(3), own[parts["axes"]], answers
+        np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0]),
+        *before,
+        np.zeros(3),
+        own[parts["axes"]],
+        answers,
     )
     passes, _, _, misfit, _ = asked.report
     assert passes < 10 and misfit <= MISFIT
@@ -246,7 +322,10 @@ def test_twists_and_wrenches_are_in_the_axes_of_the_frame(contact):
     run.plant.SetPositions(run.context, state)
     run.plant.SetVelocities(run.context, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
     run.to(0.11)
-    twist, wrench = (run.friction.GetOutputPort(name).Eval(run.own) for name in ("twists", "wrenches"))
+    twist, wrench = (
+        run.friction.GetOutputPort(name).Eval(run.own)
+        for name in ("twists", "wrenches")
+    )
     speed = run.plant.GetVelocities(run.context)[3]
     np.testing.assert_allclose(twist, [0.0, -speed, 0.0], atol=1e-4)
     np.testing.assert_allclose(wrench[:2], [0.0, 0.3 * 0.2 * 9.81], atol=2e-2)
@@ -261,11 +340,17 @@ def test_what_else_drives_the_plant_is_seen():
         patches = _patches()
         prepare(plant, scene_graph, patches)
         pull = builder.AddSystem(ConstantVectorSource([0.0, 0.0, 0.0, force, 0.0, 0.0]))
-        builder.Connect(pull.get_output_port(), plant.get_applied_generalized_force_input_port())
-        run = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+        builder.Connect(
+            pull.get_output_port(), plant.get_applied_generalized_force_input_port()
+        )
+        run = running(
+            builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+        )
         run.to(0.4)
         assert run.friction.GetReport(run.own).misfit <= MISFIT
-        return run.plant.GetPositions(run.context)[4], run.friction.get_wrenches_output_port().Eval(run.own)[0]
+        return run.plant.GetPositions(run.context)[
+            4
+        ], run.friction.get_wrenches_output_port().Eval(run.own)[0]
 
     slid, friction = moved(1.5)
     assert abs(slid) < 1e-4 and friction == pytest.approx(-1.5, rel=1e-3)
@@ -281,20 +366,25 @@ def test_contexts_that_are_cloned_go_on_alike():
     run.to(0.1)
     run.plant.SetVelocities(run.context, [0.0, 0.0, 10.0, 1.0, 0.0, 0.0])
     run.to(0.15)
-    diagram, ends = run.simulator.get_system(), []
+    diagram = run.simulator.get_system()
+    ends = []
     others = [run.simulator.get_context().Clone() for _ in range(2)]
     for context in (run.simulator.get_mutable_context(), *others):
         Simulator(diagram, context).AdvanceTo(0.2)
         ends.append(
             (
                 context.get_discrete_state(0).value(),
-                run.plant.GetPositionsAndVelocities(run.plant.GetMyContextFromRoot(context)),
+                run.plant.GetPositionsAndVelocities(
+                    run.plant.GetMyContextFromRoot(context)
+                ),
             )
         )
     ends = [np.concatenate(each) for each in ends]
     assert np.array_equal(ends[0], ends[1]) and np.array_equal(ends[1], ends[2])
     bristles = run.friction.GetBristles(run.own)
-    assert [each.shape for each in bristles] == [DISC.state_shape] and abs(bristles[0]).max() > 0.0
+    assert [each.shape for each in bristles] == [DISC.state_shape] and abs(
+        bristles[0]
+    ).max() > 0.0
     run.friction.SetDefaultContext(run.own)
     assert not run.friction.GetBristles(run.own)[0].any()
 
@@ -310,7 +400,8 @@ def test_ports_can_be_logged_watched_and_drawn():
         "generalized_force": friction.get_generalized_force_output_port(),
     }  # fmt: skip
     logs = {name: LogVectorOutput(port, builder, 2e-3) for name, port in ports.items()}
-    run, seen = running(builder, plant, friction), []
+    run = running(builder, plant, friction)
+    seen = []
 
     def watch(root):
         seen.append(friction.GetReport(friction.GetMyContextFromRoot(root)).passes)
@@ -318,14 +409,21 @@ def test_ports_can_be_logged_watched_and_drawn():
 
     run.simulator.set_monitor(watch)
     run.to(0.1)
-    data = {name: log.FindLog(run.simulator.get_context()).data() for name, log in logs.items()}
+    data = {
+        name: log.FindLog(run.simulator.get_context()).data()
+        for name, log in logs.items()
+    }
     assert {name: len(each) for name, each in data.items()} == {
         "wrenches": 3, "twists": 3, "loads": 1, "report": 6, "generalized_force": 6,
     }  # fmt: skip
     assert len(seen) >= 50 and max(seen) <= 5 and data["report"][0].max() == max(seen)
-    np.testing.assert_array_equal(data["wrenches"][:, -1], ports["wrenches"].Eval(run.own))
+    np.testing.assert_array_equal(
+        data["wrenches"][:, -1], ports["wrenches"].Eval(run.own)
+    )
     # what the plant gets at a step is what the wrenches of that step were
-    np.testing.assert_allclose(data["generalized_force"][3, 5:-1], data["wrenches"][0, 6:], atol=1e-6)
+    np.testing.assert_allclose(
+        data["generalized_force"][3, 5:-1], data["wrenches"][0, 6:], atol=1e-6
+    )
     assert "patch_friction" in run.simulator.get_system().GetGraphvizString()
     assert "patch_friction" in str(run.simulator.get_context())
 
@@ -337,7 +435,9 @@ def test_what_is_connected_later_is_refused_by_drake():
     Friction.AddToBuilder(builder, plant, scene_graph, patches)
     late = builder.AddSystem(ConstantVectorSource(np.zeros(6)))
     with pytest.raises((RuntimeError, SystemExit), match=r"AlreadyWired|already"):
-        builder.Connect(late.get_output_port(), plant.get_applied_generalized_force_input_port())
+        builder.Connect(
+            late.get_output_port(), plant.get_applied_generalized_force_input_port()
+        )
     assert builder.IsConnectedOrExported(plant.get_applied_spatial_force_input_port())
 
 
@@ -346,14 +446,17 @@ def test_friction_is_added_once():
     builder, plant, scene_graph = on_the_floor("box", "point", 2e-3)
     prepare(plant, scene_graph, _patches())
     Friction.AddToBuilder(builder, plant, scene_graph, _patches())
-    with pytest.raises(InvalidValueError, match="plant must have no patch friction yet"):
+    with pytest.raises(
+        InvalidValueError, match="plant must have no patch friction yet"
+    ):
         Friction.AddToBuilder(builder, plant, scene_graph, _patches())
 
 
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_parameters_changed_in_a_context_are_noticed(contact):
     """The plant slides with ten times the mass, or as it is: a state that is set surprises once."""
-    run, warned = sliding("disc", contact, 2e-3, DISC), "parameters in its context are not those"
+    run = sliding("disc", contact, 2e-3, DISC)
+    warned = "parameters in its context are not those"
     run.to(0.1)
     run.plant.SetVelocities(run.context, [0.0, 0.0, 0.0, 0.5, 0.0, 0.0])
     run.to(0.102)
@@ -373,21 +476,34 @@ def test_spatial_forces_are_seen():
     patches = _patches()
     prepare(plant, scene_graph, patches)
     pull = ExternallyAppliedSpatialForce()
-    pull.body_index, pull.p_BoBq_B = plant.GetBodyByName("box").index(), np.zeros(3)
+    pull.body_index = plant.GetBodyByName("box").index()
+    pull.p_BoBq_B = np.zeros(3)
     pull.F_Bq_W = SpatialForce(np.zeros(3), np.array([0.0, 1.2, 0.0]))
-    source = builder.AddSystem(ConstantValueSource(Value[list[ExternallyAppliedSpatialForce]]([pull])))
-    builder.Connect(source.get_output_port(), plant.get_applied_spatial_force_input_port())
-    run = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    source = builder.AddSystem(
+        ConstantValueSource(Value[list[ExternallyAppliedSpatialForce]]([pull]))
+    )
+    builder.Connect(
+        source.get_output_port(), plant.get_applied_spatial_force_input_port()
+    )
+    run = running(
+        builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    )
     run.to(0.3)
     assert run.friction.GetReport(run.own).misfit <= MISFIT
-    assert run.friction.get_wrenches_output_port().Eval(run.own)[1] == pytest.approx(-1.2, rel=1e-3)
+    assert run.friction.get_wrenches_output_port().Eval(run.own)[1] == pytest.approx(
+        -1.2, rel=1e-3
+    )
 
 
 # ---------------------------------------------------------------------- bad input
 
 
-def _refused(message: str, patches: list[PatchContact], *, ready: bool = True, scene=None) -> None:
-    builder, plant, scene_graph = on_the_floor("box", "point", 2e-3) if scene is None else scene
+def _refused(
+    message: str, patches: list[PatchContact], *, ready: bool = True, scene=None
+) -> None:
+    builder, plant, scene_graph = (
+        on_the_floor("box", "point", 2e-3) if scene is None else scene
+    )
     if ready:
         prepare(plant, scene_graph, _patches())
     with pytest.raises(InvalidValueError, match=message):
@@ -396,13 +512,26 @@ def _refused(message: str, patches: list[PatchContact], *, ready: bool = True, s
 
 def test_names_that_are_not_there_and_patches_that_do_not_fit_are_refused():
     def patch(**changes):
-        return PatchContact(**{"model": BOX, "frame": "bottom", "geometries": ("floor", "box"), **changes})
+        return PatchContact(
+            **{
+                "model": BOX,
+                "frame": "bottom",
+                "geometries": ("floor", "box"),
+                **changes,
+            }
+        )
 
-    _refused("frame must be a frame of the plant, got nowhere", [patch(frame="nowhere")])
     _refused(
-        "geometries must be a collision geometry or body of the plant, got lid", [patch(geometries=("floor", "lid"))]
+        "frame must be a frame of the plant, got nowhere", [patch(frame="nowhere")]
     )
-    _refused("frame must be on the body of one of the geometries", [patch(geometries=("floor", "floor"))])
+    _refused(
+        "geometries must be a collision geometry or body of the plant, got lid",
+        [patch(geometries=("floor", "lid"))],
+    )
+    _refused(
+        "frame must be on the body of one of the geometries",
+        [patch(geometries=("floor", "floor"))],
+    )
     _refused(
         "patches must have each pair of geometries once, got floor and box",
         [patch(), patch(geometries=("foot 0", "floor"))],
@@ -410,26 +539,52 @@ def test_names_that_are_not_there_and_patches_that_do_not_fit_are_refused():
     _refused("patches must hold at least one, got none", [])
     _refused("patches must be a list of patches", patch())
     _refused(
-        r"friction must be 0 on floor and box, on one of the two \(prepare does that\), got 0.5", [patch()], ready=False
+        r"friction must be 0 on floor and box, on one of the two \(prepare does that\), got 0.5",
+        [patch()],
+        ready=False,
     )
-    with pytest.raises(InvalidValueError, match="centre must be one of auto, frame, contact"):
+    with pytest.raises(
+        InvalidValueError, match="centre must be one of auto, frame, contact"
+    ):
         patch(centre="middle")
-    with pytest.raises(InvalidValueError, match="geometries must be the names of two geometries or bodies, got floor"):
+    with pytest.raises(
+        InvalidValueError,
+        match="geometries must be the names of two geometries or bodies, got floor",
+    ):
         patch(geometries="floor")
 
 
 def test_plants_that_do_not_fit_are_refused():
     scene = on_the_floor("box", "point", 0.0)
-    _refused("time_step must be > 0: friction is for discrete plants, got 0", _patches(), scene=scene)
-    _refused("plant must be finalized, got one that is not", _patches(), ready=False, scene=bare(2e-3))
+    _refused(
+        "time_step must be > 0: friction is for discrete plants, got 0",
+        _patches(),
+        scene=scene,
+    )
+    _refused(
+        "plant must be finalized, got one that is not",
+        _patches(),
+        ready=False,
+        scene=bare(2e-3),
+    )
     scene = on_the_floor("box", "point", 2e-3)
     scene[0].ExportInput(scene[1].get_applied_generalized_force_input_port())
-    _refused("plant must have no exported input .*, got applied_generalized_force", _patches(), scene=scene)
+    _refused(
+        "plant must have no exported input .*, got applied_generalized_force",
+        _patches(),
+        scene=scene,
+    )
     _, plant, scene_graph = scene = on_the_floor("box", "point", 2e-3)
     bodies = [plant.GetBodyByName(name) for name in ("box", "world")]
-    both = GeometrySet([each for body in bodies for each in plant.GetCollisionGeometriesForBody(body)])
-    scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(both))
-    message = r"geometries must be able to collide \(a collision filter keeps them apart\)"
+    both = GeometrySet(
+        [each for body in bodies for each in plant.GetCollisionGeometriesForBody(body)]
+    )
+    scene_graph.collision_filter_manager().Apply(
+        CollisionFilterDeclaration().ExcludeWithin(both)
+    )
+    message = (
+        r"geometries must be able to collide \(a collision filter keeps them apart\)"
+    )
     _refused(message, _patches(), scene=scene)
 
 
@@ -438,17 +593,25 @@ def test_a_state_that_is_not_finite_stops_the_run():
     run.to(0.01)
     state = run.context.get_mutable_discrete_state_vector()
     state.SetAtIndex(10, np.nan)
-    with pytest.raises(InvalidValueError, match="state must be finite, got nan in that of the plant"):
+    with pytest.raises(
+        InvalidValueError, match="state must be finite, got nan in that of the plant"
+    ):
         run.to(0.02)
 
 
 def test_a_name_that_means_two_geometries_is_refused_with_both():
     builder, plant, scene_graph = bare(2e-3)
     for name in ("one", "two"):
-        body = plant.AddRigidBody(name, SpatialInertia(1.0, [0, 0, 0], UnitInertia.SolidSphere(0.1)))
-        plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(0.1), "ball", CoulombFriction(0.0, 0.0))
+        body = plant.AddRigidBody(
+            name, SpatialInertia(1.0, [0, 0, 0], UnitInertia.SolidSphere(0.1))
+        )
+        plant.RegisterCollisionGeometry(
+            body, RigidTransform(), Sphere(0.1), "ball", CoulombFriction(0.0, 0.0)
+        )
     plant.Finalize()
-    message = r"geometries must be one geometry \(.*one::ball or .*two::ball\), got ball"
+    message = (
+        r"geometries must be one geometry \(.*one::ball or .*two::ball\), got ball"
+    )
     _refused(
         message,
         [PatchContact(PAD, frame="one", geometries=("ball", "two"))],
@@ -460,7 +623,11 @@ def test_a_name_that_means_two_geometries_is_refused_with_both():
 def test_without_drake_the_extra_is_named(monkeypatch):
     for name in [name for name in sys.modules if name.partition(".")[0] == "pydrake"]:
         monkeypatch.setitem(sys.modules, name, None)
-    for name in [name for name in sys.modules if name.startswith("planarfriction.adapters.drake")]:
+    for name in [
+        name for name in sys.modules if name.startswith("planarfriction.adapters.drake")
+    ]:
         monkeypatch.delitem(sys.modules, name)
-    with pytest.raises(MissingExtraError, match=r"pip install 'planarfriction\[drake\]'"):
+    with pytest.raises(
+        MissingExtraError, match=r"pip install 'planarfriction\[drake\]'"
+    ):
         importlib.import_module("planarfriction.adapters.drake")

@@ -14,7 +14,12 @@ pytest.importorskip("pydrake")
 
 from pydrake.geometry import Box, HalfSpace, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    PrismaticJoint,
+    SpatialInertia,
+    UnitInertia,
+)
 
 from planarfriction.adapters.drake import Friction, PatchContact, prepare
 from tests.support.drake_scenes import Running, bare, material, running
@@ -25,27 +30,45 @@ LAW = pf.LuGre(mu_c=0.4, sigma_2=0.0, elasto_plastic=0.9)
 CORNERS = 0.05 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 
 
-def carried(mass: float, speed: float, dt: float, contact: str, approximation: str) -> Running:
+def carried(
+    mass: float, speed: float, dt: float, contact: str, approximation: str
+) -> Running:
     """A box of 0.5 kg that is 0.1 m/s slower than its carrier, which nothing else slows down."""
     builder, plant, scene_graph = bare(dt, discrete_contact_approximation=approximation)
-    carrier = plant.AddRigidBody("carrier", SpatialInertia(mass, [0, 0, 0], UnitInertia.SolidBox(1, 1, 0.1)))
-    joint = plant.AddJoint(PrismaticJoint("x", plant.world_frame(), carrier.body_frame(), [1, 0, 0]))
+    carrier = plant.AddRigidBody(
+        "carrier", SpatialInertia(mass, [0, 0, 0], UnitInertia.SolidBox(1, 1, 0.1))
+    )
+    joint = plant.AddJoint(
+        PrismaticJoint("x", plant.world_frame(), carrier.body_frame(), [1, 0, 0])
+    )
     deck = RigidTransform([0, 0, -0.05])
-    plant.RegisterCollisionGeometry(carrier, deck, Box(4, 1, 0.1), "deck", material(contact, rigid=True))
-    box = plant.AddRigidBody("box", SpatialInertia(0.5, [0, 0, 0], UnitInertia.SolidBox(0.1, 0.1, 0.04)))
+    plant.RegisterCollisionGeometry(
+        carrier, deck, Box(4, 1, 0.1), "deck", material(contact, rigid=True)
+    )
+    box = plant.AddRigidBody(
+        "box", SpatialInertia(0.5, [0, 0, 0], UnitInertia.SolidBox(0.1, 0.1, 0.04))
+    )
     if contact == "hydroelastic":
-        plant.RegisterCollisionGeometry(box, RigidTransform(), Box(0.1, 0.1, 0.04), "solid", material(contact))
+        plant.RegisterCollisionGeometry(
+            box, RigidTransform(), Box(0.1, 0.1, 0.04), "solid", material(contact)
+        )
     else:
         for i, (x, y) in enumerate(CORNERS):
             foot = RigidTransform([x, y, -0.019])
-            plant.RegisterCollisionGeometry(box, foot, Sphere(0.001), f"foot {i}", material(contact))
-    plant.AddFrame(FixedOffsetFrame("bottom", box.body_frame(), RigidTransform([0, 0, -0.02])))
+            plant.RegisterCollisionGeometry(
+                box, foot, Sphere(0.001), f"foot {i}", material(contact)
+            )
+    plant.AddFrame(
+        FixedOffsetFrame("bottom", box.body_frame(), RigidTransform([0, 0, -0.02]))
+    )
     plant.Finalize()
     plant.SetDefaultFloatingBaseBodyPose(box, RigidTransform([0, 0, 0.02 - 1e-5]))
     model = pf.ReducedModel(pf.ContactPatch.rectangle(0.1), LAW)
     patches = [PatchContact(model, frame="bottom", geometries=("carrier", "box"))]
     prepare(plant, scene_graph, patches)
-    made = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    made = running(
+        builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    )
     joint.set_translation_rate(made.context, speed)
     velocities = plant.GetVelocities(made.context)
     velocities[box.floating_velocities_start_in_v() + 3] = speed - 0.1
@@ -72,34 +95,57 @@ def test_a_box_comes_to_rest_on_a_carrier(mass, speed, approximation, contact):
     open_end = 1e-6 * math.sqrt(mass / 0.5) * speed
     assert abs(twist[:2]).max() < 1e-6 + 2.0 * open_end
     assert abs(wrench[:2]).max() < 1e-3 + 0.5 * 4.0 * open_end / 2e-3
-    assert made.plant.GetVelocities(made.context)[0] == pytest.approx(speed - 0.05 / (mass + 0.5), abs=1e-3)
+    assert made.plant.GetVelocities(made.context)[0] == pytest.approx(
+        speed - 0.05 / (mass + 0.5), abs=1e-3
+    )
 
 
 def ball(turned: RotationMatrix, angle: float) -> Running:
     builder, plant, scene_graph = bare(2e-3)
-    body = plant.AddRigidBody("ball", SpatialInertia(0.1, [0, 0, 0], UnitInertia.SolidSphere(0.05)))
-    plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(0.05), "ball", material("point"))
+    body = plant.AddRigidBody(
+        "ball", SpatialInertia(0.1, [0, 0, 0], UnitInertia.SolidSphere(0.05))
+    )
+    plant.RegisterCollisionGeometry(
+        body, RigidTransform(), Sphere(0.05), "ball", material("point")
+    )
     floor = material("point", rigid=True)
-    plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "floor", floor)
-    plant.AddFrame(FixedOffsetFrame("middle", body.body_frame(), RigidTransform(turned, [0, 0, 0])))
-    plant.mutable_gravity_field().set_gravity_vector(9.81 * np.array([math.sin(angle), 0.0, -math.cos(angle)]))
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform(), HalfSpace(), "floor", floor
+    )
+    plant.AddFrame(
+        FixedOffsetFrame("middle", body.body_frame(), RigidTransform(turned, [0, 0, 0]))
+    )
+    plant.mutable_gravity_field().set_gravity_vector(
+        9.81 * np.array([math.sin(angle), 0.0, -math.cos(angle)])
+    )
     plant.Finalize()
     plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform([0, 0, 0.05 - 1e-5]))
     law = pf.LuGre(mu_c=0.5, sigma_0=1e3, sigma_1=60.0, sigma_2=0.0, elasto_plastic=0.9)
     model = pf.ReducedModel(pf.ContactPatch.disc(0.003, cells=5), law)
-    patches = [PatchContact(model, frame="middle", geometries=("floor", "ball"), centre="contact")]
+    patches = [
+        PatchContact(
+            model, frame="middle", geometries=("floor", "ball"), centre="contact"
+        )
+    ]
     prepare(plant, scene_graph, patches)
-    return running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    return running(
+        builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    )
 
 
-@pytest.mark.parametrize("turned", [RotationMatrix(), RotationMatrix.MakeYRotation(np.pi / 2)])
+@pytest.mark.parametrize(
+    "turned", [RotationMatrix(), RotationMatrix.MakeYRotation(np.pi / 2)]
+)
 def test_a_ball_rolls_down_at_a_constant_acceleration(turned):
     """5/7 g sin(angle); the x axis of its frame reverses every half turn, or starts as the normal."""
-    angle, speeds = math.radians(10.0), []
+    angle = math.radians(10.0)
+    speeds = []
     made = ball(turned, angle)
     for i in range(600):
         made.to(2e-3 * (i + 1))
         speeds.append(made.plant.GetVelocities(made.context)[3])
     acceleration = np.diff(speeds[200:]) / 2e-3
-    assert acceleration.mean() == pytest.approx(5.0 / 7.0 * 9.81 * math.sin(angle), rel=5e-3)
+    assert acceleration.mean() == pytest.approx(
+        5.0 / 7.0 * 9.81 * math.sin(angle), rel=5e-3
+    )
     assert np.ptp(acceleration) < 2e-3

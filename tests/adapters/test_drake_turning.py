@@ -58,40 +58,63 @@ class Turning(NamedTuple):
         rows = []
         for i in range(round(seconds / every) + 1):
             self.run.to(i * every)
-            pose = self.run.plant.CalcRelativeTransform(self.run.context, self.support, self.part.body_frame())
+            pose = self.run.plant.CalcRelativeTransform(
+                self.run.context, self.support, self.part.body_frame()
+            )
             x, y, _ = pose.translation()
             turned = pose.rotation().matrix()
-            rows.append([i * every, np.hypot(x, y), np.arctan2(y, x), np.arctan2(turned[1, 0], turned[0, 0])])
+            rows.append(
+                [
+                    i * every,
+                    np.hypot(x, y),
+                    np.arctan2(y, x),
+                    np.arctan2(turned[1, 0], turned[0, 0]),
+                ]
+            )
         return np.array(rows)
 
 
 def _box(plant: Any) -> Any:
     """Add a box of 60 x 60 x 20 mm on four feet, with a frame on its bottom."""
-    box = plant.AddRigidBody("box", SpatialInertia(0.1, [0, 0, 0], UnitInertia.SolidBox(0.06, 0.06, 0.02)))
+    box = plant.AddRigidBody(
+        "box", SpatialInertia(0.1, [0, 0, 0], UnitInertia.SolidBox(0.06, 0.06, 0.02))
+    )
     for i, (x, y) in enumerate(CORNERS):
         foot = RigidTransform([x, y, -0.009])
-        plant.RegisterCollisionGeometry(box, foot, Sphere(0.001), f"foot {i}", material("point"))
-    plant.AddFrame(FixedOffsetFrame("bottom", box.body_frame(), RigidTransform([0, 0, -0.01])))
+        plant.RegisterCollisionGeometry(
+            box, foot, Sphere(0.001), f"foot {i}", material("point")
+        )
+    plant.AddFrame(
+        FixedOffsetFrame("bottom", box.body_frame(), RigidTransform([0, 0, -0.01]))
+    )
     return box
 
 
 def _turntable(plant: Any) -> Any:
     """Add a body that turns about the vertical."""
-    return plant.AddRigidBody("table", SpatialInertia(HEAVY, [0, 0, 0], UnitInertia.SolidSphere(1.0)))
+    return plant.AddRigidBody(
+        "table", SpatialInertia(HEAVY, [0, 0, 0], UnitInertia.SolidSphere(1.0))
+    )
 
 
 def _place(made: Running, part: Any, place: list[float], spin: float) -> None:
     """Let a part turn about the vertical axis of the world."""
-    plant, spins = made.plant, np.array([0.0, 0.0, spin])
+    plant = made.plant
+    spins = np.array([0.0, 0.0, spin])
     plant.SetFreeBodyPose(made.context, part, RigidTransform(np.array(place)))
-    plant.SetFreeBodySpatialVelocity(made.context, part, SpatialVelocity(spins, np.cross(spins, place)))
+    plant.SetFreeBodySpatialVelocity(
+        made.context, part, SpatialVelocity(spins, np.cross(spins, place))
+    )
 
 
 def table(spin: float, dt: float, **options: Any) -> Turning:
     """A box on a hinged table."""
     builder, plant, scene_graph = bare(dt, **options)
-    support, part = _turntable(plant), _box(plant)
-    hinge = plant.AddJoint(RevoluteJoint("hinge", plant.world_frame(), support.body_frame(), [0, 0, 1]))
+    support = _turntable(plant)
+    part = _box(plant)
+    hinge = plant.AddJoint(
+        RevoluteJoint("hinge", plant.world_frame(), support.body_frame(), [0, 0, 1])
+    )
     made = _on_a_deck(builder, plant, scene_graph)
     hinge.set_angular_rate(made.context, spin)
     _place(made, part, [ample(spin, 0.25), 0.0, 0.01 - 1e-5], spin)
@@ -101,44 +124,63 @@ def table(spin: float, dt: float, **options: Any) -> Turning:
 def angles(spin: float, dt: float) -> Turning:
     """A box on a table that both turn by roll, pitch and yaw about skew axes: steps of these are no steady turns."""
     builder, plant, scene_graph = bare(dt)
-    support, part = _turntable(plant), _box(plant)
+    support = _turntable(plant)
+    part = _box(plant)
     skew = RollPitchYaw(-1.2, 0.7, 1.0).ToRotationMatrix()
-    base = plant.AddFrame(FixedOffsetFrame("skew", plant.world_frame(), RigidTransform(skew, np.zeros(3))))
+    base = plant.AddFrame(
+        FixedOffsetFrame("skew", plant.world_frame(), RigidTransform(skew, np.zeros(3)))
+    )
     ball = plant.AddJoint(BallRpyJoint("ball", base, support.body_frame()))
     free = plant.AddJoint(RpyFloatingJoint("free", base, part.body_frame()))
     made = _on_a_deck(builder, plant, scene_graph)
-    axis, place = skew.inverse() @ np.array([0.0, 0.0, spin]), np.array([ample(spin, 0.25), 0.0, 0.01 - 1e-5])
+    axis = skew.inverse() @ np.array([0.0, 0.0, spin])
+    place = np.array([ample(spin, 0.25), 0.0, 0.01 - 1e-5])
     ball.set_angles(made.context, RollPitchYaw(skew.inverse()).vector())
     ball.set_angular_velocity(made.context, axis)
     free.SetPose(made.context, RigidTransform(skew.inverse(), skew.inverse() @ place))
     free.set_angular_velocity(made.context, axis)
-    free.set_translational_velocity(made.context, np.cross(axis, skew.inverse() @ place))
+    free.set_translational_velocity(
+        made.context, np.cross(axis, skew.inverse() @ place)
+    )
     return Turning(made, part, support.body_frame())
 
 
 def _on_a_deck(builder: Any, plant: Any, scene_graph: Any) -> Running:
     """Return the plant with a deck on its table, and a patch between this and its box."""
     deck = material("point", rigid=True)
-    plant.RegisterCollisionGeometry(plant.GetBodyByName("table"), RigidTransform(), HalfSpace(), "deck", deck)
+    plant.RegisterCollisionGeometry(
+        plant.GetBodyByName("table"), RigidTransform(), HalfSpace(), "deck", deck
+    )
     plant.Finalize()
     patches = [PatchContact(BOX, frame="bottom", geometries=("table", "box"))]
     prepare(plant, scene_graph, patches)
-    return running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    return running(
+        builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    )
 
 
 def car(spin: float, dt: float) -> Turning:
     """A box on a car that drives in a circle, on springs that keep it there."""
     builder, plant, scene_graph = bare(dt)
-    support, part = _turntable(plant), _box(plant)
-    base, slides = plant.world_frame(), []
+    support = _turntable(plant)
+    part = _box(plant)
+    base = plant.world_frame()
+    slides = []
     for name, axis in (("x", [1, 0, 0]), ("y", [0, 1, 0])):
-        body = plant.AddRigidBody(name, SpatialInertia(HEAVY, [0, 0, 0], UnitInertia.SolidSphere(1.0)))
-        slides.append(plant.AddJoint(PrismaticJoint(name, base, body.body_frame(), axis)))
+        body = plant.AddRigidBody(
+            name, SpatialInertia(HEAVY, [0, 0, 0], UnitInertia.SolidSphere(1.0))
+        )
+        slides.append(
+            plant.AddJoint(PrismaticJoint(name, base, body.body_frame(), axis))
+        )
         base = body.body_frame()
-    hinge = plant.AddJoint(RevoluteJoint("hinge", base, support.body_frame(), [0, 0, 1]))
+    hinge = plant.AddJoint(
+        RevoluteJoint("hinge", base, support.body_frame(), [0, 0, 1])
+    )
     for slide, mass in zip(slides, (3.0 * HEAVY, 2.0 * HEAVY), strict=True):
         plant.AddForceElement(PrismaticSpring(slide, 0.0, mass * spin**2))
-    made, orbit = _on_a_deck(builder, plant, scene_graph), ample(spin, 0.5)
+    made = _on_a_deck(builder, plant, scene_graph)
+    orbit = ample(spin, 0.5)
     slides[0].set_translation(made.context, orbit)
     slides[1].set_translation_rate(made.context, spin * orbit)
     hinge.set_angular_rate(made.context, spin)
@@ -153,32 +195,53 @@ def arm(spin: float, dt: float, reach: float = 0.014) -> Turning:
     """
     builder, plant, scene_graph = bare(dt)
     radius = 0.5 if spin < 10.0 else 0.1
-    block = plant.AddRigidBody("block", SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidBox(0.08, 0.02, 0.12)))
+    block = plant.AddRigidBody(
+        "block", SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidBox(0.08, 0.02, 0.12))
+    )
     solid = Box(0.08, 0.02, 0.12)
-    plant.RegisterCollisionGeometry(block, RigidTransform(), solid, "block", material("point", rigid=True))
+    plant.RegisterCollisionGeometry(
+        block, RigidTransform(), solid, "block", material("point", rigid=True)
+    )
     support = _turntable(plant)
-    hinge = plant.AddJoint(RevoluteJoint("hinge", plant.world_frame(), support.body_frame(), [0, 0, 1]))
+    hinge = plant.AddJoint(
+        RevoluteJoint("hinge", plant.world_frame(), support.body_frame(), [0, 0, 1])
+    )
     for side, sign in (("left", -1.0), ("right", 1.0)):
-        pad = plant.AddRigidBody(side + " pad", SpatialInertia(0.05, [0, 0, 0], UnitInertia.SolidSphere(0.01)))
-        plant.RegisterCollisionGeometry(pad, RigidTransform(), Sphere(0.01), side + " pad", material("point"))
+        pad = plant.AddRigidBody(
+            side + " pad",
+            SpatialInertia(0.05, [0, 0, 0], UnitInertia.SolidSphere(0.01)),
+        )
+        plant.RegisterCollisionGeometry(
+            pad, RigidTransform(), Sphere(0.01), side + " pad", material("point")
+        )
         place = RigidTransform([radius, reach * sign, 0.5])
-        base = plant.AddFrame(FixedOffsetFrame(side + " base", support.body_frame(), place))
+        base = plant.AddFrame(
+            FixedOffsetFrame(side + " base", support.body_frame(), place)
+        )
         if side == "left":
             plant.WeldFrames(base, pad.body_frame())
         else:
-            press = plant.AddJoint(PrismaticJoint("press", base, pad.body_frame(), [0, -1, 0], damping=3.0))
+            press = plant.AddJoint(
+                PrismaticJoint("press", base, pad.body_frame(), [0, -1, 0], damping=3.0)
+            )
             plant.AddJointActuator("press", press)
-        turned = RigidTransform(RotationMatrix.MakeXRotation(sign * np.pi / 2), [0, 0.01 * sign, 0])
+        turned = RigidTransform(
+            RotationMatrix.MakeXRotation(sign * np.pi / 2), [0, 0.01 * sign, 0]
+        )
         plant.AddFrame(FixedOffsetFrame(side, block.body_frame(), turned))
     plant.Finalize()
     force = builder.AddSystem(ConstantVectorSource([30.0]))
     builder.Connect(force.get_output_port(), plant.get_actuation_input_port())
     patches = [
-        PatchContact(PAD, frame=side, geometries=(side + " pad", "block"), centre="contact")
+        PatchContact(
+            PAD, frame=side, geometries=(side + " pad", "block"), centre="contact"
+        )
         for side in ("left", "right")
     ]
     prepare(plant, scene_graph, patches)
-    made = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    made = running(
+        builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    )
     hinge.set_angular_rate(made.context, spin)
     _place(made, block, [radius, 0.0, 0.5], spin)
     return Turning(made, block, support.body_frame())
@@ -189,7 +252,9 @@ def _check(made: Turning, spin: float, dt: float, seconds: float, start: float) 
     path = made.path(seconds)
     times, radius, around, own = path[path[:, 0] > start - 1e-9].T
     lasts = times[-1] - times[0]
-    elastic = 2.0 * spin**2 / 9.81 / LAW.sigma_0  # m, where the load is the weight of the part
+    elastic = (
+        2.0 * spin**2 / 9.81 / LAW.sigma_0
+    )  # m, where the load is the weight of the part
     assert np.ptp(radius) < 1.5 * radius[0] * spin**4 * dt**3 * lasts / 8.0 + elastic
     assert np.ptp(around) < 1.5 * spin**3 * dt**2 * lasts / 6.0 + elastic / radius[0]
     assert np.ptp(own) < 1.5 * spin**3 * dt**2 * lasts / 6.0 + elastic / radius[0]
@@ -209,23 +274,36 @@ def test_pads_that_close_while_they_turn_do_not_turn_what_they_hold():
 def test_a_ball_that_spins_rolls_straight():
     """Its contact moves along with it: the material below turns aside, by half of 10 rad/s in 4 ms, 4 mm in 0.2 m."""
     builder, plant, scene_graph = bare(4e-3)
-    ball = plant.AddRigidBody("ball", SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidSphere(0.05)))
-    plant.RegisterCollisionGeometry(ball, RigidTransform(), Sphere(0.05), "ball", material("point"))
+    ball = plant.AddRigidBody(
+        "ball", SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidSphere(0.05))
+    )
+    plant.RegisterCollisionGeometry(
+        ball, RigidTransform(), Sphere(0.05), "ball", material("point")
+    )
     floor = material("point", rigid=True)
-    plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "floor", floor)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform(), HalfSpace(), "floor", floor
+    )
     plant.Finalize()
     patches = [PatchContact(PAD, frame="ball", geometries=("floor", "ball"))]
     prepare(plant, scene_graph, patches)
-    run = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    run = running(
+        builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    )
     plant.SetFreeBodyPose(run.context, ball, RigidTransform([0.0, 0.0, 0.0499]))
-    plant.SetFreeBodySpatialVelocity(run.context, ball, SpatialVelocity([0.0, 20.0, 10.0], [1.0, 0.0, 0.0]))
+    plant.SetFreeBodySpatialVelocity(
+        run.context, ball, SpatialVelocity([0.0, 20.0, 10.0], [1.0, 0.0, 0.0])
+    )
     run.to(0.2)
     x, y, _ = plant.GetFreeBodyPose(run.context, ball).translation()
     assert x == pytest.approx(0.2, abs=2e-3)
     assert abs(y) < 1e-6
 
 
-@pytest.mark.parametrize("options", [{"use_sampled_output_ports": False}, {"discrete_contact_approximation": "sap"}])
+@pytest.mark.parametrize(
+    "options",
+    [{"use_sampled_output_ports": False}, {"discrete_contact_approximation": "sap"}],
+)
 def test_all_kinds_of_discrete_plants_keep_places(options):
     _check(table(3.0, 4e-3, **options), 3.0, 4e-3, 0.4, 0.2)
 

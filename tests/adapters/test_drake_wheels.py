@@ -7,11 +7,18 @@ import pytest
 
 import planarfriction as pf
 
-pytest.importorskip("pydrake", reason="Drake is not installed: pip install 'planarfriction[drake]'")
+pytest.importorskip(
+    "pydrake", reason="Drake is not installed: pip install 'planarfriction[drake]'"
+)
 
 from pydrake.geometry import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    PlanarJoint,
+    SpatialInertia,
+    UnitInertia,
+)
 
 from planarfriction.adapters.drake import Friction, PatchContact, prepare
 from tests.support.drake_scenes import Running, bare, material, running, sliding
@@ -19,7 +26,9 @@ from tests.support.drake_scenes import Running, bare, material, running, sliding
 pytestmark = pytest.mark.drake
 
 RADIUS, HALF, MASS, DT = 0.05, 0.02, 0.5, 2e-3
-LAW = pf.LuGre(mu_c=0.4, mu_s=0.4, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+LAW = pf.LuGre(
+    mu_c=0.4, mu_s=0.4, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9
+)
 POINT = pf.ReducedModel(pf.ContactPatch.disc(radius=0.002, cells=5), LAW)
 TREAD = pf.ReducedModel(pf.ContactPatch.rectangle(2.0 * HALF, 0.0005, cells=9), LAW)
 """Patch under a wheel, x along the axle."""
@@ -32,34 +41,73 @@ SHAPES = {
 }
 """Shape with its axle along z, patch, and moment of inertia about the axle in m r^2."""
 
-FRAMES = {"hub": [0.0, 0.0, 0.0], "tread": [RADIUS, 0.0, 0.0], "contact": [0.0, -RADIUS, 0.0]}
+FRAMES = {
+    "hub": [0.0, 0.0, 0.0],
+    "tread": [RADIUS, 0.0, 0.0],
+    "contact": [0.0, -RADIUS, 0.0],
+}
 
 
-def made(body: str, place: list[float], solid, kind: str, inertia, model, *, turned=None, joint=None, **options):
+def made(
+    body: str,
+    place: list[float],
+    solid,
+    kind: str,
+    inertia,
+    model,
+    *,
+    turned=None,
+    joint=None,
+    **options,
+):
     """Return a running plant of a body on the floor with a patch at a place in it, free or on a joint."""
     builder, plant, scene_graph = bare(DT)
     link = plant.AddRigidBody(body, SpatialInertia(MASS, [0, 0, 0], inertia))
-    plant.RegisterCollisionGeometry(link, RigidTransform(), solid, "solid", material(kind))
+    plant.RegisterCollisionGeometry(
+        link, RigidTransform(), solid, "solid", material(kind)
+    )
     floor = material(kind, rigid=True)
-    plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "floor", floor)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), RigidTransform(), HalfSpace(), "floor", floor
+    )
     frame = RigidTransform(turned or RotationMatrix(), place)
     plant.AddFrame(FixedOffsetFrame("place", link.body_frame(), frame))
     if joint is not None:
         upright = FixedOffsetFrame("upright", plant.world_frame(), joint)
-        plant.AddJoint(PlanarJoint("upright", plant.AddFrame(upright), link.body_frame()))
+        plant.AddJoint(
+            PlanarJoint("upright", plant.AddFrame(upright), link.body_frame())
+        )
     plant.Finalize()
-    patches = [PatchContact(model, frame="place", geometries=("floor", body), **options)]
+    patches = [
+        PatchContact(model, frame="place", geometries=("floor", body), **options)
+    ]
     prepare(plant, scene_graph, patches)
-    return running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
+    return running(
+        builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    )
 
 
-def wheel(shape: str, frame: str, velocity: list[float], centre: str = "auto") -> tuple[np.ndarray, np.ndarray]:
+def wheel(
+    shape: str, frame: str, velocity: list[float], centre: str = "auto"
+) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and velocities (along x, z, about -y) of an upright wheel that was set moving 0.4 s ago."""
     solid, model, share = SHAPES[shape]
-    upright = RigidTransform(RotationMatrix.MakeXRotation(0.5 * np.pi), [0.0, 0.0, RADIUS - 1e-5])
+    upright = RigidTransform(
+        RotationMatrix.MakeXRotation(0.5 * np.pi), [0.0, 0.0, RADIUS - 1e-5]
+    )
     inertia = UnitInertia.TriaxiallySymmetric(share * RADIUS**2)
     along = RotationMatrix.MakeYRotation(-0.5 * np.pi)  # its x axis, along the axle
-    run = made("wheel", FRAMES[frame], solid, "point", inertia, model, turned=along, joint=upright, centre=centre)
+    run = made(
+        "wheel",
+        FRAMES[frame],
+        solid,
+        "point",
+        inertia,
+        model,
+        turned=along,
+        joint=upright,
+        centre=centre,
+    )
     run.to(0.1)
     run.plant.SetVelocities(run.context, velocity)
     run.to(0.5)
@@ -81,7 +129,9 @@ def wheel(shape: str, frame: str, velocity: list[float], centre: str = "auto") -
 def test_a_wheel_thrown_without_spin_rolls_on(shape, frame):
     """v = v0/(1 + I/(m r^2)): 5/7 for a sphere, 2/3 for a solid cylinder."""
     position, velocity = wheel(shape, frame, [1.0, 0.0, 0.0])
-    arm = RADIUS + 0.5 * position[1]  # Drake's contact points lie between the surfaces, which overlap
+    arm = (
+        RADIUS + 0.5 * position[1]
+    )  # Drake's contact points lie between the surfaces, which overlap
     share = SHAPES[shape][2] * (RADIUS / arm) ** 2
     assert velocity[0] == pytest.approx(1.0 / (1.0 + share), rel=1e-3)
     assert -velocity[2] * arm == pytest.approx(velocity[0], rel=1e-3)
@@ -97,16 +147,30 @@ def test_a_spinning_wheel_with_its_frame_at_the_hub_drives_off(centre):
 def box(mu: float, place: list[float], turned=None) -> Running:
     """Return a box of 40 x 40 x 200 mm at rest."""
     inertia = UnitInertia.SolidBox(0.04, 0.04, 0.2)
-    law = pf.LuGre(mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+    law = pf.LuGre(
+        mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9
+    )
     model = pf.ReducedModel(pf.ContactPatch.rectangle(0.04, cells=9), law)
-    run = made("box", place, Box(0.04, 0.04, 0.2), "hydroelastic", inertia, model, turned=turned)
+    run = made(
+        "box",
+        place,
+        Box(0.04, 0.04, 0.2),
+        "hydroelastic",
+        inertia,
+        model,
+        turned=turned,
+    )
     run.plant.SetPositions(run.context, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0999])
     run.to(0.1)
     return run
 
 
-@pytest.mark.filterwarnings("ignore:frame place of the contact:UserWarning")  # where the box has fallen
-@pytest.mark.parametrize("place", [[0.0, 0.0, 0.0], [0.0, 0.0, -0.1]], ids=["body", "face"])
+@pytest.mark.filterwarnings(
+    "ignore:frame place of the contact:UserWarning"
+)  # where the box has fallen
+@pytest.mark.parametrize(
+    "place", [[0.0, 0.0, 0.0], [0.0, 0.0, -0.1]], ids=["body", "face"]
+)
 def test_a_box_topples_where_friction_is_beyond_its_half_width_over_its_height(place):
     """b/h = 0.2: it falls at mu = 0.6, and slides on at 0.08, by v0^2/(2 mu g) less the stepper's own v0 dt/2.
 
@@ -116,31 +180,53 @@ def test_a_box_topples_where_friction_is_beyond_its_half_width_over_its_height(p
         run = box(mu, place)
         run.plant.SetVelocities(run.context, [0.0, 0.0, 0.0, speed, 0.0, 0.0])
         start = run.plant.GetPositions(run.context)[4]
-        body, upright = run.plant.GetBodyByName("box"), 1.0
+        body = run.plant.GetBodyByName("box")
+        upright = 1.0
         for i in range(1, 41):
             run.to(0.1 + 0.02 * i)
-            upright = run.plant.EvalBodyPoseInWorld(run.context, body).rotation().matrix()[2, 2]
+            upright = (
+                run.plant.EvalBodyPoseInWorld(run.context, body)
+                .rotation()
+                .matrix()[2, 2]
+            )
             if upright < 0.5:
                 break
         assert (upright < 0.5) == (mu > 0.2)
         if mu < 0.2:
             slid = run.plant.GetPositions(run.context)[4] - start
-            assert slid == pytest.approx(0.5 * speed**2 / (mu * 9.81) - 0.5 * speed * DT, rel=5e-3)
+            assert slid == pytest.approx(
+                0.5 * speed**2 / (mu * 9.81) - 0.5 * speed * DT, rel=5e-3
+            )
 
 
 def test_a_frame_that_is_not_in_the_contact_is_told_once():
-    with pytest.warns(UserWarning, match="frame place of the contact between floor and box: contact forces") as told:
+    with pytest.warns(
+        UserWarning,
+        match="frame place of the contact between floor and box: contact forces",
+    ) as told:
         box(0.4, [0.05, 0.0, 0.0])
     assert len(told) == 1
     along = RotationMatrix.MakeYRotation(0.5 * np.pi)
-    with pytest.warns(UserWarning, match="frame place of .*: its x axis lies along the normal of the contact") as told:
+    with pytest.warns(
+        UserWarning,
+        match="frame place of .*: its x axis lies along the normal of the contact",
+    ) as told:
         box(0.4, [0.0, 0.0, 0.0], along)
     assert len(told) == 1
 
 
 def test_a_port_that_is_fixed_after_the_friction_was_added_is_named():
-    run = sliding("box", "point", DT, pf.ReducedModel(pf.ContactPatch.rectangle(0.1, cells=9), LAW))
+    run = sliding(
+        "box",
+        "point",
+        DT,
+        pf.ReducedModel(pf.ContactPatch.rectangle(0.1, cells=9), LAW),
+    )
     run.to(0.1)
-    run.plant.get_applied_generalized_force_input_port().FixValue(run.context, [0.0, 0.0, 0.0, 2.0, 0.0, 0.0])
-    with pytest.warns(UserWarning, match="one of its input ports was fixed after AddToBuilder"):
+    run.plant.get_applied_generalized_force_input_port().FixValue(
+        run.context, [0.0, 0.0, 0.0, 2.0, 0.0, 0.0]
+    )
+    with pytest.warns(
+        UserWarning, match="one of its input ports was fixed after AddToBuilder"
+    ):
         run.to(0.12)

@@ -41,11 +41,16 @@ def double_precision():
 
 def made(scene, model=None, dt=DT, **options):
     """Model, data and patches of a scene, as MJX wants them."""
-    text = scene.text(Native(cone="pyramidal", impratio=1.0, condim=1, solref=0.02), dt, "Euler")
+    text = scene.text(
+        Native(cone="pyramidal", impratio=1.0, condim=1, solref=0.02), dt, "Euler"
+    )
     spec = mujoco.MjSpec.from_string(text)
     for name, value in options.items():
         setattr(spec.option, name, value)
-    patches = [PatchContact(model or scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
+    patches = [
+        PatchContact(model or scene.model, site=site, geoms=geoms)
+        for site, geoms in scene.patches
+    ]
     prepare(spec, patches)
     m = spec.compile()
     return m, mujoco.MjData(m), patches
@@ -58,21 +63,36 @@ def test_patches_that_follow_their_contact_do_so_as_in_mujoco():
         <worldbody><geom name="table" type="plane" size="2 2 0.1"/><body pos="0 0 0.02"><freejoint/>
         <site name="under" pos="0 0 -0.02"/><inertial pos="0.012 0 -0.01" mass="0.3" diaginertia="1e-4 3e-4 3e-4"/>
         <geom name="box" type="box" size="0.05 0.03 0.02"/></body></worldbody></mujoco>""")
-    law = pf.LuGre(mu_c=0.4, mu_s=0.4, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+    law = pf.LuGre(
+        mu_c=0.4, mu_s=0.4, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9
+    )
     face = pf.ReducedModel(pf.ContactPatch.rectangle(0.1, 0.06, cells=9), law)
-    patches = [PatchContact(face, site="under", geoms=("table", "box"), centre="contact", pressure="fixed")]
+    patches = [
+        PatchContact(
+            face,
+            site="under",
+            geoms=("table", "box"),
+            centre="contact",
+            pressure="fixed",
+        )
+    ]
     prepare(spec, patches)
     m = spec.compile()
-    theirs, ours, d = adapter.Friction(m, patches), Friction(m, patches), mujoco.MjData(m)
+    theirs = adapter.Friction(m, patches)
+    ours = Friction(m, patches)
+    d = mujoco.MjData(m)
     for _ in range(200):
         theirs.step(d)
     assert theirs.misplaced(d) is None
     d.qvel[:] = 0.2, 0.5, 0.0, 0.0, 0.0, 4.0
     theirs.step(d)
-    at, mx = theirs._memory.centre, mjx.put_model(m)
-    end = jax.jit(lambda d: jax.lax.scan(lambda d, _: (ours.step(mx, d), None), d, None, length=100)[0])(
-        mjx.put_data(m, d)
-    )
+    at = theirs._memory.centre
+    mx = mjx.put_model(m)
+    end = jax.jit(
+        lambda d: jax.lax.scan(
+            lambda d, _: (ours.step(mx, d), None), d, None, length=100
+        )[0]
+    )(mjx.put_data(m, d))
     for _ in range(100):
         theirs.step(d)
     centre = d.userdata[at : at + 3]
@@ -85,8 +105,11 @@ def test_patches_that_follow_their_contact_do_so_as_in_mujoco():
 
 def rolled(friction, m, data, steps: int):
     """Rollouts of all `data` side by side: the last data, and positions `[steps + 1, E, nq]`."""
-    batch = jax.tree.map(lambda *each: jnp.stack(each), *(mjx.put_data(m, d) for d in data))
-    step, mx = jax.jit(jax.vmap(friction.step, (None, 0))), mjx.put_model(m)
+    batch = jax.tree.map(
+        lambda *each: jnp.stack(each), *(mjx.put_data(m, d) for d in data)
+    )
+    step = jax.jit(jax.vmap(friction.step, (None, 0)))
+    mx = mjx.put_model(m)
     path = [np.asarray(batch.qpos)]
     for _ in range(steps):
         batch = step(mx, batch)
@@ -117,7 +140,13 @@ def discs() -> Discs:
         mujoco.mj_step(m, settled)
     v, w = STARTS[0]
     data = []
-    for speed, spin in (*STARTS, (v + SMALL, w), (v - SMALL, w), (v, w + SMALL), (v, w - SMALL)):
+    for speed, spin in (
+        *STARTS,
+        (v + SMALL, w),
+        (v - SMALL, w),
+        (v, w + SMALL),
+        (v, w - SMALL),
+    ):
         each = copy.copy(settled)
         each.qvel[:] = speed, 0.0, 0.0, spin
         data.append(each)
@@ -128,20 +157,27 @@ def discs() -> Discs:
 @pytest.mark.parametrize("e", range(3))
 def test_a_disc_slides_and_spins_to_rest_where_theory_says(discs, e):
     speed, spin = STARTS[e]
-    stop, qpos = coulomb_disc.stop(speed, spin), discs.path[-1, e]
+    stop = coulomb_disc.stop(speed, spin)
+    qpos = discs.path[-1, e]
     assert abs(np.asarray(discs.end.qvel[e])).max() < 1e-6
     # less the stepper's own v dt/2
-    assert qpos[0] + 0.5 * DT * speed == pytest.approx(stop.distance, rel=1e-3)  # of a few discs
+    assert qpos[0] + 0.5 * DT * speed == pytest.approx(
+        stop.distance, rel=1e-3
+    )  # of a few discs
     assert qpos[3] + 0.5 * DT * spin == pytest.approx(stop.angle, rel=2e-3)
 
 
 def test_environments_do_what_mujoco_does(discs):
-    d, friction = copy.copy(discs.data[0]), adapter.Friction(discs.m, discs.patches)
+    d = copy.copy(discs.data[0])
+    friction = adapter.Friction(discs.m, discs.patches)
     for i in range(1, 601):
         friction.step(d)
         # both solve to 1e-9 m/s a step, and what is left of that adds up over 600 steps of 2 ms
-        np.testing.assert_allclose(discs.path[i, 0], d.qpos, atol=600 * DT * 1e-9 + 1e-9)
-    ours, theirs = discs.friction, friction
+        np.testing.assert_allclose(
+            discs.path[i, 0], d.qpos, atol=600 * DT * 1e-9 + 1e-9
+        )
+    ours = discs.friction
+    theirs = friction
     end = jax.tree.map(lambda each: each[0], discs.end)
     np.testing.assert_allclose(ours.loads(end), theirs.loads(d), rtol=1e-9)
     np.testing.assert_allclose(ours.wrenches(end), theirs.wrenches(d), atol=1e-6)
@@ -149,18 +185,27 @@ def test_environments_do_what_mujoco_does(discs):
 
 
 def test_the_lever_arm_of_a_patch_counts_the_radii_of_its_discs():
-    model = pf.DistributedModel(pf.ContactPatch.disc(0.05, 9).discs(), pf.LuGre(mu_s=1.2))
+    model = pf.DistributedModel(
+        pf.ContactPatch.disc(0.05, 9).discs(), pf.LuGre(mu_s=1.2)
+    )
     m, _, patches = made(disc(*STARTS[0]), model)
     assert model.patch.radii.all()
-    np.testing.assert_array_equal(Friction(m, patches)._fixed.places.radius, [lever_of(model)])
+    np.testing.assert_array_equal(
+        Friction(m, patches)._fixed.places.radius, [lever_of(model)]
+    )
 
 
 def test_a_stiffness_that_ignores_the_load_does_what_it_does_in_mujoco():
-    law = pf.LuGre(mu_c=0.4, mu_s=0.5, sigma_0=1e5, elasto_plastic=0.9, reference_load=1.5)
+    law = pf.LuGre(
+        mu_c=0.4, mu_s=0.5, sigma_0=1e5, elasto_plastic=0.9, reference_load=1.5
+    )
     scene = disc(0.05, 1.0)
-    m, d, patches = made(scene, pf.DistributedModel(pf.ContactPatch.disc(radius=0.05, cells=5), law))
+    m, d, patches = made(
+        scene, pf.DistributedModel(pf.ContactPatch.disc(radius=0.05, cells=5), law)
+    )
     d.qvel[:] = scene.start
-    friction, theirs = Friction(m, patches), adapter.Friction(m, patches)
+    friction = Friction(m, patches)
+    theirs = adapter.Friction(m, patches)
     end, path = rolled(friction, m, [d], 100)
     for i in range(1, 101):
         theirs.step(d)
@@ -171,7 +216,8 @@ def test_a_stiffness_that_ignores_the_load_does_what_it_does_in_mujoco():
 
 def test_data_go_from_one_into_the_other(discs):
     """The bristles are where both look for them."""
-    friction, ours = adapter.Friction(discs.m, discs.patches), discs.friction
+    friction = adapter.Friction(discs.m, discs.patches)
+    ours = discs.friction
     d = copy.copy(discs.data[0])
     for _ in range(100):
         friction.step(d)
@@ -184,18 +230,23 @@ def test_data_go_from_one_into_the_other(discs):
     np.testing.assert_array_equal(friction.wrenches(back), ours.wrenches(end))
     assert (np.asarray(ours.states(ours.reset(end))[0]) == 0.0).all()
     later = end.replace(time=end.time + 1.0)
-    assert (np.asarray(ours.states(later)[0]) == 0.0).all(), "at other times than those of the step bristles rest"
+    assert (np.asarray(ours.states(later)[0]) == 0.0).all(), (
+        "at other times than those of the step bristles rest"
+    )
 
 
 @pytest.mark.slow
 def test_gradients_of_a_roll_out_are_differences(discs):
     """Backwards through ten sliding steps, MJX's solver, whose loop has no derivative, and the step of the patches."""
     steps = 10
-    mx, d = mjx.put_model(discs.m), mjx.put_data(discs.m, discs.data[0])
+    mx = mjx.put_model(discs.m)
+    d = mjx.put_data(discs.m, discs.data[0])
 
     def end(velocity):
         start = d.replace(qvel=jnp.array([velocity[0], 0.0, 0.0, velocity[1]]))
-        last, _ = jax.lax.scan(lambda d, _: (discs.friction.step(mx, d), None), start, None, length=steps)
+        last, _ = jax.lax.scan(
+            lambda d, _: (discs.friction.step(mx, d), None), start, None, length=steps
+        )
         return last.qpos[0] + 0.1 * last.qpos[3]
 
     slopes = jax.jit(jax.grad(end))(jnp.array(STARTS[0]))
@@ -217,26 +268,39 @@ def test_gradients_are_differences_by_velocity_and_friction():
     """Backwards through MJX's solver, whose loop has no derivative, and through the step of the patches."""
     law = pf.LuGre(mu_s=0.5, mu_c=0.3, v_s=0.1, sigma_0=1e5, elasto_plastic=0.9)
     patches = [
-        PatchContact(pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law), "ball", ("floor", "ball"))
+        PatchContact(
+            pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law),
+            "ball",
+            ("floor", "ball"),
+        )
     ]
     spec = mujoco.MjSpec.from_string(BALL)
     prepare(spec, patches)
     m = spec.compile()
-    d, mx, friction = mjx.put_data(m, mujoco.MjData(m)), mjx.put_model(m), Friction(m, patches)
+    d = mjx.put_data(m, mujoco.MjData(m))
+    mx = mjx.put_model(m)
+    friction = Friction(m, patches)
 
     @jax.jit
     @jax.value_and_grad
     def end(numbers):
         speed, fall, spin, mu_c, v_s = numbers
         model = friction.models[0]
-        own = friction.replace([model.replace(parameters=model.parameters._replace(mu_c=mu_c, v_s=v_s))])
+        own = friction.replace(
+            [model.replace(parameters=model.parameters._replace(mu_c=mu_c, v_s=v_s))]
+        )
         start = d.replace(qvel=jnp.stack([speed, fall, spin]))
-        last, _ = jax.lax.scan(lambda d, _: (own.step(mx, d), None), start, None, length=4)
+        last, _ = jax.lax.scan(
+            lambda d, _: (own.step(mx, d), None), start, None, length=4
+        )
         return last.qvel @ jnp.array([1.0, 10.0, 0.01]) + own.loads(last)[0]
 
     at = np.array([0.1, -0.01, 10.0, 0.3, 0.1])
-    slopes, steps = end(at)[1], 1e-5 * np.diag(abs(at))
-    differences = [(end(at + step)[0] - end(at - step)[0]) / (2.0 * step.sum()) for step in steps]
+    slopes = end(at)[1]
+    steps = 1e-5 * np.diag(abs(at))
+    differences = [
+        (end(at + step)[0] - end(at - step)[0]) / (2.0 * step.sum()) for step in steps
+    ]
     assert abs(slopes).min() > 1e-5
     # rounding of the differences, and 1e-9 m/s of the step in contact space over 1e-5 of the numbers
     np.testing.assert_allclose(slopes, differences, rtol=1e-4, atol=1e-4)
@@ -248,11 +312,16 @@ def test_gradients_are_differences_by_velocity_and_friction():
 @pytest.mark.slow
 def test_a_grip_beside_the_centre_of_mass_holds_as_in_mujoco():
     scene = grip("sphere")
-    model = pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), scene.model.law)
-    m, d, patches = made(scene, model, integrator=mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+    model = pf.DistributedModel(
+        pf.ContactPatch.disc(radius=0.01, cells=5), scene.model.law
+    )
+    m, d, patches = made(
+        scene, model, integrator=mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    )
     m.dof_damping[:] = 0.5, 0.5, 0.5, 1e-4, 1e-4, 1e-4, 5.0, 5.0
     d.ctrl[:] = 3.0
-    friction, theirs = Friction(m, patches), adapter.Friction(m, patches)
+    friction = Friction(m, patches)
+    theirs = adapter.Friction(m, patches)
     end, path = rolled(friction, m, [d], 500)
     for _ in range(500):
         theirs.step(d)
@@ -263,7 +332,9 @@ def test_a_grip_beside_the_centre_of_mass_holds_as_in_mujoco():
     # the pads of MuJoCo touch where those of MJX do to 1e-9 m, bristles give 4e-7 m
     np.testing.assert_allclose(path[-1, 0], d.qpos, atol=1e-8)
     np.testing.assert_allclose(friction.loads(end)[0], theirs.loads(d), rtol=1e-5)
-    np.testing.assert_allclose(friction.wrenches(end)[0, :, :2], theirs.wrenches(d)[:, :2], atol=1e-3)
+    np.testing.assert_allclose(
+        friction.wrenches(end)[0, :, :2], theirs.wrenches(d)[:, :2], atol=1e-3
+    )
 
 
 # ---------------------------------------------------------------------- the step in contact space
@@ -273,17 +344,26 @@ def in_operations(patches):
     """`CoupledPatches.step` in operations of JAX, for a batch of problems."""
     models = [_in_jax(model) for model in patches.models]
     by_load = any(model.reference_load is not None for model in models)
-    radius = jnp.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models])
+    radius = jnp.array(
+        [np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models]
+    )
 
     @jax.jit
     @jax.vmap
     def solve(states, twist, load, response, load_response, guess, dt):
-        host = newton.HostResponse(twist - response @ guess, load - load_response @ guess, response, load_response)
+        host = newton.HostResponse(
+            twist - response @ guess,
+            load - load_response @ guess,
+            response,
+            load_response,
+        )
 
         def unit(twists, loads):
             loads = jnp.maximum(loads, 1e-12) if by_load else jnp.ones_like(loads)
             each = zip(models, states, twists, loads, strict=True)
-            return jnp.stack([model.step(z, v, load, dt)[1] / load for model, z, v, load in each])
+            return jnp.stack(
+                [model.step(z, v, load, dt)[1] / load for model, z, v, load in each]
+            )
 
         found = newton.solve(newton.Unit(unit, by_load), host, guess, radius, 1e-9, 50)
         return found, host.twists(found.wrench), host.loads(found.wrench)
@@ -292,22 +372,44 @@ def in_operations(patches):
         flat = (np.reshape(each, (len(dt), -1)) for each in (host.twist, host.wrench))
         twist, guess = flat
         return solve(
-            patches.states(state), twist, host.normal_force, host.twist_response, host.load_response, guess, dt
+            patches.states(state),
+            twist,
+            host.normal_force,
+            host.twist_response,
+            host.load_response,
+            guess,
+            dt,
         )
 
     return step
 
 
-def compare_with_compiled(seed: int, kinds, steps: int, bodies: int, reference_load: float | None = None) -> None:
+def compare_with_compiled(
+    seed: int, kinds, steps: int, bodies: int, reference_load: float | None = None
+) -> None:
     generator = np.random.default_rng(seed)
     patches = random_patches(generator, 2, kinds)
     if reference_load is not None:
-        laws = [dataclasses.replace(model.law, reference_load=reference_load) for model in patches.models]
-        patches = CoupledPatches([model.with_law(law) for model, law in zip(patches.models, laws, strict=True)])
-    radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models])
+        laws = [
+            dataclasses.replace(model.law, reference_load=reference_load)
+            for model in patches.models
+        ]
+        patches = CoupledPatches(
+            [
+                model.with_law(law)
+                for model, law in zip(patches.models, laws, strict=True)
+            ]
+        )
+    radius = np.array(
+        [np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models]
+    )
     lever = np.stack([np.ones(2), np.ones(2), radius], 1)
-    step, both, rounds = in_operations(patches), 0, 0
-    for state, host, dt, theirs in random_run(generator, patches, random_bodies(generator, bodies, 2, 0.3), steps):
+    step = in_operations(patches)
+    both = 0
+    rounds = 0
+    for state, host, dt, theirs in random_run(
+        generator, patches, random_bodies(generator, bodies, 2, 0.3), steps
+    ):
         ours, twist, load = step(state, host, dt)
         good = np.asarray(ours.converged) & theirs.converged
         both += good.sum()
@@ -336,30 +438,50 @@ def test_the_step_in_contact_space_is_the_compiled_one_for_all_models(kind):
 def test_derivatives_of_the_step_in_contact_space_are_differences(reference_load):
     """A patch slides and spins under a changing load: derivatives to the host's numbers and to friction."""
     law = pf.LuGre(mu_s=1.2, reference_load=reference_load)
-    model = _in_jax(pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law))
+    model = _in_jax(
+        pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law)
+    )
     response = 0.01 * np.array([[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1e4]])
     load_response = np.array([[0.2, -0.1, 3.0]])
 
     def problem(numbers):
-        twist, load, mu_c, share = numbers[:3], numbers[3:4], numbers[4], numbers[5]
+        twist = numbers[:3]
+        load = numbers[3:4]
+        mu_c = numbers[4]
+        share = numbers[5]
         own = model.replace(parameters=model.parameters._replace(mu_c=mu_c))
 
         def unit(twists, loads):
-            return own.step(jnp.full((1, *own.rest().shape), 1e-7), twists, loads, 1e-3)[1] / loads[:, None]
+            return (
+                own.step(jnp.full((1, *own.rest().shape), 1e-7), twists, loads, 1e-3)[1]
+                / loads[:, None]
+            )
 
-        return newton.Unit(unit, True), newton.HostResponse(twist, load, share * response, share * load_response)
+        return newton.Unit(unit, True), newton.HostResponse(
+            twist, load, share * response, share * load_response
+        )
 
     @jax.jit
     @jax.value_and_grad
     def power(numbers):
-        found = newton.solve(*problem(jax.lax.stop_gradient(numbers)), jnp.zeros(3), jnp.array([0.01]), 1e-13, 50)
+        found = newton.solve(
+            *problem(jax.lax.stop_gradient(numbers)),
+            jnp.zeros(3),
+            jnp.array([0.01]),
+            1e-13,
+            50,
+        )
         unit, host = problem(numbers)
         wrench = newton.fitting(unit, host, found.wrench)
         return wrench @ jnp.array([1.0, -2.0, 100.0]) + host.loads(wrench)[0]
 
     at = np.array([0.05, 0.02, 5.0, 2.0, 1.0, 1.0])
-    slopes, steps = power(at)[1], 1e-6 * np.diag(at)
-    differences = [(power(at + step)[0] - power(at - step)[0]) / (2.0 * step.sum()) for step in steps]
+    slopes = power(at)[1]
+    steps = 1e-6 * np.diag(at)
+    differences = [
+        (power(at + step)[0] - power(at - step)[0]) / (2.0 * step.sum())
+        for step in steps
+    ]
     # rounding, 1e-13 over 1e-6 of the numbers, where friction falls by 10 N s/m
     np.testing.assert_allclose(slopes, differences, rtol=1e-5, atol=1e-5)
 
@@ -367,13 +489,22 @@ def test_derivatives_of_the_step_in_contact_space_are_differences(reference_load
 # ---------------------------------------------------------------------- bad input
 
 BAD = {
-    "RK4": ({"integrator": mujoco.mjtIntegrator.mjINT_RK4}, "integrator must be Euler, implicitfast, got RK4"),
+    "RK4": (
+        {"integrator": mujoco.mjtIntegrator.mjINT_RK4},
+        "integrator must be Euler, implicitfast, got RK4",
+    ),
     "implicit": (
         {"integrator": mujoco.mjtIntegrator.mjINT_IMPLICIT},
         "integrator must be Euler, implicitfast, got IMPLICIT",
     ),
-    "elliptic": ({"cone": mujoco.mjtCone.mjCONE_ELLIPTIC}, "cone must be pyramidal: .* got elliptic"),
-    "noslip": ({"noslip_iterations": 3}, "noslip_iterations must be 0: they would change the solution, got 3"),
+    "elliptic": (
+        {"cone": mujoco.mjtCone.mjCONE_ELLIPTIC},
+        "cone must be pyramidal: .* got elliptic",
+    ),
+    "noslip": (
+        {"noslip_iterations": 3},
+        "noslip_iterations must be 0: they would change the solution, got 3",
+    ),
 }
 
 
@@ -390,24 +521,46 @@ def test_what_does_not_fit_is_refused_in_one_line():
     m, d, patches = made(scene)
     site, geoms = scene.patches[0]
     finger = pf.SoftFinger(c=6e-3, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.01)
-    soft = pf.DistributedModel(pf.ContactPatch.rectangle(0.02, cells=9, pressure=finger), scene.model.law)
+    soft = pf.DistributedModel(
+        pf.ContactPatch.rectangle(0.02, cells=9, pressure=finger), scene.model.law
+    )
     for wrong, message in (
         ([patches[0], patches[0]], "patches must have each pair of geoms once"),
-        ([PatchContact(scene.model, site="nowhere", geoms=geoms)], "site must be in the model, got nowhere"),
-        ([PatchContact(scene.model, site=site, geoms=("floor", "none"))], "geoms must be in the model, got none"),
-        ([PatchContact(soft, site=site, geoms=geoms)], "model must have a shape that does not change with the load"),
+        (
+            [PatchContact(scene.model, site="nowhere", geoms=geoms)],
+            "site must be in the model, got nowhere",
+        ),
+        (
+            [PatchContact(scene.model, site=site, geoms=("floor", "none"))],
+            "geoms must be in the model, got none",
+        ),
+        (
+            [PatchContact(soft, site=site, geoms=geoms)],
+            "model must have a shape that does not change with the load",
+        ),
     ):
         with pytest.raises(InvalidValueError, match=message):
             Friction(m, wrong)
     m.pair_dim[0] = 3
-    with pytest.raises(InvalidValueError, match="pair must have condim 1 between floor and disc"):
+    with pytest.raises(
+        InvalidValueError, match="pair must have condim 1 between floor and disc"
+    ):
         Friction(m, patches)
     m.pair_dim[0] = 1
-    friction, mx, there = Friction(m, patches), mjx.put_model(m), mjx.put_data(m, d)
+    friction = Friction(m, patches)
+    mx = mjx.put_model(m)
+    there = mjx.put_data(m, d)
     two = jax.tree.map(lambda each: jnp.stack([each, each]), there)
-    with pytest.raises(InvalidValueError, match=r"models must be models of .*: [A-Za-z]+, got"):
+    with pytest.raises(
+        InvalidValueError, match=r"models must be models of .*: [A-Za-z]+, got"
+    ):
         friction.replace([scene.model])
-    with pytest.raises(InvalidValueError, match=r"userdata must have shape \[\d+\]: of one environment"):
+    with pytest.raises(
+        InvalidValueError, match=r"userdata must have shape \[\d+\]: of one environment"
+    ):
         friction.step(mx, two)
-    with pytest.raises(InvalidValueError, match=r"precision must be float64, that of JAX .*, got data of float32"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"precision must be float64, that of JAX .*, got data of float32",
+    ):
         friction.step(mx, there.replace(qpos=there.qpos.astype("float32")))

@@ -18,7 +18,9 @@ from planarfriction.adapters.mjx import Friction, PatchContact, prepare  # noqa:
 
 pytestmark = pytest.mark.mjx
 
-LAW = pf.LuGre(mu_c=0.3, mu_s=0.4, v_s=0.01, sigma_0=1e5, sigma_1=10.0, elasto_plastic=0.9)
+LAW = pf.LuGre(
+    mu_c=0.3, mu_s=0.4, v_s=0.01, sigma_0=1e5, sigma_1=10.0, elasto_plastic=0.9
+)
 
 BALLS = """<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type="plane" size="9 9 .1"/>
     <body pos="0 0 0.00998"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
@@ -29,8 +31,17 @@ BALLS = """<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type=
     </worldbody></mujoco>"""
 """Slides and spins on two patches of the same model."""
 
-DRAWN = {"mu_c": [0.2, 0.35, 0.3], "mu_s": [0.25, 0.4, 0.6], "v_s": [1e-2, 2e-2, 1e-3], "scale": [0.7, 1.0, 1.4]}
-DRAWN |= {"centre_x": [0.0, 0.002, -0.003], "centre_y": [0.001, 0.0, 0.004], "sigma_1": [10.0, 0.0, 50.0]}
+DRAWN = {
+    "mu_c": [0.2, 0.35, 0.3],
+    "mu_s": [0.25, 0.4, 0.6],
+    "v_s": [1e-2, 2e-2, 1e-3],
+    "scale": [0.7, 1.0, 1.4],
+}
+DRAWN |= {
+    "centre_x": [0.0, 0.002, -0.003],
+    "centre_y": [0.001, 0.0, 0.004],
+    "sigma_1": [10.0, 0.0, 50.0],
+}
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -56,13 +67,21 @@ def made():
 @pytest.mark.slow
 def test_environments_with_friction_of_their_own_step_as_copies_in_mujoco(made):
     m, d, theirs, ours = made
-    mx, steps = mjx.put_model(m), 40
+    mx = mjx.put_model(m)
+    steps = 40
 
     def rolled(parameters):
         friction = ours.with_parameters(parameters)
-        return jax.lax.scan(lambda d, _: (friction.step(mx, d), None), mjx.put_data(m, d), None, length=steps)[0]
+        return jax.lax.scan(
+            lambda d, _: (friction.step(mx, d), None),
+            mjx.put_data(m, d),
+            None,
+            length=steps,
+        )[0]
 
-    ends = jax.jit(jax.vmap(rolled))({name: jnp.array(values) for name, values in DRAWN.items()})
+    ends = jax.jit(jax.vmap(rolled))(
+        {name: jnp.array(values) for name, values in DRAWN.items()}
+    )
     for e, model in enumerate(theirs.copies(DRAWN)):
         alone = mujoco.MjData(model)
         alone.qvel[:] = d.qvel
@@ -70,24 +89,34 @@ def test_environments_with_friction_of_their_own_step_as_copies_in_mujoco(made):
             theirs.step(alone)
         # both solve to 1e-9 m/s a step
         np.testing.assert_allclose(ends.qpos[e], alone.qpos, atol=2e-9)
-        np.testing.assert_allclose(ours.wrenches(ends)[e], theirs.wrenches(alone), atol=1e-6)
-        np.testing.assert_allclose(ours.twists(ends)[e], theirs.twists(alone), atol=1e-7)
+        np.testing.assert_allclose(
+            ours.wrenches(ends)[e], theirs.wrenches(alone), atol=1e-6
+        )
+        np.testing.assert_allclose(
+            ours.twists(ends)[e], theirs.twists(alone), atol=1e-7
+        )
     assert np.ptp(ends.qpos[:, 0]) > 1e-3
 
 
 @pytest.mark.slow
 def test_derivatives_by_the_parameters_of_one_patch_are_differences(made):
     m, d, _, ours = made
-    mx, base = mjx.put_model(m), {"mu_c": 0.3, "scale": 1.2, "centre_y": 0.001}
+    mx = mjx.put_model(m)
+    base = {"mu_c": 0.3, "scale": 1.2, "centre_y": 0.001}
 
     def slid(values):
-        own = {name: jnp.stack([value, jnp.asarray(base[name])]) for name, value in zip(base, values, strict=True)}
+        own = {
+            name: jnp.stack([value, jnp.asarray(base[name])])
+            for name, value in zip(base, values, strict=True)
+        }
         friction = ours.with_parameters(own)
         last = friction.step(mx, friction.step(mx, mjx.put_data(m, d)))
         return last.qvel @ jnp.array([1.0, 1.0, 0.0, 0.02])
 
     at = np.array([0.25, 1.1, 0.002])
-    found = jax.jit(jax.vmap(lambda values, along: jax.jvp(slid, (values,), (along,)), (0, 0)))
+    found = jax.jit(
+        jax.vmap(lambda values, along: jax.jvp(slid, (values,), (along,)), (0, 0))
+    )
     _, slopes = found(np.tile(at, (3, 1)), np.eye(3))
     steps = 1e-5 * np.diag(at)
     more, less = (found(at + sign * steps, np.eye(3))[0] for sign in (1.0, -1.0))
@@ -112,7 +141,10 @@ def test_numbers_of_the_model_of_mujoco_count(made):
     ("parameters", "message"),
     [
         ({"mu": 0.3}, "parameters key must be one of"),
-        ({"mu_c": np.ones(3)}, r"mu_c must be a number or have shape \[2\]: see jax.vmap, got \[3\]"),
+        (
+            {"mu_c": np.ones(3)},
+            r"mu_c must be a number or have shape \[2\]: see jax.vmap, got \[3\]",
+        ),
         ({"mu_c": 0.5}, "mu_s must be >= mu_c, got mu_s=0.4, mu_c=0.5"),
         ({"scale": [1.0, -1.0]}, "scale must be > 0, got -1.0"),
     ],

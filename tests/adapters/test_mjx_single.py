@@ -40,20 +40,28 @@ def test_a_box_slides_and_rests_as_in_double_precision():
     spec = mujoco.MjSpec.from_string(BOX)
     prepare(spec, patches)
     m = spec.compile()
-    theirs, d = adapter.Friction(m, patches), mujoco.MjData(m)
+    theirs = adapter.Friction(m, patches)
+    d = mujoco.MjData(m)
     for _ in range(200):
         theirs.step(d)
     d.qvel[:] = 0.3, 0.2, 0.0, 0.0, 0.0, 6.0
-    ours, mx = Friction(m, patches), mjx.put_model(m)
+    ours = Friction(m, patches)
+    mx = mjx.put_model(m)
 
     def one(x, _):
         x = ours.step(mx, x)
         report = ours.report(x)
-        return x, (x.qpos, x.qvel, ours.wrenches(x)[0], report.converged, report.iterations)
+        return x, (
+            x.qpos,
+            x.qvel,
+            ours.wrenches(x)[0],
+            report.converged,
+            report.iterations,
+        )
 
-    end, (qpos, qvel, wrench, converged, iterations) = jax.jit(lambda x: jax.lax.scan(one, x, None, length=300))(
-        mjx.put_data(m, d)
-    )
+    end, (qpos, qvel, wrench, converged, iterations) = jax.jit(
+        lambda x: jax.lax.scan(one, x, None, length=300)
+    )(mjx.put_data(m, d))
     assert qpos.dtype == jnp.float32 and end.userdata.dtype == jnp.float32
     path = []
     for _ in range(300):

@@ -18,14 +18,24 @@ BELT = """<geom name="floor" type="plane" size="5 5 1" surfacevel="0.5 0 0 0 0 0
 <geom name="box" type="box" size="0.02 0.02 0.02" mass="0.2"/><site name="sole" pos="0 0 -0.02"/></body>"""
 BALL = """<geom name="floor" type="plane" size="50 5 1"/><body pos="0 0 0.04999"><freejoint/>
 <geom name="ball" type="sphere" size="0.05" mass="0.1"/><site name="ball"/></body>"""
-SOLE = pf.ReducedModel(pf.ContactPatch.rectangle(0.04), pf.LuGre(mu_c=0.4, sigma_2=0.0, elasto_plastic=0.9))
+SOLE = pf.ReducedModel(
+    pf.ContactPatch.rectangle(0.04), pf.LuGre(mu_c=0.4, sigma_2=0.0, elasto_plastic=0.9)
+)
 SOFT = pf.LuGre(mu_c=0.5, sigma_0=1e3, sigma_1=60.0, sigma_2=0.0, elasto_plastic=0.9)
 ON_BELT = [PatchContact(SOLE, "sole", ("box", "floor"))]
-ROLLING = [PatchContact(pf.ReducedModel(pf.ContactPatch.disc(0.003, cells=5), SOFT), "ball", ("ball", "floor"))]
+ROLLING = [
+    PatchContact(
+        pf.ReducedModel(pf.ContactPatch.disc(0.003, cells=5), SOFT),
+        "ball",
+        ("ball", "floor"),
+    )
+]
 
 
 def model(text: str, patches, angle: float = 0.0):
-    spec = mujoco.MjSpec.from_string(f'<mujoco><option cone="pyramidal"/><worldbody>{text}</worldbody></mujoco>')
+    spec = mujoco.MjSpec.from_string(
+        f'<mujoco><option cone="pyramidal"/><worldbody>{text}</worldbody></mujoco>'
+    )
     spec.option.gravity = G * math.sin(angle), 0.0, -G * math.cos(angle)
     return prepare(spec, patches).compile()
 
@@ -37,9 +47,11 @@ def in_mjx(m, patches, steps: int) -> np.ndarray:
     from planarfriction.adapters.mjx import Friction
 
     with jax.enable_x64(True):
-        friction, data = Friction(m, patches), mjx.put_data(m, mujoco.MjData(m))
+        friction = Friction(m, patches)
+        data = mjx.put_data(m, mujoco.MjData(m))
         theirs = mjx.put_model(m)
-        step, speeds = jax.jit(lambda d: friction.step(theirs, d)), []
+        step = jax.jit(lambda d: friction.step(theirs, d))
+        speeds = []
         for _ in range(steps):
             data = step(data)
             speeds.append(float(data.qvel[0]))
@@ -50,7 +62,8 @@ def in_warp(m, patches, steps: int) -> np.ndarray:
     pytest.importorskip("mujoco_warp")
     from planarfriction.adapters.mujoco_warp import Friction
 
-    friction, speeds = Friction(m, patches, njmax=20, nconmax=10), []
+    friction = Friction(m, patches, njmax=20, nconmax=10)
+    speeds = []
     for _ in range(steps):
         friction.step()
         speeds.append(float(friction.data.qvel.numpy()[0, 0]))

@@ -70,7 +70,9 @@ def test_twists_and_loads_come_out_as_they_were_solved_for(integrator, jacobian)
     <geom name="box" type="box" size="0.02 0.015 0.025" mass="0.3" contype="0" conaffinity="1"/>
     <site name="box" pos="0 0 -0.025" euler="0 0 30"/></body></worldbody>
     <actuator><position joint="x" kp="300" kv="5"/></actuator></mujoco>"""
-    _, d, friction = _made(text, [PatchContact(PAD, site="box", geoms=("box", "tray"), centre="contact")])
+    _, d, friction = _made(
+        text, [PatchContact(PAD, site="box", geoms=("box", "tray"), centre="contact")]
+    )
     seen = {"slid": 0.0, "passes": 0, "followed": 0.0}
     for i in range(600):
         d.ctrl[:] = 0.04 * np.sin(25.0 * d.time)
@@ -96,12 +98,21 @@ def test_contact_is_lost_and_found_again():
         step_checked(friction, d, 1e-8)
         loads.append(friction.loads(d)[0])
         if loads[-1] == 0.0:
-            assert (friction.wrenches(d) == 0.0).all() and (friction.state(d) == 0.0).all()
+            assert (friction.wrenches(d) == 0.0).all() and (
+                friction.state(d) == 0.0
+            ).all()
     away = np.flatnonzero(np.array(loads) == 0.0)
-    assert 80 < len(away) < 110 and away[-1] < 180 and loads[-1] == pytest.approx(0.981, rel=1e-2)
+    assert (
+        80 < len(away) < 110
+        and away[-1] < 180
+        and loads[-1] == pytest.approx(0.981, rel=1e-2)
+    )
 
 
-@pytest.mark.parametrize(("cone", "solver"), [("pyramidal", "Newton"), ("elliptic", "Newton"), ("elliptic", "CG")])
+@pytest.mark.parametrize(
+    ("cone", "solver"),
+    [("pyramidal", "Newton"), ("elliptic", "Newton"), ("elliptic", "CG")],
+)
 def test_other_contacts_keep_mujocos_own_friction(cone, solver):
     """A box that is dragged over the floor by another on it: MuJoCo's friction below, that of a patch between."""
     text = f"""<mujoco><option timestep="0.002" cone="{cone}" solver="{solver}" tolerance="1e-15" iterations="200"/>
@@ -113,7 +124,9 @@ def test_other_contacts_keep_mujocos_own_friction(cone, solver):
     <geom name="upper" type="box" size="0.03 0.03 0.02" mass="0.5" contype="0" conaffinity="1"/>
     <site name="upper" pos="0 0 -0.02"/></body></worldbody></mujoco>"""
     face = pf.ReducedModel(pf.ContactPatch.rectangle(0.06, cells=9), LAW)
-    _, d, friction = _made(text, [PatchContact(face, site="upper", geoms=("lower", "upper"))])
+    _, d, friction = _made(
+        text, [PatchContact(face, site="upper", geoms=("lower", "upper"))]
+    )
     slid = np.zeros(2)
     for _ in range(400):
         d.qfrc_applied[6] = 6.0 * np.sin(12.0 * d.time)
@@ -125,7 +138,8 @@ def test_other_contacts_keep_mujocos_own_friction(cone, solver):
 
 
 def test_many_trees_with_sparse_jacobians_step_as_with_dense_ones():
-    scene, ends = mujoco_scenes.tray(11), {}
+    scene = mujoco_scenes.tray(11)
+    ends = {}
     assert scene.ours()[0].nv == 68
     for jacobian in (0, 1):
         m, d, friction = scene.ours()
@@ -143,11 +157,18 @@ def test_models_of_all_kinds_hold_and_pads_may_differ():
     patch = pf.ContactPatch.disc(radius=0.01, cells=9)
     law = pf.LuGre(mu_c=1.0, elasto_plastic=0.9)
     scene = mujoco_scenes.grip()
-    kinds = pf.DistributedModel(patch, law), pf.ReducedModelPublished(patch, law), pf.ReducedModel(patch, law)
+    kinds = (
+        pf.DistributedModel(patch, law),
+        pf.ReducedModelPublished(patch, law),
+        pf.ReducedModel(patch, law),
+    )
     text = scene.text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler")
     for kind in kinds:
         models = PAD, kind
-        patches = [PatchContact(model, site=s, geoms=g) for model, (s, g) in zip(models, scene.patches, strict=True)]
+        patches = [
+            PatchContact(model, site=s, geoms=g)
+            for model, (s, g) in zip(models, scene.patches, strict=True)
+        ]
         _, d, friction = _made(text, patches)
         d.ctrl[:] = 6.0
         for _ in range(200):
@@ -161,21 +182,28 @@ def test_twists_and_wrenches_are_in_the_axes_of_the_site():
     """Whatever tangents MuJoCo gives the contact: the weight is along the axis of the site that lies aslant."""
     scene = mujoco_scenes.tray(1)
     text = scene.text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler").replace(
-        'site name="block 0" pos="0 0 -0.02"', 'site name="block 0" pos="0 0 -0.02" euler="0 0 40"'
+        'site name="block 0" pos="0 0 -0.02"',
+        'site name="block 0" pos="0 0 -0.02" euler="0 0 40"',
     )
-    m, d, friction = _made(text, [PatchContact(PAD, site="block 0", geoms=("tray", "block 0"))])
+    m, d, friction = _made(
+        text, [PatchContact(PAD, site="block 0", geoms=("tray", "block 0"))]
+    )
     m.opt.gravity[0] = 2.0
     for _ in range(300):
         friction.step(d)
     turned = np.radians(40.0)
     wrench = friction.wrenches(d)[0]
-    np.testing.assert_allclose(wrench[:2], -0.1 * 2.0 * np.array([np.cos(turned), -np.sin(turned)]), atol=1e-6)
+    np.testing.assert_allclose(
+        wrench[:2], -0.1 * 2.0 * np.array([np.cos(turned), -np.sin(turned)]), atol=1e-6
+    )
     d.qvel[2:4] = 3.0, 0.0
     before = d.qvel.copy()
     friction.step(d)
     vx, vy, _ = friction.twists(d)[0]
     assert vx > 1.0 and np.arctan2(-vy, vx) == pytest.approx(turned, abs=1e-2)
-    np.testing.assert_allclose(twists_and_loads(friction, d, before)[0], friction.twists(d), atol=1e-8)
+    np.testing.assert_allclose(
+        twists_and_loads(friction, d, before)[0], friction.twists(d), atol=1e-8
+    )
 
 
 # ---------------------------------------------------------------------- the callback
@@ -185,7 +213,8 @@ def test_installed_friction_steps_as_step_does_and_keeps_user_data():
     scene = mujoco_scenes.shaken()
     m, d, friction = _held(scene)
     other = copy.copy(d)
-    other.qfrc_applied[4], d.qfrc_applied[4] = 0.1, 0.1
+    other.qfrc_applied[4] = 0.1
+    d.qfrc_applied[4] = 0.1
     with friction.install() as installed:
         assert installed is friction and mujoco.get_mjcb_control() is not None
         for _ in range(100):
@@ -193,16 +222,23 @@ def test_installed_friction_steps_as_step_does_and_keeps_user_data():
     assert mujoco.get_mjcb_control() is None
     for _ in range(100):
         friction.step(d)
-    assert np.array_equal(d.qpos, other.qpos) and np.array_equal(friction.state(d), friction.state(other))
+    assert np.array_equal(d.qpos, other.qpos) and np.array_equal(
+        friction.state(d), friction.state(other)
+    )
     for each in (d, other):
-        assert each.qfrc_applied[4] == 0.1 and (np.delete(each.qfrc_applied, 4) == 0.0).all()
+        assert (
+            each.qfrc_applied[4] == 0.1
+            and (np.delete(each.qfrc_applied, 4) == 0.0).all()
+        )
 
 
 def test_other_models_are_left_alone_and_copies_are_not():
     scene = mujoco_scenes.grip()
     m, _, friction = _held(scene)
-    same, bare = copy.copy(m), mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
-    other, nothing = mujoco.MjData(same), mujoco.MjData(bare)
+    same = copy.copy(m)
+    bare = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
+    other = mujoco.MjData(same)
+    nothing = mujoco.MjData(bare)
     with friction.install():
         mujoco.mj_step(bare, nothing)
         other.ctrl[:] = 3.0
@@ -219,7 +255,10 @@ def test_another_model_of_the_same_size_is_not_served():
     law = dataclasses.replace(LAW, mu_c=0.4)
     m, other, slippery = scene.ours(model=pf.ReducedModel(PAD.patch, law))
     assert (m.nv, m.nuserdata) == (friction.m.nv, friction.m.nuserdata)
-    with pytest.raises(pf.errors.InvalidValueError, match="d must be data of the model of the patches, or of a copy"):
+    with pytest.raises(
+        pf.errors.InvalidValueError,
+        match="d must be data of the model of the patches, or of a copy",
+    ):
         friction.step(other)
     with friction.install():
         for data in (other, mujoco.MjData(scene.ours()[0])):
@@ -275,15 +314,19 @@ def test_derivatives_by_finite_differences_see_friction():
         for each, push in ((d, 1e-6), (other, -1e-6)):
             each.qvel[0] += push
             mujoco.mj_step(m, each)
-    lift, block = m.nv + 0, m.nv + m.joint("turn").id + 5
-    assert a[block, lift] == pytest.approx((d.qvel - other.qvel)[block - m.nv] / 2e-6, rel=1e-4)
+    lift = m.nv + 0
+    block = m.nv + m.joint("turn").id + 5
+    assert a[block, lift] == pytest.approx(
+        (d.qvel - other.qvel)[block - m.nv] / 2e-6, rel=1e-4
+    )
 
 
 def test_data_restore_bit_for_bit():
     scene = mujoco_scenes.shaken()
     for integrator in ("Euler", "implicit", "implicitfast"):
         m, d, friction = _held(scene, integrator=integrator)
-        saved, other = _saved(m, d), mujoco.MjData(m)
+        saved = _saved(m, d)
+        other = mujoco.MjData(m)
         mujoco.mj_setState(m, other, saved, STATE)
         for each in (d, other, copy.copy(d)):
             mujoco.mj_setState(m, each, saved, STATE)
@@ -303,7 +346,9 @@ def test_rollouts_agree_for_any_former_data_and_number_of_threads():
     start = np.zeros(mujoco.mj_stateSize(m, full))
     mujoco.mj_getState(m, d, start, full)
     starts = np.tile(start, (6, 1))
-    controls = np.array([[scene.control(2e-3 * i + 0.1 * e) for i in range(40)] for e in range(6)])
+    controls = np.array(
+        [[scene.control(2e-3 * i + 0.1 * e) for i in range(40)] for e in range(6)]
+    )
     one = mujoco.MjData(m)
     with friction.install():
         first, _ = rollout.rollout(m, one, starts, controls)
@@ -324,15 +369,35 @@ def test_rollouts_agree_for_any_former_data_and_number_of_threads():
 
 
 BAD = {
-    "RK4": ("integrator", 1, "integrator must be Euler, implicit, implicitfast, got RK4"),
-    "noslip": ("noslip_iterations", 3, "noslip_iterations must be 0: they would change the solution, got 3"),
-    "timestep": ("timestep", 0.011, r"timestep must be at most half of solref\[0\] = 0.02 s of the pair"),
+    "RK4": (
+        "integrator",
+        1,
+        "integrator must be Euler, implicit, implicitfast, got RK4",
+    ),
+    "noslip": (
+        "noslip_iterations",
+        3,
+        "noslip_iterations must be 0: they would change the solution, got 3",
+    ),
+    "timestep": (
+        "timestep",
+        0.011,
+        r"timestep must be at most half of solref\[0\] = 0.02 s of the pair",
+    ),
 }
 if hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE"):
     discrete = int(mujoco.mjtIntegrator.mjINT_DISCRETE)
-    BAD["discrete"] = ("integrator", discrete, "integrator must be Euler, implicit, implicitfast, got DISCRETE")
+    BAD["discrete"] = (
+        "integrator",
+        discrete,
+        "integrator must be Euler, implicit, implicitfast, got DISCRETE",
+    )
 if hasattr(mujoco.mjtEnableBit, "mjENBL_SLEEP"):
-    BAD["sleep"] = ("enableflags", int(mujoco.mjtEnableBit.mjENBL_SLEEP), "sleep must be disabled")
+    BAD["sleep"] = (
+        "enableflags",
+        int(mujoco.mjtEnableBit.mjENBL_SLEEP),
+        "sleep must be disabled",
+    )
 
 
 @pytest.mark.parametrize("name", BAD)
@@ -354,7 +419,8 @@ CHANGED = BAD | {"timestep": ("timestep", 0.015, BAD["timestep"][2])}
 def test_options_changed_at_run_time_are_refused_before_the_step(name):
     m, d, friction = _held(mujoco_scenes.grip())
     if name == "condim":
-        m.pair_dim[0], message = 3, "pair must have condim 1 between pad left and block"
+        m.pair_dim[0] = 3
+        message = "pair must have condim 1 between pad left and block"
     else:
         option, value, message = CHANGED[name]
         setattr(m.opt, option, value)
@@ -364,8 +430,15 @@ def test_options_changed_at_run_time_are_refused_before_the_step(name):
     assert d.time == time and (friction.wrenches(d) == 0.0).all()
     with pytest.raises(pf.errors.InvalidValueError, match=message):
         friction.step(d)
-    m.opt.integrator, m.opt.noslip_iterations, m.opt.timestep, m.opt.enableflags, m.pair_dim[:] = 0, 0, 2e-3, 0, 1
-    with pytest.raises(pf.errors.InvalidValueError, match="integrator"), friction.install():
+    m.opt.integrator = 0
+    m.opt.noslip_iterations = 0
+    m.opt.timestep = 2e-3
+    m.opt.enableflags = 0
+    m.pair_dim[:] = 1
+    with (
+        pytest.raises(pf.errors.InvalidValueError, match="integrator"),
+        friction.install(),
+    ):
         friction.step(d)
         assert friction.report(d).converged
         m.opt.integrator = 1
@@ -377,7 +450,10 @@ def test_options_changed_at_run_time_are_refused_before_the_step(name):
 def test_implicit_steps_may_be_longer_than_contacts_are_stiff(integrator):
     """A quarter of what Euler takes: MuJoCo makes contacts softer (`refsafe`), unless it may not."""
     scene = dataclasses.replace(mujoco_scenes.grip(), time=1.0)
-    with pytest.raises(pf.errors.InvalidValueError, match=r"or 0\.01 s with refsafe and implicit or implicitfast, got"):
+    with pytest.raises(
+        pf.errors.InvalidValueError,
+        match=r"or 0\.01 s with refsafe and implicit or implicitfast, got",
+    ):
         scene.ours(5e-3, "Euler", 0.004)
     m, d, friction = scene.ours(5e-3, integrator, 0.004)
     path = scene.run(m, d, lambda: friction.step(d))
@@ -389,8 +465,12 @@ def test_implicit_steps_may_be_longer_than_contacts_are_stiff(integrator):
 
 def test_preparing_twice_takes_user_data_once():
     text = mujoco_scenes.grip().text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler")
-    patches = [PatchContact(PAD, site=site, geoms=geoms) for site, geoms in mujoco_scenes.grip().patches]
-    spec, once = mujoco.MjSpec.from_string(text), mujoco.MjSpec.from_string(text)
+    patches = [
+        PatchContact(PAD, site=site, geoms=geoms)
+        for site, geoms in mujoco_scenes.grip().patches
+    ]
+    spec = mujoco.MjSpec.from_string(text)
+    once = mujoco.MjSpec.from_string(text)
     spec.nuserdata = once.nuserdata = 7  # the user's own
     prepare(once, patches)
     for each in (patches, patches[:1], patches):
@@ -406,32 +486,54 @@ def test_preparing_twice_takes_user_data_once():
 def test_unprepared_models_and_unknown_names_are_refused():
     scene = mujoco_scenes.grip()
     m, _, friction = scene.ours()
-    patches, pads = friction.patches, ("pad left", "block")
+    patches = friction.patches
+    pads = ("pad left", "block")
     bare, _ = scene.native(mujoco_scenes.Native())
-    with pytest.raises(pf.errors.InvalidValueError, match=r"pair must be in the model \(prepare adds it\)"):
+    with pytest.raises(
+        pf.errors.InvalidValueError,
+        match=r"pair must be in the model \(prepare adds it\)",
+    ):
         Friction(bare, patches)
     text = scene.text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler")
     spec = mujoco.MjSpec.from_string(text)
     prepare(spec, patches)
     spec.pairs[0].condim = 3
-    with pytest.raises(pf.errors.InvalidValueError, match=r"pair must have condim 1 between .* got 3"):
-        Friction(spec.compile(), patches)
-    spec.pairs[0].condim, spec.nuserdata = 1, 5
     with pytest.raises(
-        pf.errors.InvalidValueError, match=r"nuserdata must be at least \d+ \(prepare adds them\), got 5"
+        pf.errors.InvalidValueError, match=r"pair must have condim 1 between .* got 3"
     ):
         Friction(spec.compile(), patches)
-    soft = pf.ContactPatch.rectangle(0.02, cells=9, pressure=pf.SoftFinger(c=0.01, n=0.3, k=2.0))
+    spec.pairs[0].condim = 1
+    spec.nuserdata = 5
+    with pytest.raises(
+        pf.errors.InvalidValueError,
+        match=r"nuserdata must be at least \d+ \(prepare adds them\), got 5",
+    ):
+        Friction(spec.compile(), patches)
+    soft = pf.ContactPatch.rectangle(
+        0.02, cells=9, pressure=pf.SoftFinger(c=0.01, n=0.3, k=2.0)
+    )
     for wrong, message in (
-        ([patches[0], patches[0]], "patches must have each pair of geoms once, got block, pad left"),
+        (
+            [patches[0], patches[0]],
+            "patches must have each pair of geoms once, got block, pad left",
+        ),
         ([], "patches must be a list of PatchContact, not empty"),
-        (patches[0], "patches must be a list of PatchContact, not empty, got PatchContact"),
+        (
+            patches[0],
+            "patches must be a list of PatchContact, not empty, got PatchContact",
+        ),
         (
             [PatchContact(PAD, site="left", geoms=("block", "block"))],
             "geoms must be on two bodies",
         ),
-        ([PatchContact(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
-        ([PatchContact(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
+        (
+            [PatchContact(PAD, site="nowhere", geoms=pads)],
+            "site must be in the model, got nowhere",
+        ),
+        (
+            [PatchContact(PAD, site="left", geoms=("pad left", "nothing"))],
+            "geoms must be in the model, got nothing",
+        ),
         (
             [PatchContact(PAD, site="left", geoms=("pad left", "pad right"))],
             "site must be on the body of one of the geoms",
@@ -445,19 +547,29 @@ def test_unprepared_models_and_unknown_names_are_refused():
         with pytest.raises(pf.errors.InvalidValueError, match=message):
             Friction(m, wrong)
     for wrong, message in (
-        ([PatchContact(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
-        ([PatchContact(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
+        (
+            [PatchContact(PAD, site="nowhere", geoms=pads)],
+            "site must be in the model, got nowhere",
+        ),
+        (
+            [PatchContact(PAD, site="left", geoms=("pad left", "nothing"))],
+            "geoms must be in the model, got nothing",
+        ),
         ([patches[0], patches[0]], "patches must have each pair of geoms once"),
     ):
         with pytest.raises(pf.errors.InvalidValueError, match=message):
             prepare(mujoco.MjSpec.from_string(text), wrong)
-    with pytest.raises(pf.errors.InvalidValueError, match="centre must be one of auto, site, contact"):
+    with pytest.raises(
+        pf.errors.InvalidValueError, match="centre must be one of auto, site, contact"
+    ):
         PatchContact(PAD, site="L", geoms=pads, centre="middle")
 
 
 def test_one_callback_at_a_time():
     _, _, friction = mujoco_scenes.grip().ours()
-    refused = pytest.raises(pf.errors.FrictionError, match="a control callback is installed already")
+    refused = pytest.raises(
+        pf.errors.FrictionError, match="a control callback is installed already"
+    )
     with friction.install(), refused, friction.install():
         pass
     mujoco.set_mjcb_control(lambda m, d: None)

@@ -15,7 +15,9 @@ from tests.support.mujoco_misfit import step_checked  # noqa: E402
 
 pytestmark = pytest.mark.mujoco
 
-LAW = pf.LuGre(mu_c=0.3, mu_s=0.3, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+LAW = pf.LuGre(
+    mu_c=0.3, mu_s=0.3, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9
+)
 DT, RADIUS, MASS = 2e-3, 0.05, 0.5
 SMALL = pf.ReducedModel(pf.ContactPatch.disc(radius=0.004, cells=9), LAW)
 LINE = pf.ReducedModel(pf.ContactPatch.rectangle(0.0005, 0.08, cells=9), LAW)
@@ -23,7 +25,9 @@ FACE = pf.ReducedModel(pf.ContactPatch.rectangle(0.08, cells=9), LAW)
 BOX = 'type="box" size="0.04 0.04 0.04"'
 
 
-def on_the_floor(geom: str, site: str, model=SMALL, height=RADIUS, turned="", inertia=0.4, **options):
+def on_the_floor(
+    geom: str, site: str, model=SMALL, height=RADIUS, turned="", inertia=0.4, **options
+):
     """Return data after a body on a plane has come to rest, and friction."""
     i = inertia * MASS * RADIUS**2
     spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{DT}" integrator="implicitfast"/><worldbody>
@@ -33,7 +37,8 @@ def on_the_floor(geom: str, site: str, model=SMALL, height=RADIUS, turned="", in
     patches = [PatchContact(model, site="site", geoms=("floor", "body"), **options)]
     prepare(spec, patches)
     m = spec.compile()
-    d, friction = mujoco.MjData(m), Friction(m, patches)
+    d = mujoco.MjData(m)
+    friction = Friction(m, patches)
     for _ in range(300):
         friction.step(d)
     return d, friction
@@ -41,7 +46,13 @@ def on_the_floor(geom: str, site: str, model=SMALL, height=RADIUS, turned="", in
 
 ROUND = {
     "sphere": ('type="sphere" size="0.05"', 'pos="0 0 -0.05"', SMALL, "", 0.4),
-    "cylinder": ('type="cylinder" size="0.05 0.04"', 'pos="0 -0.05 0"', LINE, 'euler="90 0 0"', 0.5),
+    "cylinder": (
+        'type="cylinder" size="0.05 0.04"',
+        'pos="0 -0.05 0"',
+        LINE,
+        'euler="90 0 0"',
+        0.5,
+    ),
 }
 
 
@@ -57,7 +68,9 @@ def test_round_bodies_slide_until_they_roll(name):
         step_checked(friction, d, 1e-8)
         speeds.append(d.qvel[0])
     # MuJoCo's contact points lie between the surfaces: by half of what the body sinks in
-    assert speeds[-1] == pytest.approx(1.0 / (1.0 + inertia * (RADIUS / radius) ** 2), rel=3e-3)
+    assert speeds[-1] == pytest.approx(
+        1.0 / (1.0 + inertia * (RADIUS / radius) ** 2), rel=3e-3
+    )
     assert np.ptp(speeds[250:]) < 1e-5
     assert friction.misplaced(d) is None
 
@@ -66,12 +79,19 @@ def test_round_bodies_slide_until_they_roll(name):
 def test_pads_with_jumping_points_do_not_creep(centre):
     """MuJoCo finds four other points of a cylinder's rim from step to step: their centre jumps by 1 mm."""
     scene = mujoco_scenes.grip("cylinder")
-    text = scene.text(mujoco_scenes.Native(condim=1, impratio=1.0), DT, "Euler").replace('multiccd="disable"', "")
+    text = scene.text(
+        mujoco_scenes.Native(condim=1, impratio=1.0), DT, "Euler"
+    ).replace('multiccd="disable"', "")
     spec = mujoco.MjSpec.from_string(text)
-    patches = [PatchContact(scene.model, site=s, geoms=g, centre=centre) for s, g in scene.patches]
+    patches = [
+        PatchContact(scene.model, site=s, geoms=g, centre=centre)
+        for s, g in scene.patches
+    ]
     prepare(spec, patches)
     m = spec.compile()
-    d, friction, points = mujoco.MjData(m), Friction(m, patches), []
+    d = mujoco.MjData(m)
+    friction = Friction(m, patches)
+    points = []
 
     def step():
         friction.step(d)
@@ -86,15 +106,23 @@ def test_pads_with_jumping_points_do_not_creep(centre):
 
 
 FAULTS = {
-    "off": ({"geom": BOX, "site": 'pos="0.5 0 -0.04"'}, "contact forces act beyond the patch"),
-    "upright": ({"geom": BOX, "site": 'pos="0 0 -0.04" euler="0 90 0"'}, "its x axis lies along the normal"),
+    "off": (
+        {"geom": BOX, "site": 'pos="0.5 0 -0.04"'},
+        "contact forces act beyond the patch",
+    ),
+    "upright": (
+        {"geom": BOX, "site": 'pos="0 0 -0.04" euler="0 90 0"'},
+        "its x axis lies along the normal",
+    ),
 }
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_site_that_is_not_in_the_contact_is_told_once(name):
     given, message = FAULTS[name]
-    with pytest.warns(UserWarning, match=f"site site of the contact between floor and body: {message}") as told:
+    with pytest.warns(
+        UserWarning, match=f"site site of the contact between floor and body: {message}"
+    ) as told:
         d, friction = on_the_floor(model=FACE, height=0.04, centre="site", **given)
     assert len(told) == 1
     assert message in friction.misplaced(d)

@@ -20,7 +20,15 @@ from tests.support.mujoco_misfit import step_checked  # noqa: E402
 pytestmark = pytest.mark.mujoco
 
 LAW = pf.LuGre(mu_c=0.4, mu_s=0.5, sigma_0=1e5, sigma_2=0.0, elasto_plastic=0.9)
-OTHER = {"mu_c": 0.2, "mu_s": 0.3, "v_s": 2e-3, "sigma_0": 8e4, "sigma_1": 50.0, "sigma_2": 0.1, "breakaway_ratio": 0.7}
+OTHER = {
+    "mu_c": 0.2,
+    "mu_s": 0.3,
+    "v_s": 2e-3,
+    "sigma_0": 8e4,
+    "sigma_1": 50.0,
+    "sigma_2": 0.1,
+    "breakaway_ratio": 0.7,
+}
 OTHER |= {"scale": 1.3, "centre_x": 0.01, "centre_y": -0.004}
 
 BOX = """<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>{support}
@@ -46,8 +54,12 @@ def _patch(scale: float) -> pf.ContactPatch:
 def _made(kind: str, law=LAW, scale=1.0, centre=(0.0, 0.0)):
     follows = "follows" if "follow" in kind or "edge" in kind else "fixed"
     model = KINDS[kind](_patch(scale), law)
-    spec = mujoco.MjSpec.from_string(BOX.format(support=EDGE if "edge" in kind else PLANE, x=centre[0], y=centre[1]))
-    patches = [PatchContact(model, site="under", geoms=("under", "box"), pressure=follows)]
+    spec = mujoco.MjSpec.from_string(
+        BOX.format(support=EDGE if "edge" in kind else PLANE, x=centre[0], y=centre[1])
+    )
+    patches = [
+        PatchContact(model, site="under", geoms=("under", "box"), pressure=follows)
+    ]
     prepare(spec, patches)
     return Friction(spec.compile(), patches)
 
@@ -55,7 +67,8 @@ def _made(kind: str, law=LAW, scale=1.0, centre=(0.0, 0.0)):
 def _slid(friction, m, steps=60):
     """Data of a box that slides and spins until it rests."""
     d = mujoco.MjData(m)
-    d.qvel[0], d.qvel[5] = 0.3, 6.0
+    d.qvel[0] = 0.3
+    d.qvel[5] = 6.0
     for _ in range(steps):
         friction.step(d)
     return d
@@ -68,34 +81,55 @@ def test_a_copy_with_other_parameters_steps_as_a_model_made_with_them(kind):
     law = dataclasses.replace(
         LAW,
         elasto_plastic=pf.ElastoPlastic(OTHER["breakaway_ratio"]),
-        **{name: value for name, value in OTHER.items() if name in LAW.numbers._fields and name != "breakaway_ratio"},
+        **{
+            name: value
+            for name, value in OTHER.items()
+            if name in LAW.numbers._fields and name != "breakaway_ratio"
+        },
     )
     made = _made(kind, law, OTHER["scale"], (OTHER["centre_x"], OTHER["centre_y"]))
     for steps in (20, 60):  # while it slides, and near its end
-        one, other = _slid(friction, m, steps), _slid(made, made.m, steps)
+        one = _slid(friction, m, steps)
+        other = _slid(made, made.m, steps)
         # the patch is displaced in the plane of the contact, not of the face: 1e-4 of 1 cm above it
         np.testing.assert_allclose(one.qpos, other.qpos, atol=2e-6)
         np.testing.assert_allclose(friction.twists(one), made.twists(other), atol=1e-4)
-        np.testing.assert_allclose(friction.wrenches(one), made.wrenches(other), atol=5e-4)
-        np.testing.assert_allclose(friction.frame(one, 0)[0], made.frame(other, 0)[0], atol=1e-5)
+        np.testing.assert_allclose(
+            friction.wrenches(one), made.wrenches(other), atol=5e-4
+        )
+        np.testing.assert_allclose(
+            friction.frame(one, 0)[0], made.frame(other, 0)[0], atol=1e-5
+        )
     assert abs(one.qpos - _slid(friction, friction.m).qpos).max() > 1e-3
 
 
 def test_rollouts_of_many_models_on_threads_have_friction_of_their_own():
     friction = _made("reduced")
-    drawn = pf.randomise(LAW, {"mu_c": (0.1, 0.6), "scale": (0.5, 1.5), "centre_x": (-0.01, 0.01)}, 6, seed=1)
+    drawn = pf.randomise(
+        LAW,
+        {"mu_c": (0.1, 0.6), "scale": (0.5, 1.5), "centre_x": (-0.01, 0.01)},
+        6,
+        seed=1,
+    )
     models = friction.copies(drawn)
     full = mujoco.mjtState.mjSTATE_FULLPHYSICS
     start = np.zeros((6, mujoco.mj_stateSize(friction.m, full)))
     d = mujoco.MjData(friction.m)
-    d.qvel[0], d.qvel[5] = 0.3, 6.0
+    d.qvel[0] = 0.3
+    d.qvel[5] = 6.0
     mujoco.mj_getState(friction.m, d, start[0], full)
     start[:] = start[0]
     with friction.install():
-        path, _ = rollout.rollout(models, [mujoco.MjData(friction.m) for _ in range(2)], start, nstep=60)
+        path, _ = rollout.rollout(
+            models, [mujoco.MjData(friction.m) for _ in range(2)], start, nstep=60
+        )
     alone = np.array([_slid(friction, m).qpos for m in models])
-    np.testing.assert_allclose(path[:, -1, 1:8], alone, atol=1e-8)  # the solver starts elsewhere
-    assert np.corrcoef(path[:, -1, 1], drawn["mu_c"])[0, 1] < -0.8  # less far with more friction
+    np.testing.assert_allclose(
+        path[:, -1, 1:8], alone, atol=1e-8
+    )  # the solver starts elsewhere
+    assert (
+        np.corrcoef(path[:, -1, 1], drawn["mu_c"])[0, 1] < -0.8
+    )  # less far with more friction
 
 
 def test_parameters_may_change_between_steps():
@@ -137,9 +171,14 @@ def test_numbers_out_of_range_are_refused_and_have_no_friction(name, value, rule
 
 def test_arrays_of_other_shapes_are_refused():
     friction = _made("reduced")
-    with pytest.raises(pf.errors.InvalidValueError, match=r"mu_c must have shape \[\] or \[2\] or \[2, 1\]"):
+    with pytest.raises(
+        pf.errors.InvalidValueError,
+        match=r"mu_c must have shape \[\] or \[2\] or \[2, 1\]",
+    ):
         friction.copies({"v_s": [1e-3, 2e-3], "mu_c": [0.1, 0.2, 0.3]})
-    with pytest.raises(pf.errors.InvalidValueError, match="parameters must hold an array"):
+    with pytest.raises(
+        pf.errors.InvalidValueError, match="parameters must hold an array"
+    ):
         friction.copies({"mu_c": 0.3})
     with pytest.raises(pf.errors.InvalidValueError, match="did you mean 'scale'"):
         friction.copies({"scal": [0.3]})

@@ -19,40 +19,61 @@ from tests.support.mujoco_misfit import step_checked  # noqa: E402
 pytestmark, SLOW = pytest.mark.mujoco, pytest.mark.slow
 
 
-@pytest.mark.parametrize("dt", [pytest.param(1e-3, marks=SLOW), 2e-3, pytest.param(5e-3, marks=SLOW), 1e-2])
+@pytest.mark.parametrize(
+    "dt", [pytest.param(1e-3, marks=SLOW), 2e-3, pytest.param(5e-3, marks=SLOW), 1e-2]
+)
 @pytest.mark.parametrize("pad", mujoco_scenes.PADS)
 def test_a_grip_beside_the_centre_of_mass_neither_creeps_nor_turns(pad, dt):
     scene = mujoco_scenes.grip(pad)
     m, d, friction = scene.ours(dt)
     path = scene.run(m, d, lambda: friction.step(d))
-    held, half = path[:, :7], len(path) // 2
+    held = path[:, :7]
+    half = len(path) // 2
     moved = abs(held[-1] - held[half])
     # 1e-3 um/s and 1e-6 degrees a second, over the second half
     assert moved[:3].max() <= 1e-9 * 0.5 * scene.time
     assert 2.0 * np.degrees(moved[4:].max()) <= 1e-6 * 0.5 * scene.time
     assert abs(held[:, :3] - held[0, :3]).max() <= 1e-6
     # the weight, on two pads, and its torque about them; bristles yield so little that nothing else counts
-    assert np.hypot(*friction.wrenches(d)[:, :2].T).sum() == pytest.approx(0.2 * 9.81, rel=1e-6)
-    assert abs(friction.wrenches(d)[:, 2]).sum() == pytest.approx(0.2 * 9.81 * 4e-3, rel=1e-3)
+    assert np.hypot(*friction.wrenches(d)[:, :2].T).sum() == pytest.approx(
+        0.2 * 9.81, rel=1e-6
+    )
+    assert abs(friction.wrenches(d)[:, 2]).sum() == pytest.approx(
+        0.2 * 9.81 * 4e-3, rel=1e-3
+    )
 
 
-@pytest.mark.parametrize(("reference", "low", "high"), [(3.0, 0.0, 1e-9), (None, 1e-7, 1e-6)])
-def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(reference, low, high):
+@pytest.mark.parametrize(
+    ("reference", "low", "high"), [(3.0, 0.0, 1e-9), (None, 1e-7, 1e-6)]
+)
+def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(
+    reference, low, high
+):
     """Beside the centre of mass, under 3 N +- 20 % at 2 Hz; the published law lets the part swing by 0.2 um."""
     scene = mujoco_scenes.grip("box")
     press = np.array(scene.control(0.0))
-    scene = dataclasses.replace(scene, control=lambda t: tuple(press * (1.0 + 0.2 * np.sin(4.0 * np.pi * t))), time=1.0)
-    model = scene.model.with_law(dataclasses.replace(scene.model.law, reference_load=reference))
+    scene = dataclasses.replace(
+        scene,
+        control=lambda t: tuple(press * (1.0 + 0.2 * np.sin(4.0 * np.pi * t))),
+        time=1.0,
+    )
+    model = scene.model.with_law(
+        dataclasses.replace(scene.model.law, reference_load=reference)
+    )
     m, d, friction = scene.ours(2e-3, model=model)
     path = scene.run(m, d, lambda: step_checked(friction, d, 1e-8))
     assert low < np.ptp(path[len(path) // 2 :, :3], axis=0).max() < high
-    assert np.hypot(*friction.wrenches(d)[:, :2].T).sum() == pytest.approx(0.2 * 9.81, rel=1e-5)
+    assert np.hypot(*friction.wrenches(d)[:, :2].T).sum() == pytest.approx(
+        0.2 * 9.81, rel=1e-5
+    )
 
 
 def test_a_gripper_of_four_bar_linkages_holds():
     scene = linkage()
     m, d, friction = scene.ours()
-    held = scene.run(m, d, lambda: step_checked(friction, d, 1e-8))[100:, -7:]  # its fingers have yielded to the weight
+    held = scene.run(m, d, lambda: step_checked(friction, d, 1e-8))[
+        100:, -7:
+    ]  # its fingers have yielded to the weight
     assert np.ptp(held[:, :3], axis=0).max() <= 1e-8
     assert 2.0 * np.degrees(np.ptp(held[:, 4:], axis=0).max()) <= 1e-6
     assert friction.report(d).converged
@@ -75,9 +96,12 @@ def test_a_shaken_gripper_keeps_what_it_holds(integrator):
 @pytest.mark.parametrize("start", mujoco_scenes.STARTS)
 def test_a_disc_slides_and_spins_to_rest_where_theory_says(start):
     """Less the stepper's own `v dt/2`; sliding and spinning end together."""
-    dt, (speed, spin) = 2e-3, start
+    dt = 2e-3
+    (speed, spin) = start
     scene = mujoco_scenes.disc(speed, spin)
-    m, d, friction = scene.ours(dt, model=pf.DistributedModel(scene.model.patch, scene.model.law))
+    m, d, friction = scene.ours(
+        dt, model=pf.DistributedModel(scene.model.patch, scene.model.law)
+    )
     velocities = []
 
     def step():
@@ -85,7 +109,9 @@ def test_a_disc_slides_and_spins_to_rest_where_theory_says(start):
         velocities.append(d.qvel[[0, 3]])
 
     path = scene.run(m, d, step)
-    distance, angle = path[-1, [0, 3]] - path[0, [0, 3]] + 0.5 * dt * np.array([speed, spin])
+    distance, angle = (
+        path[-1, [0, 3]] - path[0, [0, 3]] + 0.5 * dt * np.array([speed, spin])
+    )
     stop = coulomb_disc.stop(speed, spin)
     assert distance == pytest.approx(stop.distance, rel=5e-4)
     assert angle == pytest.approx(stop.angle, rel=2e-3)
@@ -104,7 +130,9 @@ def test_the_exact_disc_has_the_wrench_of_its_cells():
         u /= np.hypot(*u)
         forces = patch.weights() * u
         assert force == pytest.approx(forces[0].sum(), abs=1e-3)  # cells of 0.7 mm
-        assert torque == pytest.approx((x * forces[1] - y * forces[0]).sum() / 0.1, abs=1e-3)
+        assert torque == pytest.approx(
+            (x * forces[1] - y * forces[0]).sum() / 0.1, abs=1e-3
+        )
 
 
 @pytest.mark.parametrize("load", [1, 2])
@@ -115,7 +143,9 @@ def test_the_published_plate_moves_in_the_hand_as_in_the_solver(load):
     errors = {}
     for dt in (2e-3, 5e-4):
         m, d, friction = scene.ours(dt, solref=2.0 * dt)
-        x, y, _, theta, _ = scene.run(m, d, lambda d=d, friction=friction: friction.step(d))[-1]
+        x, y, _, theta, _ = scene.run(
+            m, d, lambda d=d, friction=friction: friction.step(d)
+        )[-1]
         errors[dt] = abs(np.array([x + 2e-3, y, theta]) - reference)
         assert errors[dt][:2].max() <= 2.5e-3 and np.degrees(errors[dt][2]) <= 0.5
     if load == 1:  # load 2 drops at once, MuJoCo's contact within some steps
@@ -124,8 +154,17 @@ def test_the_published_plate_moves_in_the_hand_as_in_the_solver(load):
 
 @pytest.mark.parametrize("sigma_1", [0.0, 300.0])
 @pytest.mark.parametrize("sigma_0", [1e4, 1e6])
-def test_grips_are_quiet_at_every_time_step_that_normal_contact_allows(sigma_0, sigma_1):
-    law = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_0=sigma_0, sigma_1=sigma_1, sigma_2=0.0, elasto_plastic=0.9)
+def test_grips_are_quiet_at_every_time_step_that_normal_contact_allows(
+    sigma_0, sigma_1
+):
+    law = pf.LuGre(
+        mu_c=1.0,
+        mu_s=1.0,
+        sigma_0=sigma_0,
+        sigma_1=sigma_1,
+        sigma_2=0.0,
+        elasto_plastic=0.9,
+    )
     model = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), law)
     scene = dataclasses.replace(mujoco_scenes.grip(), time=0.8)
     for dt in (5e-4, 2e-3, 5e-3, 1e-2):
@@ -135,5 +174,7 @@ def test_grips_are_quiet_at_every_time_step_that_normal_contact_allows(sigma_0, 
         assert abs(path[:, 2] - path[0, 2]).max() <= 2.5 * 0.2 * 9.81 / (6.0 * sigma_0)
         # what turns on soft bristles without damping of their own is damped by the implicit step alone, at 2/s or more
         tenth = len(path) // 10
-        first, last = (np.ptp(part[:, :3], axis=0).max() for part in (path[:tenth], path[-tenth:]))
+        first, last = (
+            np.ptp(part[:, :3], axis=0).max() for part in (path[:tenth], path[-tenth:])
+        )
         assert last <= (1e-9 if sigma_1 > 0.0 else 0.3 * first), dt

@@ -40,7 +40,8 @@ def test_a_ball_that_is_hit_slides_until_it_rolls():
     text = """<geom name="table" type="plane" size="5 5 1"/><body pos="0 0 0.02849"><freejoint/>
     <geom name="ball" type="sphere" size="0.0285" mass="0.17"/><site name="ball"/></body>"""
     _, d, friction = made(text, [PatchContact(point(0.2), "ball", ("ball", "table"))])
-    d.qvel[0], slips = 2.0, []
+    d.qvel[0] = 2.0
+    slips = []
     for _ in range(400):
         friction.step(d)
         slips.append(abs(friction.twists(d)[0, 0]))
@@ -64,7 +65,8 @@ def test_a_disc_that_spins_on_its_face_stops():
 @pytest.mark.parametrize("share", [0.97, 1.03])
 def test_a_pinched_capsule_holds_from_its_weight_on(share):
     """Two pads press with N: they hold 2 mu N, and what is heavier falls at the rest of g."""
-    mass, mu = 0.045, 0.8
+    mass = 0.045
+    mu = 0.8
     pads = "".join(
         f"""<body pos="{0.02 * sign} 0 1"><joint name="{side}" type="slide" axis="{-sign} 0 0" damping="1"/>
         <geom name="{side}" type="box" size="0.01 0.02 0.02" mass="0.1" contype="1" conaffinity="0"/></body>"""
@@ -74,7 +76,9 @@ def test_a_pinched_capsule_holds_from_its_weight_on(share):
     mass="{mass}" contype="0" conaffinity="1"/><site name="left" zaxis="1 0 0"/><site name="right" zaxis="-1 0 0"/>
     </body>{pads}"""
     motors = '<motor joint="left"/><motor joint="right"/>'
-    patches = [PatchContact(point(mu), side, (side, "capsule")) for side in ("left", "right")]
+    patches = [
+        PatchContact(point(mu), side, (side, "capsule")) for side in ("left", "right")
+    ]
     m, d, friction = made(text, patches, motors)
     m.opt.gravity[:] = 0.0
     d.ctrl[:] = share * mass * G / (2.0 * mu)
@@ -92,9 +96,13 @@ def test_a_pinched_capsule_holds_from_its_weight_on(share):
 @pytest.mark.parametrize(("angle", "holds"), [(48.2, True), (47.2, False)])
 def test_a_ladder_slips_below_its_angle(angle, holds):
     """tan(angle) = (1 - mu_floor mu_wall) / (2 mu_floor): 47.73 deg for 0.4 and 0.3."""
-    assert math.degrees(math.atan((1.0 - 0.4 * 0.3) / 0.8)) == pytest.approx(47.73, abs=0.005)
-    half, tip = 1.0, 0.001
-    x, z = half * math.cos(math.radians(angle)), half * math.sin(math.radians(angle))
+    assert math.degrees(math.atan((1.0 - 0.4 * 0.3) / 0.8)) == pytest.approx(
+        47.73, abs=0.005
+    )
+    half = 1.0
+    tip = 0.001
+    x = half * math.cos(math.radians(angle))
+    z = half * math.sin(math.radians(angle))
     text = f"""<geom name="floor" type="plane" size="5 5 1"/>
     <geom name="wall" type="plane" size="5 5 1" pos="0 0 0" zaxis="-1 0 0"/>
     <body pos="{-x - tip + 2e-6} 0 {z + tip - 2e-6}" euler="0 {-angle} 0"><freejoint/>
@@ -121,14 +129,22 @@ def test_a_box_that_slides_diagonally_keeps_its_direction():
     d.qvel[:2] = 1.2, -1.0
     while np.hypot(*d.qvel[:2]) > 1e-4:
         friction.step(d)
-        assert math.degrees(math.atan2(d.qpos[1], d.qpos[0])) == pytest.approx(-39.806, abs=1e-3)
-    assert np.hypot(*d.qpos[:2]) == pytest.approx((1.2**2 + 1.0) / (2.0 * 0.5 * G), rel=5e-3)
+        assert math.degrees(math.atan2(d.qpos[1], d.qpos[0])) == pytest.approx(
+            -39.806, abs=1e-3
+        )
+    assert np.hypot(*d.qpos[:2]) == pytest.approx(
+        (1.2**2 + 1.0) / (2.0 * 0.5 * G), rel=5e-3
+    )
     assert abs(d.qpos[6]) < 1e-6
 
 
 def test_a_box_slides_down_a_wedge_that_gives_way():
     """With N = m (g cos - A sin) the wedge backs off, M A = N (sin - mu cos); the box slides down it with the rest."""
-    mass, wedge, mu, s, c = 1.0, 2.0, 0.2, 0.5, math.sqrt(0.75)
+    mass = 1.0
+    wedge = 2.0
+    mu = 0.2
+    s = 0.5
+    c = math.sqrt(0.75)
     backs_off = mass * G * c * (s - mu * c) / (wedge + mass * s * (s - mu * c))
     slides = G * s + backs_off * c - mu * (G * c - backs_off * s)
     text = f"""<body pos="0 0 1"><joint name="wedge" type="slide" axis="1 0 0"/>
@@ -152,16 +168,21 @@ def test_skid_steering_turns_by_its_closed_form(grip, turns):
     They are at (+-a, +-b) = (+-0.2, +-0.3) m and turn without being slowed, at v = 1 m/s.
     """
     assert turns == pytest.approx(0.3 / (0.3**2 + (grip * 0.2) ** 2), abs=5e-5)
-    wheels, names = "", []
+    wheels = ""
+    names = []
     for x, y in ((0.2, 0.3), (0.2, -0.3), (-0.2, 0.3), (-0.2, -0.3)):
         names.append(f"wheel {x} {y}")
         wheels += f"""<body pos="{x} {y} 0"><joint axis="0 1 0" armature="1e4"/><geom name="{names[-1]}" size="0.1"
         mass="0.1" contype="0" conaffinity="1"/><site name="{names[-1]}" xyaxes="0 1 0 -1 0 0"/></body>"""
     text = f"""<geom name="ground" type="plane" size="5 5 1"/><body pos="0 0 0.0999"><freejoint/>
     <inertial pos="0 0 0" mass="10" diaginertia="0.3 0.3 0.3"/>{wheels}</body>"""
-    tread = pf.ContactPatch.disc(radius=1e-4, cells=5).with_friction_metric(pf.friction_metric(0.0, grip, 1.0))
+    tread = pf.ContactPatch.disc(radius=1e-4, cells=5).with_friction_metric(
+        pf.friction_metric(0.0, grip, 1.0)
+    )
     model = pf.ReducedModel(tread, law(0.4))
-    _, d, friction = made(text, [PatchContact(model, name, (name, "ground")) for name in names])
+    _, d, friction = made(
+        text, [PatchContact(model, name, (name, "ground")) for name in names]
+    )
     d.qvel[6:] = -10.0, 10.0, -10.0, 10.0
     for _ in range(600):
         friction.step(d)
@@ -172,12 +193,18 @@ def test_skid_steering_turns_by_its_closed_form(grip, turns):
 @pytest.mark.parametrize("thrown", [0.0, -1.5])
 def test_a_belt_takes_along_what_lies_on_it(thrown):
     """After the time |v - v_0| / (mu g) it has the speed of the belt (google-deepmind/mujoco #1323)."""
-    mu, speed, time = 0.4, 0.5, 1.0
+    mu = 0.4
+    speed = 0.5
+    time = 1.0
     slips = (speed - thrown) / (mu * G)
     end = 0.5 * (speed + thrown) * slips + speed * (time - slips)
     body = pf.Body(0.1, 1e-4, velocity=(thrown, 0.0, 0.0), gravity=(0.0, 0.0))
-    dry = pf.LuGre(mu_c=mu, sigma_0=1e6, sigma_1=10.0, sigma_2=0.0)  # damping takes sigma_1 mu g / sigma_0 off at once
+    dry = pf.LuGre(
+        mu_c=mu, sigma_0=1e6, sigma_1=10.0, sigma_2=0.0
+    )  # damping takes sigma_1 mu g / sigma_0 off at once
     sole = pf.ReducedModel(pf.ContactPatch.rectangle(0.1), dry)
-    belt = pf.Contact(sole, 0.1 * G, mounted_on="body", support_velocity=(speed, 0.0, 0.0))
+    belt = pf.Contact(
+        sole, 0.1 * G, mounted_on="body", support_velocity=(speed, 0.0, 0.0)
+    )
     run = pf.simulate(pf.Scene(body, [belt], time))
     assert float(run.data.x[-1]) == pytest.approx(end, abs=2e-5)

@@ -42,7 +42,9 @@ def box(floor: str = "", own: str = "", pos: str = "0 0 0.02", site: str = "") -
 @pytest.mark.parametrize("turned", [0, 40])
 def test_a_belt_takes_a_box_along(turned):
     """It speeds up with mu g until it has the speed of the belt; explicit steps of positions add v dt / 2."""
-    _, d, friction = made(box('surfacevel="0.5 0 0 0 0 0"', site=f'euler="0 0 {turned}"'), BOX)
+    _, d, friction = made(
+        box('surfacevel="0.5 0 0 0 0 0"', site=f'euler="0 0 {turned}"'), BOX
+    )
     for _ in range(1000):
         friction.step(d)
     expected = 0.5 - 0.5**2 / (2.0 * 0.4 * G) + 0.5 * 1e-3 / 2.0
@@ -66,20 +68,27 @@ def test_tracks_drive_a_box_and_a_turntable_turns_it():
 # ---------------------------------------------------------------------- what rolls
 
 
-@pytest.mark.parametrize("model", [pf.ReducedModel, pf.DistributedModel, pf.ReducedModelPublished])
+@pytest.mark.parametrize(
+    "model", [pf.ReducedModel, pf.DistributedModel, pf.ReducedModelPublished]
+)
 def test_a_ball_rolls_down_at_a_constant_acceleration(model):
     """5/7 g sin(angle), less what the depth of the contact takes; the site's x axis reverses every half turn."""
     law = pf.LuGre(mu_c=0.5, sigma_0=1e3, sigma_1=60.0, sigma_2=0.0, elasto_plastic=0.9)
-    angle, speeds = math.radians(10.0), []
+    angle = math.radians(10.0)
+    speeds = []
     text = """<geom name="floor" type="plane" size="50 5 1"/><body pos="0 0 0.05"><freejoint/>
     <geom name="ball" type="sphere" size="0.05" mass="0.1"/><site name="ball"/></body>"""
-    m, d, friction = made(text, [PatchContact(model(SMALL, law), "ball", ("ball", "floor"))], 2e-3)
+    m, d, friction = made(
+        text, [PatchContact(model(SMALL, law), "ball", ("ball", "floor"))], 2e-3
+    )
     m.opt.gravity[:] = G * math.sin(angle), 0.0, -G * math.cos(angle)
     for _ in range(750):
         friction.step(d)
         speeds.append(d.qvel[0])
     acceleration = np.diff(speeds[200:]) / 2e-3
-    assert acceleration.mean() == pytest.approx(5.0 / 7.0 * G * math.sin(angle), rel=3e-3)
+    assert acceleration.mean() == pytest.approx(
+        5.0 / 7.0 * G * math.sin(angle), rel=3e-3
+    )
     assert np.ptp(acceleration) < 1e-3
 
 
@@ -91,7 +100,9 @@ def test_a_wheel_keeps_its_easy_direction(site):
     text = f"""<geom name="floor" type="plane" size="5 5 1"/><body pos="0 0 0.0499"><joint type="slide" axis="0 0 1"/>
     <joint name="axle" axis="0 1 0"/><geom name="wheel" type="cylinder" size="0.05 0.01" euler="90 0 0" mass="0.5"/>
     <site name="wheel" pos="0 0 -0.05" {site}/></body>"""
-    m, d, friction = made(text, [PatchContact(pf.ReducedModel(patch, LAW), "wheel", ("wheel", "floor"))])
+    m, d, friction = made(
+        text, [PatchContact(pf.ReducedModel(patch, LAW), "wheel", ("wheel", "floor"))]
+    )
     forces = []
     for _ in range(1900):
         d.qvel[1] = 10.0
@@ -105,7 +116,10 @@ def test_a_wheel_keeps_its_easy_direction(site):
 
 def test_an_x_axis_along_the_normal_gives_way_to_the_y_axis():
     _, d, friction = made(box(site='xyaxes="0 0 1 0.6 0.8 0"'), BOX)
-    with pytest.warns(UserWarning, match="its x axis lies along the normal of the contact, where its y axis takes"):
+    with pytest.warns(
+        UserWarning,
+        match="its x axis lies along the normal of the contact, where its y axis takes",
+    ):
         for _ in range(20):
             friction.step(d)
     _, axes = friction.frame(d, 0)
@@ -129,7 +143,9 @@ def test_prepare_leaves_every_field_of_a_contact_as_it_was(height, priority):
     text = NEAR.format(height=height, floor=floor, own=f'{own} priority="{priority}"')
     contacts = []
     for prepared in (False, True):
-        spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{text}</worldbody></mujoco>")
+        spec = mujoco.MjSpec.from_string(
+            f"<mujoco><worldbody>{text}</worldbody></mujoco>"
+        )
         m = (prepare(spec, BOX) if prepared else spec).compile()
         d = mujoco.MjData(m)
         mujoco.mj_forward(m, d)
@@ -141,7 +157,9 @@ def test_prepare_leaves_every_field_of_a_contact_as_it_was(height, priority):
         np.testing.assert_allclose(after[name], value, rtol=1e-14, err_msg=name)
 
 
-@pytest.mark.skipif("adhesion" not in dir(mujoco.MjsGeom), reason="geoms do not stick in this version")
+@pytest.mark.skipif(
+    "adhesion" not in dir(mujoco.MjsGeom), reason="geoms do not stick in this version"
+)
 def test_a_sticky_box_on_a_wall_holds_what_its_adhesion_allows():
     """Four contacts of adhesion A press with 4 A: the wall holds mu 4 A, and beyond the box slides down."""
     for adhesion, held in ((1.5, True), (0.9, False)):
@@ -159,13 +177,26 @@ def test_prepare_takes_a_path_and_says_what_else_it_takes(tmp_path):
     text = f"<mujoco><worldbody>{box()}</worldbody></mujoco>"
     (tmp_path / "box.xml").write_text(text)
     assert prepare(tmp_path / "box.xml", BOX).compile().npair == 1
-    for wrong, got in ((mujoco.MjModel.from_xml_string(text), "MjModel"), ("grip.xml", "grip.xml"), (None, "NoneType")):
-        with pytest.raises(pf.errors.InvalidValueError, match=f"spec must be an MjSpec or the path .*, got {got}"):
+    for wrong, got in (
+        (mujoco.MjModel.from_xml_string(text), "MjModel"),
+        ("grip.xml", "grip.xml"),
+        (None, "NoneType"),
+    ):
+        with pytest.raises(
+            pf.errors.InvalidValueError,
+            match=f"spec must be an MjSpec or the path .*, got {got}",
+        ):
             prepare(wrong, BOX)
     spec = mujoco.MjSpec.from_string(text)
     for patch, message in (
-        (PatchContact(SOLE, "ssole", ("box", "floor")), r"site must be in the model, got ssole \(did you mean sole"),
-        (PatchContact(SOLE, "sole", ("box", "door")), r"geoms must be in the model, got door \(did you mean floor"),
+        (
+            PatchContact(SOLE, "ssole", ("box", "floor")),
+            r"site must be in the model, got ssole \(did you mean sole",
+        ),
+        (
+            PatchContact(SOLE, "sole", ("box", "door")),
+            r"geoms must be in the model, got door \(did you mean floor",
+        ),
     ):
         with pytest.raises(pf.errors.InvalidValueError, match=message):
             prepare(spec, [patch])
@@ -179,7 +210,10 @@ def test_steps_of_mujoco_alone_are_told_once():
     friction.step(d)
     mujoco.mj_step(m, d)
     mujoco.mj_step(m, d)
-    with pytest.warns(UserWarning, match="went on by 2 steps without patch friction: mj_step has none by"):
+    with pytest.warns(
+        UserWarning,
+        match="went on by 2 steps without patch friction: mj_step has none by",
+    ):
         friction.loads(d)
     mujoco.mj_step(m, d)
     friction.step(d)

@@ -21,7 +21,15 @@ mjw = pytest.importorskip("mujoco_warp", reason="needs the extra [mujoco-warp]")
 
 from planarfriction.adapters import mujoco as adapter  # noqa: E402
 from planarfriction.adapters.mujoco_warp import Friction, PatchContact, prepare  # noqa: E402
-from planarfriction_studies.bench.mujoco_scenes import Native, capsule, disc, grip, plate, shaken, tray  # noqa: E402
+from planarfriction_studies.bench.mujoco_scenes import (  # noqa: E402
+    Native,
+    capsule,
+    disc,
+    grip,
+    plate,
+    shaken,
+    tray,
+)
 from tests.support.linkage import linkage  # noqa: E402
 
 pytestmark = pytest.mark.mujoco_warp
@@ -45,7 +53,8 @@ def made(scene, model=None, pressure="auto", integrator="Euler", **options):
     for name, value in options.items():
         setattr(spec.option, name, value)
     patches = [
-        PatchContact(model or scene.model, site=site, geoms=geoms, pressure=pressure) for site, geoms in scene.patches
+        PatchContact(model or scene.model, site=site, geoms=geoms, pressure=pressure)
+        for site, geoms in scene.patches
     ]
     prepare(spec, patches)
     m = spec.compile()
@@ -55,11 +64,15 @@ def made(scene, model=None, pressure="auto", integrator="Euler", **options):
 class Both:
     """A scene that has settled in MuJoCo, and the same in the worlds of MuJoCo Warp."""
 
-    def __init__(self, scene: Any, worlds: int = 2, parameters: Any = None, **options: Any) -> None:
+    def __init__(
+        self, scene: Any, worlds: int = 2, parameters: Any = None, **options: Any
+    ) -> None:
         self.scene = scene
         self.m, self.d, patches = made(scene, **options)
         self.theirs = adapter.Friction(self.m, patches)
-        self.ours = Friction(self.m, patches, worlds=worlds, njmax=100, nconmax=40, parameters=parameters)
+        self.ours = Friction(
+            self.m, patches, worlds=worlds, njmax=100, nconmax=40, parameters=parameters
+        )
         gravity = self.m.opt.gravity.copy()
         if scene.weightless:
             self.m.opt.gravity[:] = 0.0
@@ -71,18 +84,23 @@ class Both:
             self.d.qvel[:] = scene.start
         data = self.ours.data
         for name in ("qpos", "qvel", "qacc_warmstart", "userdata"):
-            getattr(data, name).assign(np.tile(getattr(self.d, name), (worlds, 1)).astype(np.float32))
+            getattr(data, name).assign(
+                np.tile(getattr(self.d, name), (worlds, 1)).astype(np.float32)
+            )
         data.time.fill_(self.d.time)
 
     def control(self, t: float) -> None:
         if self.m.nu:
             controls = np.array(self.scene.control(t))
             self.d.ctrl[:] = controls
-            self.ours.data.ctrl.assign(np.tile(controls, (self.ours.data.nworld, 1)).astype(np.float32))
+            self.ours.data.ctrl.assign(
+                np.tile(controls, (self.ours.data.nworld, 1)).astype(np.float32)
+            )
 
     def run(self, seconds: float) -> tuple[np.ndarray, np.ndarray]:
         """Return positions of all worlds [steps, E, nq] and of MuJoCo [steps, nq]."""
-        ours, theirs = [], []
+        ours = []
+        theirs = []
         for i in range(round(seconds / DT)):
             self.control(i * DT)
             self.ours.step()
@@ -97,7 +115,9 @@ class Both:
 # ---------------------------------------------------------------------- scenes
 
 
-@pytest.mark.parametrize("scene", [disc(1.0, 10.0), shaken(), plate(2)], ids=["disc", "shaken", "plate"])
+@pytest.mark.parametrize(
+    "scene", [disc(1.0, 10.0), shaken(), plate(2)], ids=["disc", "shaken", "plate"]
+)
 def test_scenes_begin_to_move_as_in_mujoco(scene):
     ours, theirs = Both(scene).run(0.06)
     assert np.array_equal(ours[:, 0], ours[:, 1])
@@ -107,7 +127,16 @@ def test_scenes_begin_to_move_as_in_mujoco(scene):
 @SLOW
 @pytest.mark.parametrize(
     "scene",
-    [disc(1.0, 10.0), disc(1.0, 20.0), grip("sphere"), grip("box"), grip("cylinder"), shaken(), plate(1), plate(2)],
+    [
+        disc(1.0, 10.0),
+        disc(1.0, 20.0),
+        grip("sphere"),
+        grip("box"),
+        grip("cylinder"),
+        shaken(),
+        plate(1),
+        plate(2),
+    ],
     ids=["disc", "spun", "sphere", "box", "cylinder", "shaken", "plate 1", "plate 2"],
 )
 def test_scenes_move_as_in_mujoco(scene):
@@ -145,28 +174,47 @@ def test_what_is_held_does_not_creep(scene):
     """Less than 0.01 um/s; MuJoCo's own friction creeps at 155 um/s on the capsule's rig (MuJoCo issue 3328)."""
     both = Both(scene)
     ours, _ = both.run(4.0)
-    first = next(i for i, kind in enumerate(both.m.jnt_type) if kind == int(mujoco.mjtJoint.mjJNT_FREE))
+    first = next(
+        i
+        for i, kind in enumerate(both.m.jnt_type)
+        if kind == int(mujoco.mjtJoint.mjJNT_FREE)
+    )
     height = ours[:, 0, both.m.jnt_qposadr[first] + 2]
-    speed = np.polyfit(DT * np.arange(len(height) // 2), height[len(height) // 2 :], 1)[0]
+    speed = np.polyfit(DT * np.arange(len(height) // 2), height[len(height) // 2 :], 1)[
+        0
+    ]
     assert abs(speed) < 1e-8
 
 
 @SLOW
-@pytest.mark.parametrize(("reference", "low", "high"), [(3.0, 0.0, 5e-8), (None, 1e-7, 1e-6)])
-def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(reference, low, high):
+@pytest.mark.parametrize(
+    ("reference", "low", "high"), [(3.0, 0.0, 5e-8), (None, 1e-7, 1e-6)]
+)
+def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(
+    reference, low, high
+):
     """Beside the centre of mass, under 3 N +- 20 % at 2 Hz, as in MuJoCo; speeds, as positions are too coarse."""
     scene = grip("box")
     press = np.array(scene.control(0.0))
-    scene = dataclasses.replace(scene, control=lambda t: tuple(press * (1.0 + 0.2 * np.sin(4.0 * np.pi * t))))
+    scene = dataclasses.replace(
+        scene, control=lambda t: tuple(press * (1.0 + 0.2 * np.sin(4.0 * np.pi * t)))
+    )
     law = dataclasses.replace(scene.model.law, reference_load=reference)
-    both, speeds = Both(scene, model=scene.model.with_law(law)), []
+    both = Both(scene, model=scene.model.with_law(law))
+    speeds = []
     for i in range(round(1.0 / DT)):
         both.control(i * DT)
         both.ours.step()
         both.theirs.step(both.d)
         speeds.append((both.ours.data.qvel.numpy()[0, :3], both.d.qvel[:3].copy()))
-    swings = np.ptp(DT * np.cumsum(speeds, axis=0)[len(speeds) // 2 :], axis=0).max(axis=1)
-    assert both.ours.report().converged.all() and (low < swings).all() and (swings < high).all()
+    swings = np.ptp(DT * np.cumsum(speeds, axis=0)[len(speeds) // 2 :], axis=0).max(
+        axis=1
+    )
+    assert (
+        both.ours.report().converged.all()
+        and (low < swings).all()
+        and (swings < high).all()
+    )
 
 
 @SLOW
@@ -188,8 +236,10 @@ def test_blocks_on_a_shaken_tray_stay_nearer_than_without_friction():
     for name in ("qpos", "qvel", "qacc_warmstart"):
         getattr(d, name)[:] = getattr(both.d, name)
     mujoco.mj_forward(m, d)
-    model, data = mjw.put_model(m), mjw.put_data(m, d, nworld=1)
-    ours, without = [], []
+    model = mjw.put_model(m)
+    data = mjw.put_data(m, d, nworld=1)
+    ours = []
+    without = []
     for i in range(round(both.scene.time / DT)):
         both.control(i * DT)
         before = both.d.qvel.copy()
@@ -224,26 +274,35 @@ def test_contacts_come_and_go_and_worlds_are_reset():
     """A disc is lifted off: its patch forgets. Reset, one world starts again and the other goes on."""
     both = Both(disc(1.0, 10.0))
     both.run(0.1)
-    friction, data = both.ours, both.ours.data
+    friction = both.ours
+    data = both.ours.data
     state = friction.states().numpy()
     assert state.any(axis=1).all()
     mjw.reset_data(friction.model, data, wp.array([True, False]))
     assert not data.userdata.numpy()[0].any() and data.userdata.numpy()[1].any()
-    start, before = data.qpos.numpy()[0].copy(), data.qpos.numpy()[1].copy()
+    start = data.qpos.numpy()[0].copy()
+    before = data.qpos.numpy()[1].copy()
     friction.step()
-    assert abs(data.qpos.numpy()[0] - start).max() < 1e-4 and data.qpos.numpy()[1, 0] > before[0]
+    assert (
+        abs(data.qpos.numpy()[0] - start).max() < 1e-4
+        and data.qpos.numpy()[1, 0] > before[0]
+    )
     lifted = data.qpos.numpy()
     lifted[1, 2] += 0.1
     data.qpos.assign(lifted)
     friction.step()
-    assert not friction.states().numpy()[1].any() and not friction.wrenches().numpy()[1].any()
+    assert (
+        not friction.states().numpy()[1].any()
+        and not friction.wrenches().numpy()[1].any()
+    )
     assert friction.loads().numpy()[1] == 0.0 and friction.report().passes[1] == 0
 
 
 @SLOW
 def test_forward_changes_nothing():
     """`forward` plans the same step again; installed friction steps as `step` does."""
-    both, other = Both(disc(1.0, 10.0)), Both(disc(1.0, 10.0))
+    both = Both(disc(1.0, 10.0))
+    other = Both(disc(1.0, 10.0))
     for _ in range(5):
         both.ours.step()
         with other.ours.install():
@@ -257,11 +316,26 @@ def test_forward_changes_nothing():
 # ---------------------------------------------------------------------- bad input
 
 BAD = {
-    "implicit": ({"integrator": mujoco.mjtIntegrator.mjINT_IMPLICIT}, "integrator must be Euler, implicitfast"),
-    "elliptic": ({"cone": mujoco.mjtCone.mjCONE_ELLIPTIC}, "cone must be pyramidal.* got elliptic"),
-    "noslip": ({"noslip_iterations": 3}, "noslip_iterations must be 0: they would change the solution, got 3"),
-    "sleep": ({"enableflags": int(mujoco.mjtEnableBit.mjENBL_SLEEP)}, "sleep must be disabled"),
-    "actuation": ({"disableflags": int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)}, "actuation must be enabled"),
+    "implicit": (
+        {"integrator": mujoco.mjtIntegrator.mjINT_IMPLICIT},
+        "integrator must be Euler, implicitfast",
+    ),
+    "elliptic": (
+        {"cone": mujoco.mjtCone.mjCONE_ELLIPTIC},
+        "cone must be pyramidal.* got elliptic",
+    ),
+    "noslip": (
+        {"noslip_iterations": 3},
+        "noslip_iterations must be 0: they would change the solution, got 3",
+    ),
+    "sleep": (
+        {"enableflags": int(mujoco.mjtEnableBit.mjENBL_SLEEP)},
+        "sleep must be disabled",
+    ),
+    "actuation": (
+        {"disableflags": int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)},
+        "actuation must be enabled",
+    ),
 }
 
 
@@ -279,6 +353,7 @@ def test_displaced_patches_are_refused():
     m, _, patches = made(disc(1.0, 10.0))
     adapter.Friction(m, patches).parameters()["centre_x"][:] = 0.01
     with pytest.raises(
-        InvalidValueError, match=r"centre_x must be 0: in Warp patches lie at their sites, got \[0.01\]"
+        InvalidValueError,
+        match=r"centre_x must be 0: in Warp patches lie at their sites, got \[0.01\]",
     ):
         Friction(m, patches)

@@ -67,18 +67,30 @@ ARM = f"""<body pos="0 0 4"><joint name="arm" axis="0 0 1"/><inertial pos="0 0 0
   <site name="left" pos="0 -0.01 0" zaxis="0 1 0"/><site name="right" pos="0 0.01 0" zaxis="0 -1 0"/></body>"""
 """An arm that holds a block, pressed along its circle by one pad against another."""
 
-MOTORS = '<actuator><motor joint="press"/><motor joint="x"/><motor joint="y"/></actuator>'
+MOTORS = (
+    '<actuator><motor joint="press"/><motor joint="x"/><motor joint="y"/></actuator>'
+)
 
 
 class Worlds:
     """Worlds of a scene with patches between sites and geoms."""
 
-    def __init__(self, bodies: str, sites: dict[str, tuple[str, str]], dt: float, worlds: int, more: str = "") -> None:
+    def __init__(
+        self,
+        bodies: str,
+        sites: dict[str, tuple[str, str]],
+        dt: float,
+        worlds: int,
+        more: str = "",
+    ) -> None:
         text = f"""<mujoco><option timestep="{dt}"/><worldbody>{bodies}</worldbody>{more}</mujoco>"""
         spec = mujoco.MjSpec.from_string(text)
-        patches = [PatchContact(MODEL, site=site, geoms=geoms) for site, geoms in sites.items()]
+        patches = [
+            PatchContact(MODEL, site=site, geoms=geoms) for site, geoms in sites.items()
+        ]
         prepare(spec, patches)
-        self.m, self.dt = spec.compile(), dt
+        self.m = spec.compile()
+        self.dt = dt
         self.friction = Friction(self.m, patches, worlds=worlds, njmax=200, nconmax=60)
         self.q = np.tile(self.m.qpos0, (worlds, 1))
         self.v = np.zeros((worlds, self.m.nv))
@@ -90,13 +102,20 @@ class Worlds:
 
     def throw(self, body: str, spins: np.ndarray, x: Any, y: Any = 0.0) -> None:
         """Let a free body turn about the vertical axis of the world."""
-        first, dof = self.m.joint(self.m.body(body).jntadr[0]).qposadr[0], self.m.body(body).dofadr[0]
-        self.q[:, first], self.q[:, first + 1] = x, y
-        self.v[:, dof], self.v[:, dof + 1], self.v[:, dof + 5] = -spins * y, spins * x, spins
+        first = self.m.joint(self.m.body(body).jntadr[0]).qposadr[0]
+        dof = self.m.body(body).dofadr[0]
+        self.q[:, first] = x
+        self.q[:, first + 1] = y
+        self.v[:, dof] = -spins * y
+        self.v[:, dof + 1] = spins * x
+        self.v[:, dof + 5] = spins
 
-    def run(self, seconds: float, control: Any = None, every: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    def run(
+        self, seconds: float, control: Any = None, every: float = 0.1
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return times, and positions [times, E, nq]."""
-        data, places = self.friction.data, []
+        data = self.friction.data
+        places = []
         data.qpos.assign(self.q.astype(np.float32))
         data.qvel.assign(self.v.astype(np.float32))
         for i in range(round(seconds / self.dt) + 1):
@@ -108,12 +127,19 @@ class Worlds:
         assert self.friction.report().converged.all()
         return every * np.arange(len(places)), np.array(places)
 
-    def around(self, q: np.ndarray, body: str, turned: np.ndarray, x: Any = 0.0, y: Any = 0.0) -> tuple[Any, ...]:
+    def around(
+        self, q: np.ndarray, body: str, turned: np.ndarray, x: Any = 0.0, y: Any = 0.0
+    ) -> tuple[Any, ...]:
         """Return radius, angle and own angle of a free body, about an axis at (x, y), less that of its support."""
         first = self.m.joint(self.m.body(body).jntadr[0]).qposadr[0]
-        dx, dy, quaternion = q[..., first] - x, q[..., first + 1] - y, q[..., first + 3 : first + 7]
+        dx = q[..., first] - x
+        dy = q[..., first + 1] - y
+        quaternion = q[..., first + 3 : first + 7]
         around = np.unwrap(np.arctan2(dy, dx), axis=0) - turned
-        own = np.unwrap(2.0 * np.arctan2(quaternion[..., 3], quaternion[..., 0]), axis=0) - turned
+        own = (
+            np.unwrap(2.0 * np.arctan2(quaternion[..., 3], quaternion[..., 0]), axis=0)
+            - turned
+        )
         return np.hypot(dx, dy), around, own
 
 
@@ -134,15 +160,22 @@ def _check(
     lasts = np.ptp(times[chosen])
     radius, around, own = (np.ptp(each[chosen], axis=0) for each in found)
     size = found[0][0]
-    elastic = 4e-7  # m: bristles of the third of a millionth of a metre, stretched by a fifth
-    assert (radius < size * (factor * spins**4 * dt**3 * lasts / 8.0 + POSES[0]) + elastic).all()
+    elastic = (
+        4e-7  # m: bristles of the third of a millionth of a metre, stretched by a fifth
+    )
+    assert (
+        radius < size * (factor * spins**4 * dt**3 * lasts / 8.0 + POSES[0]) + elastic
+    ).all()
     angle = 1.5 * spins**3 * dt**2 * lasts / 6.0 + POSES[1] + hinge
-    assert (around < angle + elastic / size).all() and (own < angle + elastic / size).all()
+    assert (around < angle + elastic / size).all() and (
+        own < angle + elastic / size
+    ).all()
 
 
 def test_parts_on_a_table_and_a_plane_keep_their_places():
     """Steps along tangents would take them 0.54 % further out in 0.3 s: by a factor of `exp(w^2 dt T / 2)`."""
-    spins, dt = SPINS[2:3], 4e-3
+    spins = SPINS[2:3]
+    dt = 4e-3
     sites = {"part": ("table", "part"), "box 3": ("plane 3", "box 3")}
     worlds = Worlds(TABLE + plane(3.0, -4.0), sites, dt, 1)
     worlds.put("table", 0.0, spins)
@@ -170,12 +203,23 @@ def test_a_ball_that_spins_rolls_straight():
 @pytest.mark.parametrize("dt", [2e-3, 4e-3])
 def test_parts_on_planes_keep_their_places_for_long(dt):
     sites = {f"box {spin:g}": (f"plane {spin:g}", f"box {spin:g}") for spin in SPINS}
-    worlds = Worlds("".join(plane(spin, -float(i), 2**i) for i, spin in enumerate(SPINS)), sites, dt, 1)
+    worlds = Worlds(
+        "".join(plane(spin, -float(i), 2**i) for i, spin in enumerate(SPINS)),
+        sites,
+        dt,
+        1,
+    )
     for name, spin, radius in zip(sites, SPINS, RADII, strict=True):
         worlds.throw(name, spin, radius)
     times, q = worlds.run(STEPS * dt)
     for name, spin in zip(sites, SPINS, strict=True):
-        _check(worlds.around(q, name, times[:, None] * spin), times, np.array([spin]), dt, 1.0)
+        _check(
+            worlds.around(q, name, times[:, None] * spin),
+            times,
+            np.array([spin]),
+            dt,
+            1.0,
+        )
 
 
 @pytest.mark.slow
@@ -191,16 +235,39 @@ def test_parts_on_a_table_a_car_and_an_arm_keep_their_places_for_long(dt):
     worlds.throw("part", SPINS, RADII)
     worlds.throw("parcel", SPINS, 1.3 * RADII, 0.2 * RADII)
     worlds.throw("block", SPINS, PLACE)
-    x, y, car, arm = (worlds.m.joint(name).qposadr[0] for name in ("x", "y", "car", "arm"))
+    x, y, car, arm = (
+        worlds.m.joint(name).qposadr[0] for name in ("x", "y", "car", "arm")
+    )
 
     def control(q: np.ndarray) -> np.ndarray:
         """Press with 30 N, and pull the car towards the middle of its circle."""
-        return np.stack([np.full(len(q), 30.0), *(-10.0 * SPINS**2 * q[:, place] for place in (x, y))], axis=1)
+        return np.stack(
+            [
+                np.full(len(q), 30.0),
+                *(-10.0 * SPINS**2 * q[:, place] for place in (x, y)),
+            ],
+            axis=1,
+        )
 
     times, q = worlds.run(STEPS * dt, control)
     hinge = np.array([rounding(spin, dt, STEPS * dt) for spin in SPINS])
     table = np.unwrap(q[..., worlds.m.joint("table").qposadr[0]], axis=0)
     _check(worlds.around(q, "part", table), times, SPINS, dt, 1.0, hinge)
-    _check(worlds.around(q, "parcel", q[..., car], q[..., x], q[..., y]), times, SPINS, dt, 1.0, hinge)
+    _check(
+        worlds.around(q, "parcel", q[..., car], q[..., x], q[..., y]),
+        times,
+        SPINS,
+        dt,
+        1.0,
+        hinge,
+    )
     # pads leave 1.6 to 2.1 times the second order at 10 rad/s, and pull at the hinge, whose rounding they change
-    _check(worlds.around(q, "block", q[..., arm]), times, SPINS, dt, 1.0, 1.5 * hinge, factor=2.5)
+    _check(
+        worlds.around(q, "block", q[..., arm]),
+        times,
+        SPINS,
+        dt,
+        1.0,
+        1.5 * hinge,
+        factor=2.5,
+    )

@@ -38,9 +38,13 @@ def made(text: str, *patches: PatchContact):
     return mujoco.MjData(m), Friction(m, patches)
 
 
-def thrown(shape: str, site: str, speed: float = 1.0, spin: float = 0.0, centre: str = "auto"):
+def thrown(
+    shape: str, site: str, speed: float = 1.0, spin: float = 0.0, centre: str = "auto"
+):
     """Return data and friction of a wheel that was thrown along x or set spinning a while ago."""
-    patch = PatchContact(SHAPES[shape][1], site="wheel", geoms=("floor", "wheel"), centre=centre)
+    patch = PatchContact(
+        SHAPES[shape][1], site="wheel", geoms=("floor", "wheel"), centre=centre
+    )
     d, friction = made(on_the_floor(wheel(shape, site)), patch)
     for _ in range(50):
         friction.step(d)
@@ -57,15 +61,25 @@ def test_a_wheel_thrown_without_spin_rolls_on(shape, site):
 
     A mesh may have any shape: one with its site on the tread is told that this leaves the contact, and what to do.
     """
-    share, told = SHAPES[shape][2], shape == "mesh" and site in ("tread", "contact")
+    share = SHAPES[shape][2]
+    told = shape == "mesh" and site in ("tread", "contact")
     if told:
-        with pytest.warns(UserWarning, match='site wheel of the contact .* beyond the patch: .*centre="contact"'):
+        with pytest.warns(
+            UserWarning,
+            match='site wheel of the contact .* beyond the patch: .*centre="contact"',
+        ):
             thrown(shape, site)
     d, friction = thrown(shape, site, centre="contact" if told else "auto")
-    arm = 0.5 * (RADIUS + d.qpos[2])  # MuJoCo's contact points lie between the surfaces, which overlap
+    arm = 0.5 * (
+        RADIUS + d.qpos[2]
+    )  # MuJoCo's contact points lie between the surfaces, which overlap
     near = 2e-2 if shape == "mesh" else 5e-4
-    assert d.qvel[0] == pytest.approx(1.0 / (1.0 + share * (RADIUS / arm) ** 2), rel=near)
-    assert -d.qvel[5] * arm == pytest.approx(d.qvel[0], rel=3e-3 if shape == "mesh" else 1e-4)
+    assert d.qvel[0] == pytest.approx(
+        1.0 / (1.0 + share * (RADIUS / arm) ** 2), rel=near
+    )
+    assert -d.qvel[5] * arm == pytest.approx(
+        d.qvel[0], rel=3e-3 if shape == "mesh" else 1e-4
+    )
     assert friction.misplaced(d) is None
 
 
@@ -73,13 +87,16 @@ def test_a_wheel_thrown_without_spin_rolls_on(shape, site):
 @pytest.mark.parametrize("shape", ["sphere", "cylinder", "mesh"])
 def test_a_spinning_wheel_drives_off(shape, centre):
     """v = w0 r/(1 + m r^2/I)."""
-    spin, share = 20.0, SHAPES[shape][2]
+    spin = 20.0
+    share = SHAPES[shape][2]
     d, friction = thrown(shape, "centre", 0.0, spin, centre)
     assert d.qvel[0] == pytest.approx(spin * RADIUS / (1.0 + 1.0 / share), rel=2e-2)
     assert friction.misplaced(d) is None
 
 
-@pytest.mark.filterwarnings("ignore:site box of the contact:UserWarning")  # where the box has fallen
+@pytest.mark.filterwarnings(
+    "ignore:site box of the contact:UserWarning"
+)  # where the box has fallen
 @pytest.mark.parametrize("site", [-0.1, 0.0, 0.1])
 def test_a_box_topples_where_friction_is_beyond_its_half_width_over_its_height(site):
     """b/h = 0.2 of its half width and the height of its middle: it falls at mu = 0.6, and slides on at 0.15.
@@ -88,7 +105,9 @@ def test_a_box_topples_where_friction_is_beyond_its_half_width_over_its_height(s
     """
     for mu in (0.15, 0.6):
         text = on_the_floor(box(f'pos="0 0 {site}"'))
-        d, friction = made(text, PatchContact(face(mu), site="box", geoms=("floor", "box")))
+        d, friction = made(
+            text, PatchContact(face(mu), site="box", geoms=("floor", "box"))
+        )
         for _ in range(50):
             friction.step(d)
         start = d.qpos[0]
@@ -100,16 +119,24 @@ def test_a_box_topples_where_friction_is_beyond_its_half_width_over_its_height(s
                 break
         assert (upright < 0.5) == (mu > 0.2)
         if mu < 0.2:
-            assert d.qpos[0] - start == pytest.approx(0.5 / (mu * 9.81) - 0.5 * DT, rel=2e-3)
+            assert d.qpos[0] - start == pytest.approx(
+                0.5 / (mu * 9.81) - 0.5 * DT, rel=2e-3
+            )
             assert friction.misplaced(d) is None
 
 
 def test_a_puck_with_its_site_in_the_middle_slides_and_a_coin_on_its_rim_rolls():
     """The origin follows the contact of the curved side alone, whatever side the site is on."""
-    puck = wheel("cylinder", "centre").replace('euler="90 0 0"', "").replace('xyaxes="0 0 1 1 0 0"', "")
+    puck = (
+        wheel("cylinder", "centre")
+        .replace('euler="90 0 0"', "")
+        .replace('xyaxes="0 0 1 1 0 0"', "")
+    )
     puck = puck.replace(f"{RADIUS - 1e-5}", f"{HALF - 1e-5}")
     end = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), LAW)
-    d, friction = made(on_the_floor(puck), PatchContact(end, site="wheel", geoms=("floor", "wheel")))
+    d, friction = made(
+        on_the_floor(puck), PatchContact(end, site="wheel", geoms=("floor", "wheel"))
+    )
     for _ in range(50):
         friction.step(d)
     start = d.qpos[0]
@@ -120,8 +147,13 @@ def test_a_puck_with_its_site_in_the_middle_slides_and_a_coin_on_its_rim_rolls()
     origin, _ = friction.frame(d, 0)
     np.testing.assert_allclose(origin, [*d.qpos[:2], 0.0], atol=1e-4)
     assert friction.misplaced(d) is None
-    on_its_end = wheel("cylinder", "centre").replace('name="wheel" pos="0.0 0.0 0"', f'name="wheel" pos="0 0 {HALF}"')
-    d, friction = made(on_the_floor(on_its_end), PatchContact(TREAD, site="wheel", geoms=("floor", "wheel")))
+    on_its_end = wheel("cylinder", "centre").replace(
+        'name="wheel" pos="0.0 0.0 0"', f'name="wheel" pos="0 0 {HALF}"'
+    )
+    d, friction = made(
+        on_the_floor(on_its_end),
+        PatchContact(TREAD, site="wheel", geoms=("floor", "wheel")),
+    )
     d.qvel[0] = 1.0
     for _ in range(400):
         friction.step(d)
@@ -140,9 +172,14 @@ def test_a_mecanum_roller_rolls_across_its_axis_and_holds_along_it(angle):
     <inertial pos="0 0 0" mass="{MASS}" diaginertia="{i} {i} {i}"/>
     <geom name="roller" type="cylinder" size="{RADIUS} {HALF}"/>
     <site name="roller" xyaxes="0 0 1 1 0 0"/></body></body></worldbody></mujoco>"""
-    d, friction = made(text, PatchContact(TREAD, site="roller", geoms=("floor", "roller")))
+    d, friction = made(
+        text, PatchContact(TREAD, site="roller", geoms=("floor", "roller"))
+    )
     turn = math.radians(angle)
-    d.qvel[:2] = math.cos(turn), -math.sin(turn)  # along x of the world, in the axes of the carrier
+    d.qvel[:2] = (
+        math.cos(turn),
+        -math.sin(turn),
+    )  # along x of the world, in the axes of the carrier
     for _ in range(400):
         friction.step(d)
     assert d.qvel[0] == pytest.approx(0.8 * math.cos(turn), rel=3e-3)
@@ -164,7 +201,10 @@ def test_a_car_goes_as_its_wheels_turn():
     <site name="ball"/></body></body></worldbody>
     <actuator><velocity joint="right" kv="1"/><velocity joint="left" kv="1"/></actuator></mujoco>"""
     tread = pf.ReducedModel(pf.ContactPatch.rectangle(0.004, 0.0005, cells=5), LAW)
-    patches = [PatchContact(tread, site=name, geoms=("floor", name)) for name in ("right", "left")]
+    patches = [
+        PatchContact(tread, site=name, geoms=("floor", name))
+        for name in ("right", "left")
+    ]
     patches += [PatchContact(POINT, site="ball", geoms=("floor", "ball"))]
     d, friction = made(text, *patches)
     for right, left in ((6.0, 6.0), (6.0, 4.0)):
@@ -176,13 +216,17 @@ def test_a_car_goes_as_its_wheels_turn():
         np.testing.assert_allclose(turned, [right, left], rtol=5e-3)
         assert ahead == pytest.approx(0.5 * turned.sum() * RADIUS, rel=3e-3)
         # the strips under the wheels are 4 mm wide, and turn
-        assert d.qvel[5] == pytest.approx((turned[0] - turned[1]) * RADIUS / 0.2, abs=5e-3)
+        assert d.qvel[5] == pytest.approx(
+            (turned[0] - turned[1]) * RADIUS / 0.2, abs=5e-3
+        )
     assert friction.misplaced(d) is None
 
 
 def test_a_caster_swings_behind_its_pivot():
     """Drawn at a constant speed it follows a tractrix: tan(phi/2) falls as exp(-v t/a) behind the pivot."""
-    trail, speed, start = 0.04, 0.2, math.radians(120.0)
+    trail = 0.04
+    speed = 0.2
+    start = math.radians(120.0)
     text = f"""<mujoco><option timestep="{DT}" integrator="implicitfast"/><worldbody>
     <geom name="floor" type="plane" size="9 9 .1"/>
     <body><joint type="slide" axis="1 0 0"/><geom type="sphere" size="0.01" mass="1000" contype="0" conaffinity="0"/>
@@ -192,7 +236,9 @@ def test_a_caster_swings_behind_its_pivot():
     <geom name="wheel" type="cylinder" size="{0.5 * RADIUS} 0.002" mass="0.01"/>
     <site name="wheel" xyaxes="0 0 1 1 0 0"/></body></body></body></worldbody></mujoco>"""
     tread = pf.ReducedModel(pf.ContactPatch.rectangle(0.0005, cells=3), LAW)
-    d, friction = made(text, PatchContact(tread, site="wheel", geoms=("floor", "wheel")))
+    d, friction = made(
+        text, PatchContact(tread, site="wheel", geoms=("floor", "wheel"))
+    )
     d.qpos[2] = start
     for _ in range(50):
         friction.step(d)
@@ -214,7 +260,10 @@ def test_a_flex_has_no_patches():
     <edge equality="true"/></flexcomp>
     </worldbody></mujoco>"""
     patches = [PatchContact(POINT, site="floor", geoms=("floor", "cloth"))]
-    with pytest.raises(InvalidValueError, match="geoms must be rigid: flexes cannot have patches, got cloth"):
+    with pytest.raises(
+        InvalidValueError,
+        match="geoms must be rigid: flexes cannot have patches, got cloth",
+    ):
         prepare(mujoco.MjSpec.from_string(flex), patches)
     m = mujoco.MjModel.from_xml_string(flex)
     with pytest.raises(InvalidValueError, match="geoms must"):

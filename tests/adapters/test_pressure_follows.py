@@ -25,10 +25,13 @@ def made(body=BOX, table=TABLE, joint="<freejoint/>", **options):
     spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{DT}" integrator="implicitfast"/><worldbody>
         {table}<body name="box" pos="0 0 0.02">{joint}{body}<site name="under" pos="0 0 -0.02"/></body>
         </worldbody></mujoco>""")
-    patches = [PatchContact(PLATE.model(), site="under", geoms=("table", "box"), **options)]
+    patches = [
+        PatchContact(PLATE.model(), site="under", geoms=("table", "box"), **options)
+    ]
     prepare(spec, patches)
     m = spec.compile()
-    d, friction = mujoco.MjData(m), Friction(m, patches)
+    d = mujoco.MjData(m)
+    friction = Friction(m, patches)
     for _ in range(200):
         friction.step(d)
     return m, d, friction
@@ -37,9 +40,11 @@ def made(body=BOX, table=TABLE, joint="<freejoint/>", **options):
 def stopped(start, **options) -> np.ndarray:
     """Return the pose where the box comes to rest, with the half step added that a velocity-stepping start loses."""
     _, d, friction = made(**options)
-    start, away = np.array(start), PLATE.centre_of_mass
+    start = np.array(start)
+    away = PLATE.centre_of_mass
     d.qvel[:] = [start[0], start[1] - start[2] * away, 0.0, 0.0, 0.0, start[2]]
-    begin, path = d.qpos[:2] + np.array([away, 0.0]), []
+    begin = d.qpos[:2] + np.array([away, 0.0])
+    path = []
     for _ in range(400):
         friction.step(d)
         path.append(2.0 * np.arctan2(d.qpos[6], d.qpos[3]))
@@ -48,10 +53,13 @@ def stopped(start, **options) -> np.ndarray:
     return np.array([*end, angle]) + 0.5 * DT * start
 
 
-@pytest.mark.parametrize("start", [(0.0, 0.6, 0.0), (0.6, 0.0, 0.0), (0.0, 0.5, 8.0), (0.35, 0.35, -5.0)])
+@pytest.mark.parametrize(
+    "start", [(0.0, 0.6, 0.0), (0.6, 0.0, 0.0), (0.0, 0.5, 8.0), (0.35, 0.35, -5.0)]
+)
 def test_a_box_slides_as_a_plate_with_linear_pressure(start):
     """Within 0.5 mm and 0.1 degrees; 20 degrees off for the first with a pressure that stays in the middle."""
-    end, truth = stopped(start), PLATE.stops(*start)
+    end = stopped(start)
+    truth = PLATE.stops(*start)
     np.testing.assert_allclose(end[:2], truth[:2], atol=5e-4)
     assert end[2] == pytest.approx(truth[2], abs=np.radians(0.1))
 
@@ -59,7 +67,8 @@ def test_a_box_slides_as_a_plate_with_linear_pressure(start):
 @pytest.mark.parametrize("start", [(0.0, 0.6, 0.0), (0.6, 0.0, 0.0)])
 def test_a_patch_at_the_centre_of_the_contact_forces_slides_straight(start):
     """Within 0.5 mm and 0.1 degrees; 20 degrees off for the first in the middle of the contact points."""
-    end, truth = stopped(start, centre="contact", pressure="fixed"), PLATE.stops(*start)
+    end = stopped(start, centre="contact", pressure="fixed")
+    truth = PLATE.stops(*start)
     np.testing.assert_allclose(end[:2], truth[:2], atol=5e-4)
     assert abs(end[2]) < np.radians(0.1)
 
@@ -71,41 +80,61 @@ def test_a_fixed_pressure_turns_the_box():
 @pytest.mark.parametrize("centre", ["site", "contact"])
 def test_friction_is_continuous_while_points_drop_out(centre):
     """A box slides steadily and a torque moves its weight to a corner, until three of four points bear it."""
-    slides = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
+    slides = "".join(
+        f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")
+    )
     turns = '<joint axis="1 0 0"/><joint axis="0 1 0"/>'  # no yaw: it would turn
     body = '<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3"/>'
     _, d, friction = made(body=body, joint=slides + turns, centre=centre)
-    weight, force, bearing = 0.3 * GRAVITY, [], []
+    weight = 0.3 * GRAVITY
+    force = []
+    bearing = []
     d.qvel[0] = 3.0
     for k in range(300):
-        share = 0.6 * min(k / 280.0, 1.0)  # of the way to the corner; the diagonal is at 0.5
+        share = 0.6 * min(
+            k / 280.0, 1.0
+        )  # of the way to the corner; the diagonal is at 0.5
         d.xfrc_applied[1, 3:] = share * weight * 0.03, -share * weight * 0.05, 0.0
         friction.step(d)
-        wrench, (origin, axes) = friction.wrenches(d)[0].copy(), friction.frame(d, 0)
-        x, y = (origin - d.site_xpos[0]) @ axes[:2].T  # torques about the site, wherever the origin is
+        wrench = friction.wrenches(d)[0].copy()
+        (origin, axes) = friction.frame(d, 0)
+        x, y = (origin - d.site_xpos[0]) @ axes[
+            :2
+        ].T  # torques about the site, wherever the origin is
         wrench[2] += x * wrench[1] - y * wrench[0]
         force.append(wrench / (PLATE.mu * weight))
         bearing.append(int((d.efc_force > 1e-6 * weight).sum()))
     assert bearing[20] == 4 and bearing[-1] == 3
-    steps = abs(np.diff(force[20:], axis=0)) / (1.0, 1.0, 0.03)  # torques by the half width
+    steps = abs(np.diff(force[20:], axis=0)) / (
+        1.0,
+        1.0,
+        0.03,
+    )  # torques by the half width
     assert steps.max() < 0.01
 
 
 def test_auto_follows_on_faces_and_not_on_spheres():
-    for body, follows in ((BOX, True), ('<geom name="box" type="sphere" size="0.02" mass="0.1"/>', False)):
+    for body, follows in (
+        (BOX, True),
+        ('<geom name="box" type="sphere" size="0.02" mass="0.1"/>', False),
+    ):
         friction = made(body=body)[2]
         assert [each.follows for each in friction.placed] == [follows]
 
 
 def test_another_word_for_the_pressure_is_refused():
     with pytest.raises(InvalidValueError, match="pressure"):
-        PatchContact(PLATE.model(), site="under", geoms=("table", "box"), pressure="linear")
+        PatchContact(
+            PLATE.model(), site="under", geoms=("table", "box"), pressure="linear"
+        )
 
 
 def test_a_box_tips_over_the_edge_of_a_table_as_with_mujocos_own_contacts():
     """It leaves at the speed of MuJoCo's own friction within 5 %, and turns as fast within 10 %."""
     edge = '<geom name="table" type="box" size="0.3 0.3 0.05" pos="0 0 -0.05" friction="0.4"/>'
-    body = '<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3" friction="0.4"/>'
+    body = (
+        '<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3" friction="0.4"/>'
+    )
     ends = []
     for ours in (True, False):
         m, d, friction = made(body=body, table=edge)
@@ -114,7 +143,8 @@ def test_a_box_tips_over_the_edge_of_a_table_as_with_mujocos_own_contacts():
                 cone="elliptic" impratio="10" noslip_iterations="10"/><worldbody>{edge}
                 <body pos="0 0 0.02"><freejoint/>{body}</body></worldbody></mujoco>""")
             d = mujoco.MjData(m)
-        d.qpos[0], d.qvel[0] = 0.2, 1.15
+        d.qpos[0] = 0.2
+        d.qvel[0] = 1.15
         for _ in range(200):
             friction.step(d) if ours else mujoco.mj_step(m, d)
         ends.append((d.qvel[0], d.qvel[4]))
@@ -126,9 +156,15 @@ def test_a_box_tips_over_the_edge_of_a_table_as_with_mujocos_own_contacts():
 def test_a_patch_over_the_edge_acts_with_the_part_that_is_borne(beyond):
     """Spun in place, the box is braked as by the cells on the table, pressed by a plane with their centre below it."""
     edge = '<geom name="table" type="box" size="0.3 0.3 0.05" pos="0 0 -0.05"/>'
-    slides = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
+    slides = "".join(
+        f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")
+    )
     turns = '<joint axis="1 0 0"/><joint axis="0 1 0"/><joint axis="0 0 1"/>'
-    _, d, friction = made('<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3"/>', edge, slides + turns)
+    _, d, friction = made(
+        '<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3"/>',
+        edge,
+        slides + turns,
+    )
     d.qpos[0] = 0.25 + beyond
     for _ in range(100):
         friction.step(d)
@@ -136,7 +172,8 @@ def test_a_patch_over_the_edge_acts_with_the_part_that_is_borne(beyond):
     for _ in range(3):
         friction.step(d)
     patch = PLATE.model().patch.refined(4)
-    (x, y), load = patch.positions.T, 0.3 * GRAVITY
+    (x, y) = patch.positions.T
+    load = 0.3 * GRAVITY
     on = x < 0.05 - beyond
     assert on.all() == (beyond == 0.0)
     cells = type(patch).points(patch.positions[on], patch.weights()[on])

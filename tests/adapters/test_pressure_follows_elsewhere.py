@@ -25,14 +25,21 @@ def test_in_drake_a_box_slides_as_a_plate():
 
     builder = drake.DiagramBuilder()
     plant, graph = drake.AddMultibodyPlantSceneGraph(builder, time_step=DT)
-    away, slippery = np.array([PLATE.centre_of_mass, 0.0, PLATE.height]), drake.CoulombFriction(0.4, 0.4)
-    unit = drake.UnitInertia(*(np.array(PLATE.inertia) / PLATE.mass)).ShiftFromCenterOfMass(-away)
+    away = np.array([PLATE.centre_of_mass, 0.0, PLATE.height])
+    slippery = drake.CoulombFriction(0.4, 0.4)
+    unit = drake.UnitInertia(
+        *(np.array(PLATE.inertia) / PLATE.mass)
+    ).ShiftFromCenterOfMass(-away)
     box = plant.AddRigidBody("box", drake.SpatialInertia(PLATE.mass, away, unit))
     floor = drake.Box(2.0, 2.0, 0.1), "floor", slippery
-    plant.RegisterCollisionGeometry(plant.world_body(), drake.RigidTransform([0.0, 0.0, -0.05]), *floor)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), drake.RigidTransform([0.0, 0.0, -0.05]), *floor
+    )
     for i, (x, y) in enumerate([(1, 1), (1, -1), (-1, 1), (-1, -1)]):
         foot = drake.RigidTransform([0.05 * x, 0.03 * y, 0.001])
-        plant.RegisterCollisionGeometry(box, foot, drake.Sphere(0.001), f"foot {i}", slippery)
+        plant.RegisterCollisionGeometry(
+            box, foot, drake.Sphere(0.001), f"foot {i}", slippery
+        )
     plant.Finalize()
     patches = [PatchContact(PLATE.model(), frame="box", geometries=("floor", "box"))]
     prepare(plant, graph, patches)
@@ -45,27 +52,49 @@ def test_in_drake_a_box_slides_as_a_plate():
     def pose() -> np.ndarray:
         at = plant.EvalBodyPoseInWorld(context, box)
         return np.array(
-            [*at.multiply(np.array([away[0], 0.0, 0.0]))[:2], drake.RollPitchYaw(at.rotation()).yaw_angle()]
+            [
+                *at.multiply(np.array([away[0], 0.0, 0.0]))[:2],
+                drake.RollPitchYaw(at.rotation()).yaw_angle(),
+            ]
         )
 
     begin = pose()
-    plant.SetVelocities(context, [0.0, 0.0, START[2], START[0], START[1] - START[2] * away[0], 0.0])
+    plant.SetVelocities(
+        context, [0.0, 0.0, START[2], START[0], START[1] - START[2] * away[0], 0.0]
+    )
     simulator.AdvanceTo(0.6)
     assert near(pose() - begin)
 
 
 @pytest.mark.drake
-@pytest.mark.parametrize("shape, follows", [(lambda d: d.Box(0.1, 0.1, 0.1), True), (lambda d: d.Sphere(0.02), False)])
+@pytest.mark.parametrize(
+    "shape, follows",
+    [(lambda d: d.Box(0.1, 0.1, 0.1), True), (lambda d: d.Sphere(0.02), False)],
+)
 def test_in_drake_auto_follows_on_faces_and_not_on_spheres(shape, follows):
     drake = pytest.importorskip("pydrake.all", reason="Drake is not installed")
     from planarfriction.adapters.drake import PatchContact, patches
 
-    plant, graph = drake.AddMultibodyPlantSceneGraph(drake.DiagramBuilder(), time_step=DT)
-    body, at = plant.AddRigidBody("body", drake.SpatialInertia.SolidSphereWithMass(0.1, 0.02)), drake.RigidTransform()
-    for owner, of, name in ((plant.world_body(), lambda d: d.HalfSpace(), "floor"), (body, shape, "own")):
-        plant.RegisterCollisionGeometry(owner, at, of(drake), name, drake.CoulombFriction(0.0, 0.0))
+    plant, graph = drake.AddMultibodyPlantSceneGraph(
+        drake.DiagramBuilder(), time_step=DT
+    )
+    body = plant.AddRigidBody(
+        "body", drake.SpatialInertia.SolidSphereWithMass(0.1, 0.02)
+    )
+    at = drake.RigidTransform()
+    for owner, of, name in (
+        (plant.world_body(), lambda d: d.HalfSpace(), "floor"),
+        (body, shape, "own"),
+    ):
+        plant.RegisterCollisionGeometry(
+            owner, at, of(drake), name, drake.CoulombFriction(0.0, 0.0)
+        )
     plant.Finalize()
-    (placed,) = patches.found(plant, graph, [PatchContact(PLATE.model(), frame="body", geometries=("floor", "own"))])
+    (placed,) = patches.found(
+        plant,
+        graph,
+        [PatchContact(PLATE.model(), frame="body", geometries=("floor", "own"))],
+    )
     assert placed.follows == follows
 
 
@@ -88,11 +117,19 @@ def test_in_mjx_a_box_slides_as_a_plate_with_derivatives():
         patches = [PatchContact(PLATE.model(), site="under", geoms=("table", "box"))]
         prepare(spec, patches)
         m = spec.compile()
-        friction, mx = Friction(m, patches), mjx.put_model(m)
-        slide = jax.jit(lambda d: jax.lax.scan(lambda d, _: (friction.step(mx, d), None), d, None, length=200)[0])
+        friction = Friction(m, patches)
+        mx = mjx.put_model(m)
+        slide = jax.jit(
+            lambda d: jax.lax.scan(
+                lambda d, _: (friction.step(mx, d), None), d, None, length=200
+            )[0]
+        )
         d = slide(mjx.put_data(m, mujoco.MjData(m)))
-        begin, away = np.array(d.qpos[:2]), PLATE.centre_of_mass
-        start = jax.numpy.array([START[0], START[1] - START[2] * away, 0.0, 0.0, 0.0, START[2]])
+        begin = np.array(d.qpos[:2])
+        away = PLATE.centre_of_mass
+        start = jax.numpy.array(
+            [START[0], START[1] - START[2] * away, 0.0, 0.0, 0.0, START[2]]
+        )
         end = np.array(slide(d.replace(qvel=start)).qpos)
         angle = 2.0 * np.arctan2(end[6], end[3])
         way = end[:2] - begin + away * np.array([np.cos(angle) - 1.0, np.sin(angle)])
@@ -100,10 +137,15 @@ def test_in_mjx_a_box_slides_as_a_plate_with_derivatives():
 
         def after(speed):
             later = d.replace(qvel=start.at[1].set(speed))
-            return jax.lax.scan(lambda d, _: (friction.step(mx, d), None), later, None, length=5)[0].qpos[1]
+            return jax.lax.scan(
+                lambda d, _: (friction.step(mx, d), None), later, None, length=5
+            )[0].qpos[1]
 
-        h, at = 1e-6, float(start[1])
+        h = 1e-6
+        at = float(start[1])
         slope = (jax.jit(after)(at + h) - jax.jit(after)(at - h)) / (2.0 * h)
-        assert float(jax.jit(jax.jacfwd(after))(at)) == pytest.approx(float(slope), rel=1e-6)
+        assert float(jax.jit(jax.jacfwd(after))(at)) == pytest.approx(
+            float(slope), rel=1e-6
+        )
     finally:
         jax.config.update("jax_enable_x64", before)

@@ -28,25 +28,43 @@ def scene():
 
     Torques lift a side in about half of the worlds.
     """
-    x, y = (part.ravel() for part in np.meshgrid(np.linspace(-0.05, 0.05, 3), np.linspace(-0.03, 0.03, 3)))
+    x, y = (
+        part.ravel()
+        for part in np.meshgrid(
+            np.linspace(-0.05, 0.05, 3), np.linspace(-0.03, 0.03, 3)
+        )
+    )
     law = pf.LuGre(mu_c=0.4, mu_s=0.5, sigma_2=0.0, elasto_plastic=0.9)
     feet = pf.DistributedModel(pf.ContactPatch.points(np.stack([x, y], -1)), law)
-    patches, spec = [PatchContact(feet, "box", ("floor", "box"))], mujoco.MjSpec.from_string(BOX)
+    patches = [PatchContact(feet, "box", ("floor", "box"))]
+    spec = mujoco.MjSpec.from_string(BOX)
     m = prepare(spec, patches).compile()
-    d, friction = mujoco.MjData(m), adapter.Friction(m, patches)
+    d = mujoco.MjData(m)
+    friction = adapter.Friction(m, patches)
     for _ in range(300):
         friction.step(d)
     rng = np.random.default_rng(28)
-    qvel = rng.normal(size=(COUNT, 6)) * (0.2, 0.2, 0.0, 0.0, 0.0, 5.0) * 10.0 ** rng.uniform(-4.0, 0.0, (COUNT, 1))
-    force = rng.normal(size=(COUNT, 6)) * WEIGHT * (0.3, 0.3, 0.0, HALF[1], HALF[0], 0.01)
-    return m, patches, *(np.float32(each) for each in (np.tile(d.qpos, (COUNT, 1)), qvel, force))
+    qvel = (
+        rng.normal(size=(COUNT, 6))
+        * (0.2, 0.2, 0.0, 0.0, 0.0, 5.0)
+        * 10.0 ** rng.uniform(-4.0, 0.0, (COUNT, 1))
+    )
+    force = (
+        rng.normal(size=(COUNT, 6)) * WEIGHT * (0.3, 0.3, 0.0, HALF[1], HALF[0], 0.01)
+    )
+    return (
+        m,
+        patches,
+        *(np.float32(each) for each in (np.tile(d.qpos, (COUNT, 1)), qvel, force)),
+    )
 
 
 def in_double(m, patches, qpos, qvel, force):
     """Return wrenches after a few steps of MuJoCo `[worlds, 3]`."""
     found = []
     for each in zip(qpos, qvel, force, strict=True):
-        d, friction = mujoco.MjData(m), adapter.Friction(m, patches)
+        d = mujoco.MjData(m)
+        friction = adapter.Friction(m, patches)
         d.qpos[:], d.qvel[:], d.qfrc_applied[:] = each
         for _ in range(STEPS):
             friction.step(d)
@@ -56,18 +74,27 @@ def in_double(m, patches, qpos, qvel, force):
 
 def in_mjx(precision, m, patches, qpos, qvel, force):
     """Return the same of MJX."""
-    jax, mjx = pytest.importorskip("jax"), pytest.importorskip("mujoco.mjx")
+    jax = pytest.importorskip("jax")
+    mjx = pytest.importorskip("mujoco.mjx")
     from planarfriction.adapters.mjx import Friction
 
     with jax.enable_x64(precision == "float64"):
-        friction, mx, start = Friction(m, patches), mjx.put_model(m), mjx.make_data(m)
+        friction = Friction(m, patches)
+        mx = mjx.put_model(m)
+        start = mjx.make_data(m)
 
         def run(qpos, qvel, force):
             d = start.replace(qpos=qpos, qvel=qvel, qfrc_applied=force)
-            d = jax.lax.scan(lambda d, _: (friction.step(mx, d), None), d, None, length=STEPS)[0]
+            d = jax.lax.scan(
+                lambda d, _: (friction.step(mx, d), None), d, None, length=STEPS
+            )[0]
             return friction.wrenches(d)[0]
 
-        return np.asarray(jax.jit(jax.vmap(run))(*(each.astype(precision) for each in (qpos, qvel, force))))
+        return np.asarray(
+            jax.jit(jax.vmap(run))(
+                *(each.astype(precision) for each in (qpos, qvel, force))
+            )
+        )
 
 
 def in_warp(m, patches, qpos, qvel, force):

@@ -30,7 +30,8 @@ def check(scene, times, qpos, share: float = 0.0, angle: float = 0.0) -> None:
     """Compare places with those after 1 s: within the bounds, bristles' deflections, and a share and an angle more."""
     places = scene.places(times, qpos)[times > 1.0 - 1e-9]
     law = scene.patches[0].model.law
-    radius, bristles = places[0, 0], law.mu_c / law.sigma_0
+    radius = places[0, 0]
+    bristles = law.mu_c / law.sigma_0
     change = abs(places - places[0])
     most, turned = scene.bounds(times[-1] - 1.0)
     assert change[:, 0].max() <= (most + share) * radius + bristles
@@ -58,7 +59,8 @@ def test_a_box_on_a_surface_that_turns_slips_beyond_the_friction(share, holds):
     """From the radius mu g/w^2 on."""
     scene = turning("surface", 2.0, 2e-3)
     radius = share * 0.3 * G / 2.0**2
-    scene.qpos[0], scene.qvel[1] = radius, 2.0 * radius
+    scene.qpos[0] = radius
+    scene.qvel[1] = 2.0 * radius
     end = scene.places(*in_mujoco(scene, 3.0))[-1, 0]
     assert (abs(end - radius) < 1e-4) == holds
 
@@ -83,7 +85,12 @@ def test_held_boxes_keep_their_places_for_long_in_single_precision(support):
     scenes = [turning(support, w, dt) for w in speeds for dt in STEPS]
     for scene, path in zip(scenes, in_mjx(scenes, 20.0), strict=True):
         hinged = support in ("table", "arm")
-        check(scene, *path, share=1e-5, angle=1e-4 + hinged * rounding(scene.w, scene.m.opt.timestep, 20.0))
+        check(
+            scene,
+            *path,
+            share=1e-5,
+            angle=1e-4 + hinged * rounding(scene.w, scene.m.opt.timestep, 20.0),
+        )
 
 
 WRIST = """<mujoco><option timestep="0.004" gravity="0 0 0"/><worldbody>
@@ -100,11 +107,17 @@ WRIST = """<mujoco><option timestep="0.004" gravity="0 0 0"/><worldbody>
 def test_a_grip_that_turns_about_two_axes_keeps_its_angle():
     """The hand's spin turns with its first axis: a held spin alone would turn the box by dt/2 w^2 = 8 mrad/s."""
     spec = mujoco.MjSpec.from_string(WRIST)
-    pad = pf.ReducedModel(pf.ContactPatch.rectangle(0.04), pf.LuGre(mu_c=1.0, elasto_plastic=0.9))
+    pad = pf.ReducedModel(
+        pf.ContactPatch.rectangle(0.04), pf.LuGre(mu_c=1.0, elasto_plastic=0.9)
+    )
     patches = [PatchContact(pad, name, (name, "box")) for name in ("fixed", "pad")]
     m = prepare(spec, patches).compile()
-    d, friction, turns = mujoco.MjData(m), Friction(m, patches), []
-    d.qvel[:2], d.qvel[-3:], d.ctrl[:] = 2.0, (2.0, 0.0, 2.0), 30.0
+    d = mujoco.MjData(m)
+    friction = Friction(m, patches)
+    turns = []
+    d.qvel[:2] = 2.0
+    d.qvel[-3:] = (2.0, 0.0, 2.0)
+    d.ctrl[:] = 30.0
     for _ in range(750):
         friction.step(d)
         hand, box = (d.body(name).xmat.reshape(3, 3) for name in ("hand", "box"))
@@ -137,7 +150,9 @@ def rolled(x: float, qvel, floor: str, time: float) -> np.ndarray:
     model = pf.ReducedModel(pf.ContactPatch.disc(0.0005, cells=5), LAW)
     patches = [PatchContact(model, "ball", ("ball", "floor"))]
     m = prepare(spec, patches).compile()
-    d, friction, path = mujoco.MjData(m), Friction(m, patches), []
+    d = mujoco.MjData(m)
+    friction = Friction(m, patches)
+    path = []
     d.qvel[:] = qvel
     for _ in range(round(time / m.opt.timestep)):
         friction.step(d)
@@ -154,7 +169,9 @@ def test_a_ball_that_spins_rolls_straight():
 
 def test_a_ball_rolls_round_on_a_surface_that_turns():
     """A circle at 2/7 of the spin of the surface, about a point of its own, which held velocities widen by 2 %."""
-    w, x, speed = 3.0, 0.2, 0.3
+    w = 3.0
+    x = 0.2
+    speed = 0.3
     around = 2.0 / 7.0 * w
     qvel = 0.0, speed, 0.0, (w * x - speed) / 0.05, 0.0, 0.0
     path = rolled(x, qvel, f'surfacevel="0 0 0 0 0 {w}"', 4.0 * math.pi / around)

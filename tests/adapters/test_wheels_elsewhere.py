@@ -13,7 +13,11 @@ mujoco = pytest.importorskip("mujoco")
 from planarfriction.adapters.mujoco import PatchContact, prepare  # noqa: E402
 from tests.support.wheels import RADIUS, SHAPES, box, face, on_the_floor, wheel  # noqa: E402
 
-RACE = {"ball": ("sphere", "centre"), "wheel": ("cylinder", "centre"), "tread": ("cylinder", "tread")}
+RACE = {
+    "ball": ("sphere", "centre"),
+    "wheel": ("cylinder", "centre"),
+    "tread": ("cylinder", "tread"),
+}
 """Shapes and sites of wheels side by side."""
 MU = 0.6
 """Friction coefficient under a box beside them, with its site in its middle."""
@@ -21,10 +25,18 @@ MU = 0.6
 
 def race():
     """Return a model of all of them, and their patches."""
-    wheels = [wheel(*pair, name=name, y=0.3 * i) for i, (name, pair) in enumerate(RACE.items())]
-    patches = [PatchContact(SHAPES[shape][1], name, ("floor", name)) for name, (shape, _) in RACE.items()]
+    wheels = [
+        wheel(*pair, name=name, y=0.3 * i)
+        for i, (name, pair) in enumerate(RACE.items())
+    ]
+    patches = [
+        PatchContact(SHAPES[shape][1], name, ("floor", name))
+        for name, (shape, _) in RACE.items()
+    ]
     patches += [PatchContact(face(MU), "box", ("floor", "box"))]
-    spec = mujoco.MjSpec.from_string(on_the_floor(*wheels, box(y=-0.3), options='cone="pyramidal"'))
+    spec = mujoco.MjSpec.from_string(
+        on_the_floor(*wheels, box(y=-0.3), options='cone="pyramidal"')
+    )
     return prepare(spec, patches).compile(), patches
 
 
@@ -36,15 +48,23 @@ class InMjx:
     """A model in MJX."""
 
     def __init__(self, m, patches) -> None:
-        self.jax, self.mjx = pytest.importorskip("jax"), pytest.importorskip("mujoco.mjx")
+        self.jax = pytest.importorskip("jax")
+        self.mjx = pytest.importorskip("mujoco.mjx")
         from planarfriction.adapters.mjx import Friction
 
         with self.jax.enable_x64(True):
-            self.friction, self.model, self.data = Friction(m, patches), self.mjx.put_model(m), self.mjx.make_data(m)
+            self.friction = Friction(m, patches)
+            self.model = self.mjx.put_model(m)
+            self.data = self.mjx.make_data(m)
             self.jitted = self.jax.jit(self._steps, static_argnums=1)
 
     def _steps(self, d, count):
-        return self.jax.lax.scan(lambda d, _: (self.friction.step(self.model, d), None), d, None, length=count)[0]
+        return self.jax.lax.scan(
+            lambda d, _: (self.friction.step(self.model, d), None),
+            d,
+            None,
+            length=count,
+        )[0]
 
     def throw(self, velocity) -> None:
         with self.jax.enable_x64(True):
@@ -106,22 +126,36 @@ def test_patches_lie_in_mjx_where_they_lie_in_mujoco():
     from planarfriction.adapters.mjx import Friction, responses
 
     m, patches = race()
-    d, theirs = mujoco.MjData(m), adapter.Friction(m, patches)
+    d = mujoco.MjData(m)
+    theirs = adapter.Friction(m, patches)
     theirs.step(d)
     wanted = d.userdata[theirs._memory.centre :][: 3 * len(patches)].reshape(-1, 3)
     d = mujoco.MjData(m)
     mujoco.mj_forward(m, d)
     none = np.zeros((len(patches), 3))
     with jax.enable_x64(True):
-        where = responses.geometry(mjx.put_model(m), mjx.put_data(m, d), Friction(m, patches)._fixed.places, none, none)
-        assert where.at_contact.tolist() == [True, True, True, False] and not where.upright.any()
+        where = responses.geometry(
+            mjx.put_model(m),
+            mjx.put_data(m, d),
+            Friction(m, patches)._fixed.places,
+            none,
+            none,
+        )
+        assert (
+            where.at_contact.tolist() == [True, True, True, False]
+            and not where.upright.any()
+        )
         np.testing.assert_allclose(np.asarray(where.origin), wanted, atol=1e-7)
-    np.testing.assert_allclose(np.linalg.norm(wanted[[0, 1]], axis=1), RADIUS, atol=1e-4)
+    np.testing.assert_allclose(
+        np.linalg.norm(wanted[[0, 1]], axis=1), RADIUS, atol=1e-4
+    )
     np.testing.assert_allclose(wanted[3], [0.0, 0.0, -0.1], atol=1e-4)
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:site box of the contact:UserWarning")  # where it has fallen
+@pytest.mark.filterwarnings(
+    "ignore:site box of the contact:UserWarning"
+)  # where it has fallen
 @pytest.mark.parametrize("host", HOSTS)
 def test_wheels_roll_on_and_a_box_topples(host):
     """v = v0/(1 + I/(m r^2)) of wheels, 5/7 and 2/3; half the width over the height of the box is below mu."""
@@ -139,8 +173,14 @@ def test_wheels_roll_on_and_a_box_topples(host):
 
 
 FAULTS = {
-    "beside": ('pos="0.5 0 0"', "contact forces act beyond the patch: put the site into the contact, or use centre="),
-    "upright": ('euler="0 90 0"', "its x axis lies along the normal of the contact, where its y axis takes its place"),
+    "beside": (
+        'pos="0.5 0 0"',
+        "contact forces act beyond the patch: put the site into the contact, or use centre=",
+    ),
+    "upright": (
+        'euler="0 90 0"',
+        "its x axis lies along the normal of the contact, where its y axis takes its place",
+    ),
 }
 
 
@@ -150,9 +190,14 @@ FAULTS = {
 def test_a_site_that_is_not_in_the_contact_is_told_once(host, name):
     site, message = FAULTS[name]
     patches = [PatchContact(face(0.3), "box", ("floor", "box"))]
-    spec = mujoco.MjSpec.from_string(on_the_floor(box(site), options='cone="pyramidal"'))
+    spec = mujoco.MjSpec.from_string(
+        on_the_floor(box(site), options='cone="pyramidal"')
+    )
     running = host(prepare(spec, patches).compile(), patches)
-    with pytest.warns(UserWarning, match=re.escape(f"site box of the contact between floor and box: {message}")):
+    with pytest.warns(
+        UserWarning,
+        match=re.escape(f"site box of the contact between floor and box: {message}"),
+    ):
         running.steps(10)
         running.read()
     with warnings.catch_warnings():

@@ -31,7 +31,16 @@ from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import animation
 from tests.support import synthetic
 
-LIBRARY = ["doctor", "explore", "export", "identify", "limit-surface", "run", "sweep", "warm"]
+LIBRARY = [
+    "doctor",
+    "explore",
+    "export",
+    "identify",
+    "limit-surface",
+    "run",
+    "sweep",
+    "warm",
+]
 """Commands of a library alone."""
 
 
@@ -52,7 +61,11 @@ def simulated(monkeypatch) -> list[tuple[pf.Scene, dict]]:
     def simulate(scene, *, progress=None, **options):
         calls.append((scene, options))
         progress(0.5 * scene.t_end)
-        return synthetic.solution(scene, scale=1.0 + 0.1 * len(calls), t_end=min(2.0, options.get("t_end", 2.0)))
+        return synthetic.solution(
+            scene,
+            scale=1.0 + 0.1 * len(calls),
+            t_end=min(2.0, options.get("t_end", 2.0)),
+        )
 
     monkeypatch.setitem(vars(scenes), "simulate", simulate)
     return calls
@@ -84,7 +97,9 @@ def test_version(capsys):
 @pytest.mark.parametrize("command", [["run"], ["limit-surface"], ["bench"]])
 def test_help_has_examples(capsys, command):
     assert main([*command, "--help"]) == 0
-    assert f"planarfriction {command[0]} " in capsys.readouterr().out.split("Examples")[1]
+    assert (
+        f"planarfriction {command[0]} " in capsys.readouterr().out.split("Examples")[1]
+    )
 
 
 def test_without_arguments_the_help_is_shown(capsys, monkeypatch):
@@ -100,7 +115,10 @@ def test_without_arguments_the_help_is_shown(capsys, monkeypatch):
         (["run", "in-hnad"], "did you mean 'in-hand'?"),
         (["run", "missing.toml"], "missing.toml"),
         (["run", "in-hand", "--patch", "Circel"], "did you mean 'Circle'?"),
-        (["run", "in-hand", "--patch", "missing.csv", "--cell-size", "0.001"], "missing.csv: no such file"),
+        (
+            ["run", "in-hand", "--patch", "missing.csv", "--cell-size", "0.001"],
+            "missing.csv: no such file",
+        ),
         (["run", "in-hand", "--patch", "pad.csv"], "--cell-size must be given"),
         (
             ["run", "in-hand", "--patch", "Circle", "--cell-size", "0.001"],
@@ -109,7 +127,10 @@ def test_without_arguments_the_help_is_shown(capsys, monkeypatch):
         (["run", "in-hand", "--t-end", "nan"], "--t-end must be finite"),
         (["run", "in-hand", "--rtol", "fast"], "--rtol"),
         (["run", "in-hand", "--model", "simple"], "--model"),
-        (["limit-surface", "--out", "surface.bmp"], "surface.bmp: a picture ends in .png"),
+        (
+            ["limit-surface", "--out", "surface.bmp"],
+            "surface.bmp: a picture ends in .png",
+        ),
         (["limit-surface", "--out", "missing/surface.png"], "missing"),
         (["limit-surface", "--surface", "sphere"], "table-published"),
     ],
@@ -131,11 +152,15 @@ def test_a_broken_scene_file_is_one_line(capsys, tmp_path):
 @pytest.mark.parametrize("name", ["in-hand", "drift", "free-slide", "driven", "pushed"])
 def test_ready_scenes_by_name(name):
     built = build_scenes(name, ["both"], t_end=1.5)
-    assert [type(scene.contacts[0].model).__name__ for scene in built.values()] == list(run_models())
+    assert [type(scene.contacts[0].model).__name__ for scene in built.values()] == list(
+        run_models()
+    )
     assert list(built) == ["distributed", "reduced"]
     for scene in built.values():
         assert scene.t_end == 1.5
-        assert scene.contacts[0].model.law == pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+        assert scene.contacts[0].model.law == pf.LuGre(
+            mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)
+        )
         assert scene.contacts[0].model.patch.cells == 317
 
 
@@ -151,7 +176,10 @@ def test_the_published_model_has_its_own_name():
 def test_default_models():
     assert list(build_scenes("in-hand", [])) == ["distributed", "reduced"]
     assert list(build_scenes("drift", [])) == ["distributed"]
-    assert list(build_scenes("in-hand", ["reduced", "both"])) == ["reduced", "distributed"]
+    assert list(build_scenes("in-hand", ["reduced", "both"])) == [
+        "reduced",
+        "distributed",
+    ]
 
 
 def test_drift_has_the_published_width():
@@ -182,13 +210,19 @@ def scene_file(tmp_path) -> Path:
 
 def test_scene_files_keep_their_models_unless_told_otherwise(scene_file):
     built = build_scenes(str(scene_file), [])
-    assert [type(contact.model) for contact in built["distributed"].contacts] == [pf.DistributedModel] * 2
+    assert [type(contact.model) for contact in built["distributed"].contacts] == [
+        pf.DistributedModel
+    ] * 2
     built = build_scenes(str(scene_file), ["both"])
-    assert [type(contact.model) for contact in built["reduced"].contacts] == [pf.ReducedModel] * 2
+    assert [type(contact.model) for contact in built["reduced"].contacts] == [
+        pf.ReducedModel
+    ] * 2
     assert built["reduced"].contacts[1].position == (0.03, 0.0)
     assert built["reduced"].contacts[0].model.law == pf.LuGre(mu_s=1.2)
     built = build_scenes(str(scene_file), [], patch="Line")
-    assert [contact.model.patch.name for contact in built["distributed"].contacts] == ["Line"] * 2
+    assert [contact.model.patch.name for contact in built["distributed"].contacts] == [
+        "Line"
+    ] * 2
 
 
 # ---------------------------------------------------------------------- run
@@ -200,7 +234,9 @@ def test_run_prints_the_comparison(capsys, simulated):
     assert rows["final y [mm]"] == ["-22", "-24"]
     assert rows["largest difference, position [mm]"] == ["2"]
     # scale 1.1 and 1.2, at t = 2 s: 0.1 * 0.3 * 4 rad
-    assert float(rows["largest difference, angle [deg]"][0]) == pytest.approx(np.degrees(0.12), abs=5e-4)
+    assert float(rows["largest difference, angle [deg]"][0]) == pytest.approx(
+        np.degrees(0.12), abs=5e-4
+    )
     assert rows["steps"] == ["1234", "1234"]
     assert rows["rejected steps"] == ["56", "56"]
     assert rows["times faster than real time"] == ["8", "8"]
@@ -209,14 +245,35 @@ def test_run_prints_the_comparison(capsys, simulated):
 
 def table_rows(text: str) -> list[list[str]]:
     """Cells of the rows of a printed table, empty ones left out."""
-    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in text.splitlines() if line.startswith("│")]
+    rows = [
+        [cell.strip() for cell in line.strip("│").split("│")]
+        for line in text.splitlines()
+        if line.startswith("│")
+    ]
     return [[cell for cell in row if cell] for row in rows]
 
 
 def test_run_writes_what_can_be_read_back(simulated, tmp_path):
     folder = tmp_path / "new" / "out"
-    assert main(["run", "in-hand", "--model", "reduced", "--t-end", "1", "--out", str(folder)]) == 0
-    assert sorted(path.name for path in folder.iterdir()) == ["in-hand-reduced.csv", "in-hand-reduced.nc"]
+    assert (
+        main(
+            [
+                "run",
+                "in-hand",
+                "--model",
+                "reduced",
+                "--t-end",
+                "1",
+                "--out",
+                str(folder),
+            ]
+        )
+        == 0
+    )
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "in-hand-reduced.csv",
+        "in-hand-reduced.nc",
+    ]
     stored = pf.Solution.load(folder / "in-hand-reduced.nc")
     assert stored.scene.to_dict() == simulated[0][0].to_dict()
     columns = read_csv(folder / "in-hand-reduced.csv")
@@ -236,7 +293,13 @@ def check_columns(columns, expected):
 
 
 @pytest.mark.parametrize(
-    ("text", "name"), [("in-hand", "in-hand"), (" a/b: c. ", "a-b-c"), ("../é 2.5", "é-2.5"), ("-?-", "unnamed")]
+    ("text", "name"),
+    [
+        ("in-hand", "in-hand"),
+        (" a/b: c. ", "a-b-c"),
+        ("../é 2.5", "é-2.5"),
+        ("-?-", "unnamed"),
+    ],
 )
 def test_names_of_files_are_letters_digits_dots_and_hyphens(text, name):
     assert output.slug(text) == name
@@ -247,7 +310,9 @@ def test_columns_of_several_contacts_carry_their_names():
     columns = output.history_columns(run)
     assert [name for name in columns if name.endswith("fx")] == ["pad-1.fx", "pad-2.fx"]
     for name in ("fx", "fy", "tau", "normal_force"):
-        assert columns[f"pad-2.{name}"] == pytest.approx(run.data[name].values[:, 1], rel=1e-15)
+        assert columns[f"pad-2.{name}"] == pytest.approx(
+            run.data[name].values[:, 1], rel=1e-15
+        )
         assert columns[f"pad-2.{name}"] == pytest.approx(2.0 * columns[f"pad-1.{name}"])
     assert columns["pad-2.vy"][-1] == pytest.approx(run.contact_twist("pad 2")[-1, 1])
 
@@ -256,7 +321,11 @@ def test_run_draws(simulated, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(animation, "LEAST_FRAMES", 3)
     assert main(["run", "drift", "--t-end", "0.1", "--plot", "--animate"]) == 0
-    drawn = sorted(path.name for path in (tmp_path / "out").iterdir() if path.suffix in (".png", ".gif"))
+    drawn = sorted(
+        path.name
+        for path in (tmp_path / "out").iterdir()
+        if path.suffix in (".png", ".gif")
+    )
     stem = "drift-tangential"
     assert drawn == [
         f"{stem}-histories.png",
@@ -267,11 +336,15 @@ def test_run_draws(simulated, tmp_path, monkeypatch):
     assert all((tmp_path / "out" / name).stat().st_size > 5000 for name in drawn)
 
 
-def test_a_folder_that_cannot_be_written_is_found_before_the_simulation(capsys, simulated, tmp_path):
+def test_a_folder_that_cannot_be_written_is_found_before_the_simulation(
+    capsys, simulated, tmp_path
+):
     blocked = tmp_path / "file"
     blocked.write_text("", encoding="utf-8")
     for folder in (blocked, blocked / "out"):
-        assert "cannot write to folder" in fails(capsys, "run", "in-hand", "--out", str(folder))
+        assert "cannot write to folder" in fails(
+            capsys, "run", "in-hand", "--out", str(folder)
+        )
     assert simulated == []
 
 
@@ -308,15 +381,24 @@ def test_ctrl_c_elsewhere_is_no_traceback(capsys, monkeypatch):
 
 
 def test_a_solver_that_gives_up_keeps_what_is_done(capsys, tmp_path, monkeypatch):
-    stand_in = interrupted(0, lambda part: SolverError("step size fell below the least: raise rtol", part))
+    stand_in = interrupted(
+        0, lambda part: SolverError("step size fell below the least: raise rtol", part)
+    )
     monkeypatch.setitem(vars(scenes), "simulate", stand_in)
     assert main(["run", "drift", "--out", str(tmp_path)]) == 2
-    assert capsys.readouterr().err.splitlines()[-1] == "error: step size fell below the least: raise rtol"
-    assert pf.Solution.load(tmp_path / "drift-tangential-distributed.nc").data["time"][-1] == 0.5
+    assert (
+        capsys.readouterr().err.splitlines()[-1]
+        == "error: step size fell below the least: raise rtol"
+    )
+    assert (
+        pf.Solution.load(tmp_path / "drift-tangential-distributed.nc").data["time"][-1]
+        == 0.5
+    )
 
 
 def test_differences_cover_the_time_that_both_runs_have():
-    full, short = synthetic.solution(), synthetic.solution(scale=2.0, t_end=1.0)
+    full = synthetic.solution()
+    short = synthetic.solution(scale=2.0, t_end=1.0)
     for pair in ((full, short), (short, full)):
         assert largest_differences(*pair) == pytest.approx((5e-3, 0.3), rel=1e-12)
 
@@ -340,7 +422,9 @@ def test_a_slide_ends_when_the_puck_has_stopped(capsys):
 
 
 @pytest.mark.parametrize(
-    "path", sorted((Path(__file__).parents[2] / "examples").glob("*.toml")), ids=lambda path: path.stem
+    "path",
+    sorted((Path(__file__).parents[2] / "examples").glob("*.toml")),
+    ids=lambda path: path.stem,
 )
 def test_example_scene_files_run(path, tmp_path):
     assert main(["run", str(path), "--t-end", "0.02", "--out", str(tmp_path)]) == 0
@@ -376,11 +460,21 @@ def coarse(monkeypatch):
         monkeypatch.setattr(f"planarfriction.plots.limit_surface.{name}", 12)
 
 
-def test_limit_surface_of_a_map_is_the_exact_one_alone_or_to_be_turned(coarse, capsys, tmp_path):
+def test_limit_surface_of_a_map_is_the_exact_one_alone_or_to_be_turned(
+    coarse, capsys, tmp_path
+):
     pytest.importorskip("plotly")
     (tmp_path / "pad.csv").write_text("1,1,1\n0,2,0\n", encoding="utf-8")
-    command = ["limit-surface", "--pressure", str(tmp_path / "pad.csv"), "--cell-size", "0.001"]
-    alone, both, page = (tmp_path / name for name in ("alone.png", "both.png", "both.html"))
+    command = [
+        "limit-surface",
+        "--pressure",
+        str(tmp_path / "pad.csv"),
+        "--cell-size",
+        "0.001",
+    ]
+    alone, both, page = (
+        tmp_path / name for name in ("alone.png", "both.png", "both.html")
+    )
     assert main([*command, "--out", str(alone), "--alone"]) == 0
     assert "(exact)" in capsys.readouterr().out
     for path in (both, page):
@@ -403,7 +497,10 @@ class Line:
     ratio: float | None
 
 
-LINES = [Line("import", 0.1, "s", None, None, None), Line("table.build", 0.004, "s", "published", 0.4, 0.01)]
+LINES = [
+    Line("import", 0.1, "s", None, None, None),
+    Line("table.build", 0.004, "s", "published", 0.4, 0.01),
+]
 
 
 @pytest.fixture
@@ -420,15 +517,23 @@ def measured(monkeypatch) -> list:
 
 
 def test_bench_prints_json_and_nothing_else(capsys, measured):
-    assert main(["bench", "--json", "--full", "--only", "import", "--only", "table.build"]) == 0
-    assert json.loads(capsys.readouterr().out) == [dataclasses.asdict(line) for line in LINES]
+    assert (
+        main(["bench", "--json", "--full", "--only", "import", "--only", "table.build"])
+        == 0
+    )
+    assert json.loads(capsys.readouterr().out) == [
+        dataclasses.asdict(line) for line in LINES
+    ]
     assert measured == [(["import", "table.build"], True)]
 
 
 def test_bench_prints_a_table(capsys, measured):
     assert main(["bench"]) == 0
     rows = table_rows(capsys.readouterr().out)
-    assert rows == [["import", "0.1 s"], ["table.build", "0.004 s", "0.4 s", "0.01", "published"]]
+    assert rows == [
+        ["import", "0.1 s"],
+        ["table.build", "0.004 s", "0.4 s", "0.01", "published"],
+    ]
     assert measured == [(None, False)]
 
 
@@ -452,10 +557,16 @@ def only_the_library(monkeypatch):
     """Take the commands of other packages away, as in an installation of the library alone."""
     entries = [each for each in entry_points(group=GROUP) if each.name == "explore"]
     monkeypatch.setattr("planarfriction.cli.app.entry_points", lambda *, group: entries)
-    monkeypatch.setattr(app, "commands", {name: app.commands[name] for name in LIBRARY if name in app.commands})
+    monkeypatch.setattr(
+        app,
+        "commands",
+        {name: app.commands[name] for name in LIBRARY if name in app.commands},
+    )
 
 
-def test_a_bare_library_says_what_it_has_and_where_the_rest_is(only_the_library, monkeypatch, capsys):
+def test_a_bare_library_says_what_it_has_and_where_the_rest_is(
+    only_the_library, monkeypatch, capsys
+):
     def missing(name):
         raise PackageNotFoundError(name)
 
@@ -463,7 +574,9 @@ def test_a_bare_library_says_what_it_has_and_where_the_rest_is(only_the_library,
     assert app.list_commands(click.Context(app)) == LIBRARY
     assert main(["--help"]) == 0
     out = capsys.readouterr().out
-    assert " ".join(out.split()).endswith(ELSEWHERE) and "bench" not in re.findall(r"^  (\S+)", out, re.MULTILINE)
+    assert " ".join(out.split()).endswith(ELSEWHERE) and "bench" not in re.findall(
+        r"^  (\S+)", out, re.MULTILINE
+    )
     assert main(["bench"]) == 2
     assert "No such command 'bench'" in capsys.readouterr().err
 
@@ -473,12 +586,20 @@ def test_entry_points_of_each_distribution_are_its_commands(folder):
     project = Path(__file__).parents[2] / folder / "pyproject.toml"
     if not project.exists():
         pytest.skip("no project beside these tests")
-    entries = tomllib.loads(project.read_text(encoding="utf-8"))["project"]["entry-points"][GROUP]
+    entries = tomllib.loads(project.read_text(encoding="utf-8"))["project"][
+        "entry-points"
+    ][GROUP]
     for name, value in entries.items():
         command = EntryPoint(name, value, GROUP).load()
-        assert isinstance(command, click.Command) and (command.name == name) and command.get_short_help_str()
+        assert (
+            isinstance(command, click.Command)
+            and (command.name == name)
+            and command.get_short_help_str()
+        )
     listed = app.list_commands(click.Context(app))
-    assert set(entries) <= set(listed) and ELSEWHERE not in app.get_help(click.Context(app))
+    assert set(entries) <= set(listed) and ELSEWHERE not in app.get_help(
+        click.Context(app)
+    )
 
 
 def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, capsys):
@@ -486,7 +607,9 @@ def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, ca
     def hello() -> None:
         print("hello")
 
-    entries = [SimpleNamespace(name=name, load=lambda: hello) for name in ("hello", "run")]
+    entries = [
+        SimpleNamespace(name=name, load=lambda: hello) for name in ("hello", "run")
+    ]
     monkeypatch.setattr(app, "commands", dict(app.commands))
     monkeypatch.setattr("planarfriction.cli.app.entry_points", lambda *, group: entries)
     assert main(["hello"]) == 0
@@ -496,11 +619,19 @@ def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, ca
 
 def test_options_of_maps_on_the_command_line(capsys, tmp_path):
     (tmp_path / "pad.csv").write_text("0,1,2\n5,6,1\n\n7,8,9\n5,0,5\n")
-    command = ["limit-surface", "--patch", str(tmp_path / "pad.csv"), "--width", "0.003"]
+    command = [
+        "limit-surface",
+        "--patch",
+        str(tmp_path / "pad.csv"),
+        "--width",
+        "0.003",
+    ]
     assert "first row is 0, 1, 2: labels" in fails(capsys, *command)
     assert "frame must be one of the 2 frames" in fails(capsys, *command, "--no-header")
     assert main([*command, "--no-header", "--frame", "1", "--threshold", "0.6"]) == 0
     assert re.search(r"loaded cells\W+3\b", capsys.readouterr().out)
-    assert "--frame must be given only for a pressure map" in fails(capsys, "limit-surface", "--frame", "1")
+    assert "--frame must be given only for a pressure map" in fails(
+        capsys, "limit-surface", "--frame", "1"
+    )
     assert main(["limit-surface", "--patch", "disc", "--width", "0.002"]) == 0
     assert re.search(r"contact radius r \[mm\]\W+0.66", capsys.readouterr().out)

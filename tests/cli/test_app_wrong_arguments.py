@@ -11,7 +11,9 @@ import pytest
 import planarfriction as pf
 from planarfriction.cli import main
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes and devices of POSIX")
+pytestmark = pytest.mark.skipif(
+    not hasattr(os, "mkfifo"), reason="pipes and devices of POSIX"
+)
 
 SCENE = """
 t_end = 0.01
@@ -28,7 +30,9 @@ cells = 5
 """
 LONG = 300 * "x"
 DIGITS = 5000 * "9"
-LOG = "t,vx,vy,omega,fx,fy,tau,normal_force\n" + "".join(f"{0.01 * i},0.01,0,0,-1,0,0,2\n" for i in range(20))
+LOG = "t,vx,vy,omega,fx,fy,tau,normal_force\n" + "".join(
+    f"{0.01 * i},0.01,0,0,-1,0,0,2\n" for i in range(20)
+)
 
 FOLDERS = [
     (["run", "in-hand", "--t-end", "0.01"], "--out"),
@@ -42,7 +46,12 @@ FILES = [(["limit-surface"], "--out", ".png"), (["limit-surface"], "--csv", ".cs
 def place(tmp_path, monkeypatch) -> Path:
     """A folder with a scene, a log, a map, and things that are no files."""
     monkeypatch.chdir(tmp_path)
-    for name, text in {"scene.toml": SCENE, "log.csv": LOG, "pad.csv": "1,1\n0,2\n", "plain": "kept"}.items():
+    for name, text in {
+        "scene.toml": SCENE,
+        "log.csv": LOG,
+        "pad.csv": "1,1\n0,2\n",
+        "plain": "kept",
+    }.items():
         Path(name).write_text(text)
     for suffix in ("", ".toml", ".json", ".csv", ".png", ".npy"):
         os.mkfifo(f"pipe{suffix}")
@@ -58,7 +67,9 @@ def fails(capsys, *arguments: str) -> str:
     assert main(arguments) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err.startswith("error: ") and captured.err.count("\n") == 1, captured.err
+    assert captured.err.startswith("error: ") and captured.err.count("\n") == 1, (
+        captured.err
+    )
     assert {path.name: path.stat().st_mtime_ns for path in Path().iterdir()} == before
     return captured.err
 
@@ -66,7 +77,10 @@ def fails(capsys, *arguments: str) -> str:
 # ---------------------------------------------------------------------- values
 
 
-@pytest.mark.parametrize("value", ["", "  ", "0", "-1", "nan", "inf", "1e300", "1e400", "much", "1,5", "0x1", DIGITS])
+@pytest.mark.parametrize(
+    "value",
+    ["", "  ", "0", "-1", "nan", "inf", "1e300", "1e400", "much", "1,5", "0x1", DIGITS],
+)
 @pytest.mark.parametrize(
     "command",
     [
@@ -80,7 +94,9 @@ def fails(capsys, *arguments: str) -> str:
     ids=lambda command: f"{command[0]} {command[-1]}",
 )
 def test_numbers(capsys, command, value):
-    assert len(fails(capsys, *command, value)) < 300 + len(value[:5000]) * value.isdigit()
+    assert (
+        len(fails(capsys, *command, value)) < 300 + len(value[:5000]) * value.isdigit()
+    )
 
 
 @pytest.mark.parametrize("name", ["make", "model", "options", "self"])
@@ -90,7 +106,10 @@ def test_names_of_no_value(capsys, command, name):
     assert told.startswith(f"error: {name} must name a value of the scene")
 
 
-@pytest.mark.parametrize("value", ["", "  ", LONG, "nan", "é", "\udcff", "a\0b", "plain", "none.csv", "folder.csv"])
+@pytest.mark.parametrize(
+    "value",
+    ["", "  ", LONG, "nan", "é", "\udcff", "a\0b", "plain", "none.csv", "folder.csv"],
+)
 @pytest.mark.parametrize(
     "command",
     [
@@ -141,14 +160,20 @@ def test_counts(capsys, option, value):
     ],
 )
 def test_files_that_are_none(capsys, command, suffix, kind):
-    assert kind in fails(capsys, *command, kind if kind.startswith("/") else kind + suffix)
+    assert kind in fails(
+        capsys, *command, kind if kind.startswith("/") else kind + suffix
+    )
 
 
 def test_what_is_not_said_is_not_guessed(capsys):
     """An empty patch was Circle, an empty folder the present one, and a cell size without a map was passed over."""
-    assert "patch must be one of Square" in fails(capsys, "run", "in-hand", "--patch", "")
+    assert "patch must be one of Square" in fails(
+        capsys, "run", "in-hand", "--patch", ""
+    )
     assert "--out" in fails(capsys, "run", "in-hand", "--out", "")
-    assert "--cell-size must be given only" in fails(capsys, "run", "scene.toml", "--cell-size", "0.001")
+    assert "--cell-size must be given only" in fails(
+        capsys, "run", "scene.toml", "--cell-size", "0.001"
+    )
 
 
 def test_warnings_are_one_line_too(capsys):
@@ -165,24 +190,52 @@ def test_warnings_are_one_line_too(capsys):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("t_end = 0.01", f"t_end = {DIGITS}", "not valid TOML: Exceeds the limit (4300 digits)"),
+        (
+            "t_end = 0.01",
+            f"t_end = {DIGITS}",
+            "not valid TOML: Exceeds the limit (4300 digits)",
+        ),
         ("t_end = 0.01", "t_end = 1e300", "t_end must be at most"),
         ("t_end = 0.01", "t_end = nan", "t_end must be finite"),
         ("t_end = 0.01", "t_end = 2026-01-01", "t_end must be a number"),
         ("t_end = 0.01", "t_end = 1\nname = 2026-01-01", "name must be a text"),
         ("t_end = 0.01", "t_end = 1\nname = nan", "name must be a text"),
-        ("t_end = 0.01", "t_end = 1\nsave_every = 1e-12", "save_every must be at least"),
+        (
+            "t_end = 0.01",
+            "t_end = 1\nsave_every = 1e-12",
+            "save_every must be at least",
+        ),
         ("t_end = 0.01", "t_end = 1\nt_end = 2", "not valid TOML: Cannot overwrite"),
         ("t_end = 0.01", "", "missing key 't_end'"),
         ("mass = 1.0", f"mass = 1.0\n{LONG} = 1", "unknown key 'xxx"),
         ("mass = 1.0", "mass = 1.0\nsize = [1e200, 1e200]", "size must be at most"),
         ("cells = 5", "cells = 100_000", "cells (rows x columns) must be at most"),
         ("cells = 5", "cells = '5'", "cells must be a number"),
-        ("normal_force = 2.0", f"normal_force = 2.0\ncount = 1{400 * '0'}", "count of contact 'contact' must be at mo"),
-        ("normal_force = 2.0", "normal_force = 2.0\nname = 2026-01-01", "name of a contact must be a text"),
-        ("normal_force = 2.0", "normal_force = { csv = 'pipe.csv' }", "is a device or a pipe"),
-        ("normal_force = 2.0", "normal_force = { csv = '/dev/zero' }", "is a device or a pipe"),
-        ("normal_force = 2.0", "normal_force = { csv = '' }", "must be the path of a file"),
+        (
+            "normal_force = 2.0",
+            f"normal_force = 2.0\ncount = 1{400 * '0'}",
+            "count of contact 'contact' must be at mo",
+        ),
+        (
+            "normal_force = 2.0",
+            "normal_force = 2.0\nname = 2026-01-01",
+            "name of a contact must be a text",
+        ),
+        (
+            "normal_force = 2.0",
+            "normal_force = { csv = 'pipe.csv' }",
+            "is a device or a pipe",
+        ),
+        (
+            "normal_force = 2.0",
+            "normal_force = { csv = '/dev/zero' }",
+            "is a device or a pipe",
+        ),
+        (
+            "normal_force = 2.0",
+            "normal_force = { csv = '' }",
+            "must be the path of a file",
+        ),
         ('shape = "disc"', "shape = ['disc']", "shape must be one of"),
     ],
 )
@@ -210,14 +263,36 @@ def test_json_scene_files(capsys, text, words):
 # ---------------------------------------------------------------------- places
 
 
-@pytest.mark.parametrize("folder", ["", "plain", "plain/out", "/proc/out", LONG, "a\0b", "/dev/null"])
-@pytest.mark.parametrize(("command", "option"), FOLDERS, ids=lambda value: value[0] if isinstance(value, list) else "")
+@pytest.mark.parametrize(
+    "folder", ["", "plain", "plain/out", "/proc/out", LONG, "a\0b", "/dev/null"]
+)
+@pytest.mark.parametrize(
+    ("command", "option"),
+    FOLDERS,
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
 def test_folders_that_cannot_be_written(capsys, command, option, folder):
     fails(capsys, *command, option, folder)
 
 
-@pytest.mark.parametrize("name", ["", "folder", "pipe", "none/surface", "plain/surface", "/proc/surface", LONG, "a\0b"])
-@pytest.mark.parametrize(("command", "option", "suffix"), FILES, ids=lambda value: value if value == "--csv" else "")
+@pytest.mark.parametrize(
+    "name",
+    [
+        "",
+        "folder",
+        "pipe",
+        "none/surface",
+        "plain/surface",
+        "/proc/surface",
+        LONG,
+        "a\0b",
+    ],
+)
+@pytest.mark.parametrize(
+    ("command", "option", "suffix"),
+    FILES,
+    ids=lambda value: value if value == "--csv" else "",
+)
 def test_files_that_cannot_be_written(capsys, command, option, suffix, name):
     fails(capsys, *command, option, name and name + suffix)
 
@@ -238,8 +313,16 @@ sys.exit(main(sys.argv[2:]))
 @pytest.mark.parametrize(
     ("most", "command", "kept"),
     [
-        (1000, ["limit-surface", "--surface", "ellipsoid", "--out", "kept.png"], ["kept.png"]),
-        (1000, ["limit-surface", "--surface", "ellipsoid", "--csv", "kept.csv"], ["kept.csv"]),
+        (
+            1000,
+            ["limit-surface", "--surface", "ellipsoid", "--out", "kept.png"],
+            ["kept.png"],
+        ),
+        (
+            1000,
+            ["limit-surface", "--surface", "ellipsoid", "--csv", "kept.csv"],
+            ["kept.csv"],
+        ),
         (1000, ["run", "scene.toml", "--out", "."], ["scene-distributed.nc"]),
         pytest.param(
             5000,
@@ -252,9 +335,15 @@ sys.exit(main(sys.argv[2:]))
 def test_a_full_disk_leaves_what_was_there(place, most, command, kept):
     for name in kept:
         Path(name).write_text("kept")
-    done = subprocess.run([sys.executable, "-c", FULL, str(most), *command], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, str(most), *command],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 2
-    assert done.stderr.splitlines()[-1].endswith("cannot be written: File too large"), done.stderr
+    assert done.stderr.splitlines()[-1].endswith("cannot be written: File too large"), (
+        done.stderr
+    )
     assert "Traceback" not in done.stderr
     for name in kept:
         assert Path(name).read_text() == "kept"
@@ -270,7 +359,16 @@ def test_file_names_that_are_no_utf_8(capsys):
     Path(name).rename(pad := os.fsdecode(b"p\xe4d.csv"))
     Path(pad).write_text("1,1\n")
     done = subprocess.run(
-        [sys.executable, "-c", MAIN, "limit-surface", "--patch", os.fsencode(pad), "--cell-size", "0.1"],
+        [
+            sys.executable,
+            "-c",
+            MAIN,
+            "limit-surface",
+            "--patch",
+            os.fsencode(pad),
+            "--cell-size",
+            "0.1",
+        ],
         capture_output=True,
     )
     assert (done.returncode, done.stderr) == (0, b"")

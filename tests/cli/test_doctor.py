@@ -23,8 +23,12 @@ def lines(capsys) -> dict[str, str]:
 @pytest.fixture
 def quick(monkeypatch):
     """A doctor that simulates nothing, in a sound installation."""
-    monkeypatch.setattr(doctor, "checks", lambda: [doctor.Check("one", lambda: 1.0, 1.0, 0.0)])
-    monkeypatch.setattr(doctor, "requirements", lambda: iter([("", [Requirement("numpy")])]))
+    monkeypatch.setattr(
+        doctor, "checks", lambda: [doctor.Check("one", lambda: 1.0, 1.0, 0.0)]
+    )
+    monkeypatch.setattr(
+        doctor, "requirements", lambda: iter([("", [Requirement("numpy")])])
+    )
     monkeypatch.setattr(doctor, "step_times", lambda: [])
 
 
@@ -35,7 +39,10 @@ def test_this_installation_is_sound(capsys):
     assert said["packages"].startswith("numpy ") and "step, reduced" in said
     outcomes = [words for name, words in said.items() if name.startswith("self-test, ")]
     assert len(outcomes) >= 5 and all(words.startswith("holds, ") for words in outcomes)
-    assert any(name.startswith("machine code in ") and ", 0 damaged" in words for name, words in said.items())
+    assert any(
+        name.startswith("machine code in ") and ", 0 damaged" in words
+        for name, words in said.items()
+    )
 
 
 def fails():
@@ -51,20 +58,31 @@ def fails():
     ],
 )
 def test_a_number_that_misses_is_said(quick, monkeypatch, capsys, found, words):
-    monkeypatch.setattr(doctor, "checks", lambda: [doctor.Check("one", found, 1.0, 0.05)])
+    monkeypatch.setattr(
+        doctor, "checks", lambda: [doctor.Check("one", found, 1.0, 0.05)]
+    )
     assert main(["doctor"]) == 1
     said = lines(capsys)
-    assert said["self-test, one"].startswith(words) and said["verdict"].startswith("something is wrong")
+    assert said["self-test, one"].startswith(words) and said["verdict"].startswith(
+        "something is wrong"
+    )
 
 
 @pytest.mark.parametrize(
-    ("needs", "words"), [("numpy>=99", "(needs >=99)"), ("no-such-package", "no-such-package is missing")]
+    ("needs", "words"),
+    [("numpy>=99", "(needs >=99)"), ("no-such-package", "no-such-package is missing")],
 )
-def test_a_package_that_is_missing_or_too_old_is_said(quick, monkeypatch, capsys, needs, words):
-    monkeypatch.setattr(doctor, "requirements", lambda: iter([("", [Requirement(needs)])]))
+def test_a_package_that_is_missing_or_too_old_is_said(
+    quick, monkeypatch, capsys, needs, words
+):
+    monkeypatch.setattr(
+        doctor, "requirements", lambda: iter([("", [Requirement(needs)])])
+    )
     assert main(["doctor"]) == 1
     assert words in lines(capsys)["packages"]
-    monkeypatch.setattr(doctor, "requirements", lambda: iter([("", []), ("some", [Requirement(needs)])]))
+    monkeypatch.setattr(
+        doctor, "requirements", lambda: iter([("", []), ("some", [Requirement(needs)])])
+    )
     assert main(["doctor"]) == 0  # an extra may be missing
     assert words in lines(capsys)["extra some"]
 
@@ -75,7 +93,9 @@ def test_a_release_candidate_is_a_version_as_others(monkeypatch):
 
 
 def test_packages_are_those_that_an_installation_names():
-    named = {extra: [each.name for each in those] for extra, those in doctor.requirements()}
+    named = {
+        extra: [each.name for each in those] for extra, those in doctor.requirements()
+    }
     assert "numpy" in named[""] and "torch" not in named[""]
     assert named["torch"] == ["torch"]
 
@@ -89,16 +109,24 @@ def test_damaged_machine_code_is_counted(tmp_path, monkeypatch):
     sound = machine_code._seal(b"origin", content) + content
     (folder / "a.machine").write_bytes(sound)
     (folder / "b.machine").write_bytes(sound[:-1])
-    assert doctor.machine_code() == [(f"machine code in {folder}", "2 functions, 0.3 MB, 1 damaged")]
+    assert doctor.machine_code() == [
+        (f"machine code in {folder}", "2 functions, 0.3 MB, 1 damaged")
+    ]
 
 
 def test_the_time_of_a_step_is_the_median_in_microseconds(monkeypatch):
     model = SimpleNamespace(step=None, rest=lambda: None)
     monkeypatch.setattr(doctor, "_model", lambda name: model)
     monkeypatch.setattr(doctor, "partial", lambda *call: call)
-    monkeypatch.setattr(doctor.timeit, "repeat", lambda call, number, repeat: [9e-6 * number, 4e-6 * number, 0.0])
+    monkeypatch.setattr(
+        doctor.timeit,
+        "repeat",
+        lambda call, number, repeat: [9e-6 * number, 4e-6 * number, 0.0],
+    )
     assert doctor.step_times()[0] == ("step, reduced", "4.00 us")
 
 
 def test_bug_reports_ask_for_the_output():
-    assert "`planarfriction doctor`" in (ROOT / ".github" / "ISSUE_TEMPLATE" / "bug.yml").read_text(encoding="utf-8")
+    assert "`planarfriction doctor`" in (
+        ROOT / ".github" / "ISSUE_TEMPLATE" / "bug.yml"
+    ).read_text(encoding="utf-8")

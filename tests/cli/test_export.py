@@ -18,9 +18,14 @@ def files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "model.toml").write_text(MODEL)
     disc = pf.ContactPatch.disc(0.01, 5)
-    one, other = (pf.ReducedModelPublished(disc, pf.LuGre(mu_c=mu)) for mu in (0.7, 0.5))
+    one, other = (
+        pf.ReducedModelPublished(disc, pf.LuGre(mu_c=mu)) for mu in (0.7, 0.5)
+    )
     for name, second in (("same", one), ("scene", other)):
-        contacts = [pf.Contact(one, 1.0, name="left"), pf.Contact(second, 1.0, name="right")]
+        contacts = [
+            pf.Contact(one, 1.0, name="left"),
+            pf.Contact(second, 1.0, name="right"),
+        ]
         pf.Scene(pf.Body(1.0, 1.0), contacts, 1.0).to_file(f"{name}.toml")
 
 
@@ -36,7 +41,21 @@ FILES = "pad.h", "pad.c", "pad_test.c", "pad.cmake"
     ],
 )
 def test_files(capsys, tmp_path, arguments, mu_c):
-    assert main(["export", *arguments, "--out", "made/here", "--name", "pad", "--precision", "float"]) == 0
+    assert (
+        main(
+            [
+                "export",
+                *arguments,
+                "--out",
+                "made/here",
+                "--name",
+                "pad",
+                "--precision",
+                "float",
+            ]
+        )
+        == 0
+    )
     folder = tmp_path / "made" / "here"
     assert capsys.readouterr().out.split() == [f"made/here/{each}" for each in FILES]
     assert sorted(each.name for each in folder.iterdir()) == sorted(FILES)
@@ -49,9 +68,18 @@ def test_files(capsys, tmp_path, arguments, mu_c):
     [
         (["scene.toml"], "--contact must be one of left, right"),
         (["scene.toml", "--contact", "middle"], "--contact must be one of left, right"),
-        (["model.toml", "--contact", "left"], "--contact must be given only for a scene"),
-        (["model.toml", "--name", "a b"], "name must be a letter, then letters, digits and _, 40 in all"),
-        (["model.toml", "--precision", "half"], "precision must be one of double, float"),
+        (
+            ["model.toml", "--contact", "left"],
+            "--contact must be given only for a scene",
+        ),
+        (
+            ["model.toml", "--name", "a b"],
+            "name must be a letter, then letters, digits and _, 40 in all",
+        ),
+        (
+            ["model.toml", "--precision", "half"],
+            "precision must be one of double, float",
+        ),
         (["broken.toml"], "broken.toml: unknown key 'mass'"),
         (["cells.toml"], "surface must be an ellipsoid or a table"),
         (["none.toml"], "none.toml: no such file"),
@@ -60,7 +88,9 @@ def test_files(capsys, tmp_path, arguments, mu_c):
 def test_wrong_input_is_one_line(capsys, tmp_path, arguments, words):
     (tmp_path / "broken.toml").write_text(MODEL + "mass = 1.0\n")
     (tmp_path / "cells.toml").write_text(
-        MODEL.replace('"reduced', '{kind = "reduced', 1).replace('published"\n', 'published", surface = "cells"}\n', 1)
+        MODEL.replace('"reduced', '{kind = "reduced', 1).replace(
+            'published"\n', 'published", surface = "cells"}\n', 1
+        )
     )
     assert main(["export", *arguments, "--out", "library"]) == 2
     said = capsys.readouterr()

@@ -15,7 +15,16 @@ from planarfriction.identify.logs import columns_of
 from planarfriction.validation import number_in
 from tests.support.identification_logs import clean_log, excitation, noisy
 
-FAST = ["--parameters", "mu_c,contact_radius", "--starts", "1", "--nuisance", "none", "--model", "reduced-published"]
+FAST = [
+    "--parameters",
+    "mu_c,contact_radius",
+    "--starts",
+    "1",
+    "--nuisance",
+    "none",
+    "--model",
+    "reduced-published",
+]
 START = [f"--start={name}={value}" for name, value in {"mu_s": 0.65, "v_s": 2e-3, "gamma": 1.4, "sigma_0": 2e4, "sigma_1": 30, "sigma_2": 0.8}.items()]  # fmt: skip  # noqa: E501
 
 
@@ -28,9 +37,17 @@ def path(tmp_path_factory):
 
 def test_estimates_json_and_picture(path, tmp_path, capsys):
     out = tmp_path / "new" / "folder"
-    assert main(["identify", str(path), "--patch", "disc", *FAST, *START, "--out", str(out)]) == 0
+    assert (
+        main(
+            ["identify", str(path), "--patch", "disc", *FAST, *START, "--out", str(out)]
+        )
+        == 0
+    )
     captured = capsys.readouterr()
-    assert "contact_radius" in captured.out and "slow run: 500 samples, disc" in captured.out
+    assert (
+        "contact_radius" in captured.out
+        and "slow run: 500 samples, disc" in captured.out
+    )
     assert captured.err.count("wrote") == 2
     data = json.loads((out / "slow-run-identification.json").read_text())
     assert data["parameters"]["mu_c"]["estimate"] == pytest.approx(0.5, abs=0.01)
@@ -44,12 +61,17 @@ def test_ctrl_c_prints_what_was_found_so_far(path, capsys, monkeypatch):
         if "evaluation" in text and next(after, None) is None:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("planarfriction.cli.console.work_progress", lambda label: contextlib.nullcontext(shown))
+    monkeypatch.setattr(
+        "planarfriction.cli.console.work_progress",
+        lambda label: contextlib.nullcontext(shown),
+    )
     assert main(["identify", str(path), "--patch", "disc", *FAST, *START]) == 130
     (line,) = capsys.readouterr().out.splitlines()
     words, _, found = line.partition("[SI]: ")
     assert "not finished" in words and "without intervals" in words
-    assert float(found.split(", ")[0].removeprefix("mu_c = ")) == pytest.approx(0.5, abs=0.05)
+    assert float(found.split(", ")[0].removeprefix("mu_c = ")) == pytest.approx(
+        0.5, abs=0.05
+    )
     assert "contact_radius = " in found
 
 
@@ -66,7 +88,8 @@ def test_progress_is_a_line_now_and_then_without_a_terminal(monkeypatch, capsys)
 
 
 def test_a_line_of_progress_that_is_being_written_ends_before_the_end(monkeypatch):
-    begun, written = threading.Event(), []
+    begun = threading.Event()
+    written = []
 
     def write_slowly(text):
         begun.set()
@@ -91,9 +114,19 @@ def test_a_line_of_progress_that_is_being_written_ends_before_the_end(monkeypatc
     ],
 )
 def test_what_is_wrong_is_one_line(path, capsys, options, words):
-    assert main(["identify", *(str(path) if option == "LOG" else option for option in options)]) == 2
+    assert (
+        main(
+            [
+                "identify",
+                *(str(path) if option == "LOG" else option for option in options),
+            ]
+        )
+        == 2
+    )
     message = capsys.readouterr().err
-    assert message.startswith("error: ") and message.count("\n") == 1 and words in message, message
+    assert (
+        message.startswith("error: ") and message.count("\n") == 1 and words in message
+    ), message
 
 
 def test_a_bad_line_is_named(path, tmp_path, capsys):

@@ -15,21 +15,42 @@ LONG = {("fixed_stiffness.py", "stepped")}
 
 
 def functions(folder: str) -> list[tuple[str, ast.FunctionDef]]:
-    trees = ((each.name, ast.parse(each.read_text())) for each in sorted((PACKAGE / folder).rglob("*.py")))
-    return [(name, node) for name, tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    trees = (
+        (each.name, ast.parse(each.read_text()))
+        for each in sorted((PACKAGE / folder).rglob("*.py"))
+    )
+    return [
+        (name, node)
+        for name, tree in trees
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+    ]
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_every_argument_and_result_is_annotated(folder):
     bare = []
     for file, node in functions(folder):
-        every = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, node.args.vararg, node.args.kwarg]
-        names = [each.arg for each in every if each and each.annotation is None and each.arg not in ("self", "cls")]
+        every = [
+            *node.args.posonlyargs,
+            *node.args.args,
+            *node.args.kwonlyargs,
+            node.args.vararg,
+            node.args.kwarg,
+        ]
+        names = [
+            each.arg
+            for each in every
+            if each and each.annotation is None and each.arg not in ("self", "cls")
+        ]
         if names or node.returns is None:
             bare.append(f"{file}: {node.name} {names}")
     assert not bare
 
 
 def test_functions_take_few_arguments():
-    counts = {(file, node.name): len(node.args.posonlyargs + node.args.args) for file, node in functions("_engine")}
+    counts = {
+        (file, node.name): len(node.args.posonlyargs + node.args.args)
+        for file, node in functions("_engine")
+    }
     assert {each for each, count in counts.items() if count > MOST} == LONG

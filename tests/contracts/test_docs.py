@@ -19,16 +19,32 @@ import planarfriction
 from planarfriction import families
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
-    (ROOT / "docs").glob("*.md")
+PAGES = [
+    ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
+] + sorted((ROOT / "docs").glob("*.md"))
+OPTIONAL = (
+    "torch",
+    "jax",
+    "warp",
+    "mujoco",
+    "mujoco.mjx",
+    "mujoco_warp",
+    "pydrake",
+    "zarr",
+    "casadi",
 )
-OPTIONAL = ("torch", "jax", "warp", "mujoco", "mujoco.mjx", "mujoco_warp", "pydrake", "zarr", "casadi")
 """Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
 RECIPES = ("pybullet", "genesis", "newton")
 """Hosts that a page has recipes for, and no extra of ours installs."""
 SLOW_PAGES = ("mjx-and-warp.md",)
 """Pages whose hosts compile for a minute."""
-FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
+FAMILIES = (
+    families.LAWS,
+    families.MODELS,
+    families.SURFACES,
+    families.SHAPES,
+    families.SCENES,
+)
 MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
 
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -36,7 +52,9 @@ LINK = re.compile(r"\]\(([^)\s]+)\)")
 NAME = re.compile(r"`([A-Za-z_]\w*(?:\.\w+)+)(?:\([^`]*\))?`")
 BARE_NAME = re.compile(r"\b[A-Za-z_]\w*(?:\.\w+)+")
 
-pytestmark = pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="no docs beside these tests")
+pytestmark = pytest.mark.skipif(
+    not (ROOT / "docs").is_dir(), reason="no docs beside these tests"
+)
 
 
 class Block(NamedTuple):
@@ -52,12 +70,20 @@ class Block(NamedTuple):
 
 
 def blocks(page: Path) -> list[Block]:
-    text, result, end, before = page.read_text(encoding="utf-8"), [], 0, ""
+    text = page.read_text(encoding="utf-8")
+    result = []
+    end = 0
+    before = ""
     for match in FENCE.finditer(text):
         line = text.count("\n", 0, match.start()) + 2
         follows = before == "python" and not text[end : match.start()].strip()
-        result.append(Block(match[1], match[2], line, follows, text.count("\n## ", 0, match.start())))
-        end, before = match.end(), match[1]
+        result.append(
+            Block(
+                match[1], match[2], line, follows, text.count("\n## ", 0, match.start())
+            )
+        )
+        end = match.end()
+        before = match[1]
     return result
 
 
@@ -67,7 +93,11 @@ def missing_packages(page: Path) -> dict[int, str]:
         block.section: package
         for block in blocks(page)
         for package in (*OPTIONAL, *RECIPES)
-        if re.search(rf"^(import|from) (planarfriction\.)?(adapters\.)?{package}\b", block.text, re.MULTILINE)
+        if re.search(
+            rf"^(import|from) (planarfriction\.)?(adapters\.)?{package}\b",
+            block.text,
+            re.MULTILINE,
+        )
         and not installed(package)
     }
 
@@ -89,7 +119,10 @@ def prose(page: Path) -> str:
 
 def anchors(page: Path) -> set[str]:
     headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    return {
+        re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        for heading in headings
+    }
 
 
 def ids(page: Path) -> str:
@@ -105,7 +138,9 @@ def ids(page: Path) -> str:
     ],
     ids=ids,
 )
-def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path, monkeypatch):
+def test_the_python_of_a_page_runs_and_prints_what_the_page_says(
+    page, tmp_path, monkeypatch
+):
     """In order, in one namespace, in an empty folder.
 
     A block whose first line is `# name.toml` (or .csv) is written to that file; a `text` block right after Python is
@@ -126,7 +161,12 @@ def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path,
                 continue
             if block.language == "python":
                 output = io.StringIO()
-                code = compile("\n" * (block.line - 1) + block.text, str(page), "exec", dont_inherit=True)
+                code = compile(
+                    "\n" * (block.line - 1) + block.text,
+                    str(page),
+                    "exec",
+                    dont_inherit=True,
+                )
                 with contextlib.redirect_stdout(output):
                     exec(code, namespace)
                 printed = output.getvalue()
@@ -142,12 +182,21 @@ def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path,
     finally:
         matplotlib.use(backend)
     if missing:
-        pytest.skip(f"sections that need {', '.join(sorted(set(missing.values())))}, which is not installed")
+        pytest.skip(
+            f"sections that need {', '.join(sorted(set(missing.values())))}, which is not installed"
+        )
 
 
 def test_members_of_ones_own_are_short():
     page = ROOT / "docs" / "write-your-own.md"
-    assert max(block.text.count("\n") for block in blocks(page) if block.language == "python") < 60
+    assert (
+        max(
+            block.text.count("\n")
+            for block in blocks(page)
+            if block.language == "python"
+        )
+        < 60
+    )
 
 
 @pytest.mark.parametrize("page", PAGES, ids=ids)
@@ -159,21 +208,28 @@ def test_links_lead_somewhere(page):
         target = (page.parent / path).resolve() if path else page
         assert target.exists(), f"{page.name}: {link}"
         if anchor:
-            assert anchor in anchors(target), f"{page.name}: {link} (headings: {sorted(anchors(target))})"
+            assert anchor in anchors(target), (
+                f"{page.name}: {link} (headings: {sorted(anchors(target))})"
+            )
 
 
 def resolve(name: str, package: Any = planarfriction) -> bool:
     """Return True if a package has a dotted name: modules, functions, classes and the fields of classes."""
-    parts, value = name.split("."), package
+    parts = name.split(".")
+    value = package
     for i, part in enumerate(parts):
-        fields = getattr(value, "__dataclass_fields__", None) or dict.fromkeys(getattr(value, "_fields", ()))
+        fields = getattr(value, "__dataclass_fields__", None) or dict.fromkeys(
+            getattr(value, "_fields", ())
+        )
         if hasattr(value, part):
             value = getattr(value, part)
         elif part in fields:
             return i == len(parts) - 1
         else:
             try:
-                value = importlib.import_module(".".join([package.__name__, *parts[: i + 1]]))
+                value = importlib.import_module(
+                    ".".join([package.__name__, *parts[: i + 1]])
+                )
             except ImportError:
                 return False
     return True
@@ -186,13 +242,17 @@ def test_names_exist(page):
     for name in NAME.findall(prose(page)) + BARE_NAME.findall(equations):
         first, _, rest = name.partition(".")
         packages = [part for part in name.split(".") if part in OPTIONAL]
-        if first in OPTIONAL or any(importlib.util.find_spec(package) is None for package in packages):
+        if first in OPTIONAL or any(
+            importlib.util.find_spec(package) is None for package in packages
+        ):
             continue  # a name of that package itself, or one that cannot be looked up without it
         if first in ("pf", "planarfriction"):
             assert resolve(rest), f"{page.name}: {name}"
         elif first in ("planarfriction_studies", "planarfriction_explorer"):
             assert resolve(rest, importlib.import_module(first)), f"{page.name}: {name}"
-        elif (first in MODULES or first in planarfriction.__all__) and not name.endswith((".py", ".md")):
+        elif (
+            first in MODULES or first in planarfriction.__all__
+        ) and not name.endswith((".py", ".md")):
             assert resolve(name), f"{page.name}: {name}"
 
 
@@ -203,17 +263,31 @@ def test_files_of_ours_that_a_page_names_exist(page):
     for name in re.findall(r"`(\w+(?:/[\w.]+)+)`", prose(page)):
         ends = (name, f"{name}.py", f"{name.rpartition('.')[0]}.py")
         ours = any((home / name.partition("/")[0]).is_dir() for home in homes)
-        assert not ours or any((home / end).exists() for home in homes for end in ends), f"{page.name}: {name}"
+        assert not ours or any(
+            (home / end).exists() for home in homes for end in ends
+        ), f"{page.name}: {name}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=ids)
 def test_code_of_a_page_is_not_cut_off(page):
     """A line of the site holds 88 characters of code."""
-    long = [line for block in blocks(page) for line in block.text.splitlines() if len(line) > 88]
+    long = [
+        line
+        for block in blocks(page)
+        for line in block.text.splitlines()
+        if len(line) > 88
+    ]
     assert not long, f"{page.name}: {long[0]}"
 
 
-EXPLANATION = ("physics", "exact-surfaces", "reduced-model", "solver", "embedding", "anisotropy")
+EXPLANATION = (
+    "physics",
+    "exact-surfaces",
+    "reduced-model",
+    "solver",
+    "embedding",
+    "anisotropy",
+)
 """Pages that give equations and say which code holds them."""
 
 
@@ -222,7 +296,11 @@ def test_every_formula_stands_on_a_page():
 
     text = "".join(prose(ROOT / "docs" / f"{name}.md") for name in EXPLANATION)
     own = [value for value in vars(formulas).values() if inspect.isfunction(value)]
-    public = [each.__name__ for each in own if each.__module__ == formulas.__name__ and each.__name__[0] != "_"]
+    public = [
+        each.__name__
+        for each in own
+        if each.__module__ == formulas.__name__ and each.__name__[0] != "_"
+    ]
     missing = [name for name in public if f"`formulas.{name}`" not in text]
     assert not missing
 
@@ -232,7 +310,11 @@ def test_equations_say_where_they_are_in_the_code(name):
     """Each section with an equation set apart names a function, a method or a module of ours."""
     text = prose(ROOT / "docs" / f"{name}.md")
     for section in re.split(r"^(?=##+ )", text, flags=re.MULTILINE):
-        named = [each for each in NAME.findall(section) if each.split(".")[0] in MODULES | set(planarfriction.__all__)]
+        named = [
+            each
+            for each in NAME.findall(section)
+            if each.split(".")[0] in MODULES | set(planarfriction.__all__)
+        ]
         assert "$$" not in section or any(map(resolve, named)), section.splitlines()[0]
 
 
@@ -244,7 +326,9 @@ def test_scenes_page_names_every_key_and_every_member():
     keys = {*files.SCENE_KEYS, *files.BODY_KEYS, *files.CONTACT_KEYS}
     keys |= {field.name for field in dataclasses.fields(SoftFinger)}
     for family in (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES):
-        keys |= {*family}.union(*(inspect.signature(make).parameters for make in family.values()))
+        keys |= {*family}.union(
+            *(inspect.signature(make).parameters for make in family.values())
+        )
     keys -= {"coefficients"}  # of a fitted quartic: nobody writes them by hand
     missing = {key for key in keys if f"`{key}`" not in page}
     assert not missing
@@ -256,13 +340,17 @@ def test_glossary_names_every_member():
     page = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     for family in (families.MODELS, families.LAWS, families.SURFACES, families.SCENES):
         for name in family:
-            assert f"`{name}`" in page and re.search(rf"\b{family[name].__name__}`", page), name
+            assert f"`{name}`" in page and re.search(
+                rf"\b{family[name].__name__}`", page
+            ), name
 
 
 def test_pictures_are_small_and_used():
     used = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     for picture in (ROOT / "docs" / "images").glob("*"):
-        assert picture.stat().st_size < (1_500_000 if picture.suffix == ".gif" else 200_000), picture.name
+        assert picture.stat().st_size < (
+            1_500_000 if picture.suffix == ".gif" else 200_000
+        ), picture.name
         assert f"images/{picture.name}" in used, picture.name
 
 
@@ -270,7 +358,10 @@ def test_readme_is_short_and_its_table_mixes_no_units():
     """Five rows against what people use today, each in one unit; `make_referee` fills them, from the stored run."""
     text = PAGES[0].read_text(encoding="utf-8")
     assert text.count("\n") <= 120
-    rows = [row.split(" | ")[1:] for row in re.findall(r"^\| (?!largest)(.+) \|$", text, re.MULTILINE)]
+    rows = [
+        row.split(" | ")[1:]
+        for row in re.findall(r"^\| (?!largest)(.+) \|$", text, re.MULTILINE)
+    ]
     assert len(rows) == 5
     assert all(len({re.sub(r"[\d.]", "", cell) for cell in row}) == 1 for row in rows)
 
@@ -279,12 +370,22 @@ def test_numbers_in_the_words_of_readme_stand_on_their_pages():
     text = PAGES[0].read_text(encoding="utf-8")
     gradient = re.search(r"take ([0-9.]+ ms)\.", text)
     assert gradient is not None
-    for number, page in (("8.71", "measured"), ("12.20", "measured"), (gradient[1], "benchmarks")):
-        assert number in text and number in (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8"), number
+    for number, page in (
+        ("8.71", "measured"),
+        ("12.20", "measured"),
+        (gradient[1], "benchmarks"),
+    ):
+        assert number in text and number in (ROOT / "docs" / f"{page}.md").read_text(
+            encoding="utf-8"
+        ), number
 
 
 def test_the_first_page_links_every_page():
-    lists = (ROOT / "docs" / "index.md").read_text(encoding="utf-8").partition("## All pages")[2]
+    lists = (
+        (ROOT / "docs" / "index.md")
+        .read_text(encoding="utf-8")
+        .partition("## All pages")[2]
+    )
     linked = {link.removesuffix(".md") for link in LINK.findall(lists)}
     assert {page.stem for page in (ROOT / "docs").glob("*.md")} - linked == {"index"}
 

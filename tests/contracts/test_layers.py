@@ -22,8 +22,16 @@ from tests.support.repository import script
 
 ROOT = Path(__file__).parents[2]
 ENGINE = "planarfriction._engine"
-LIBRARY, STUDIES, EXPLORER = "planarfriction", "planarfriction_studies", "planarfriction_explorer"
-SOURCES = {LIBRARY: ROOT / "src", STUDIES: ROOT / "studies" / "src", EXPLORER: ROOT / "src"}
+LIBRARY, STUDIES, EXPLORER = (
+    "planarfriction",
+    "planarfriction_studies",
+    "planarfriction_explorer",
+)
+SOURCES = {
+    LIBRARY: ROOT / "src",
+    STUDIES: ROOT / "studies" / "src",
+    EXPLORER: ROOT / "src",
+}
 HEAVY = (
     "PIL",
     "click",
@@ -49,7 +57,11 @@ HOMES = {
     "llvmlite": ("compiled",),
     "matplotlib": ("plots", "planarfriction_studies.rig"),
     "rich": ("cli",),
-    "click": ("cli", "planarfriction_studies.commands", "planarfriction_explorer.command"),
+    "click": (
+        "cli",
+        "planarfriction_studies.commands",
+        "planarfriction_explorer.command",
+    ),
     "torch": ("torch",),
     "warp": ("warp",),
     "mujoco": ("adapters",),
@@ -58,7 +70,10 @@ HOMES = {
 }
 """Package -> the floors whose modules may import it when they load; no floor may load the rest of HEAVY that way."""
 
-SIMULATORS = {"planarfriction.adapters.mjx": "jax", "planarfriction.adapters.mujoco_warp": "warp"}
+SIMULATORS = {
+    "planarfriction.adapters.mjx": "jax",
+    "planarfriction.adapters.mujoco_warp": "warp",
+}
 """Adapters of simulators that calculate with a package which has a floor of its own."""
 
 
@@ -73,7 +88,11 @@ def _floors() -> dict[str, int]:
     for contract in _contracts():
         homes = [f"{home}." for home in contract.get("containers", [])] or [""]
         for height, floor in enumerate(reversed(contract["layers"])):
-            found |= {f"{home}{name.strip(' ()')}": height for home in homes for name in floor.split("|")}
+            found |= {
+                f"{home}{name.strip(' ()')}": height
+                for home in homes
+                for name in floor.split("|")
+            }
     return found
 
 
@@ -95,7 +114,9 @@ def _imports(tree: ast.AST, nested: bool) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "imports are absolute"
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        elif nested or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
+        elif nested or not isinstance(
+            node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+        ):
             yield from _imports(node, nested)
 
 
@@ -108,8 +129,15 @@ def _is_compiled(module: str) -> bool:
 
 @functools.cache
 def _sources() -> list[tuple[str, ast.AST]]:
-    files = [(file, home) for package, home in SOURCES.items() for file in sorted((home / package).rglob("*.py"))]
-    return [(_module_name(file, home), ast.parse(file.read_text(encoding="utf-8"))) for file, home in files]
+    files = [
+        (file, home)
+        for package, home in SOURCES.items()
+        for file in sorted((home / package).rglob("*.py"))
+    ]
+    return [
+        (_module_name(file, home), ast.parse(file.read_text(encoding="utf-8")))
+        for file, home in files
+    ]
 
 
 def _floor(module: str, words: int = 2) -> str:
@@ -131,8 +159,14 @@ def _upward_imports(sources: list[tuple[str, ast.AST]]) -> list[str]:
             else:
                 # a package itself, and an explorer without floors, may see all of its own
                 words = 3 if _floor(module) == _floor(target) == ENGINE else 2
-                own, seen = _floor(module, words), _floor(target, words)
-                wrong = own != seen and own in floors and seen in floors and floors[seen] >= floors[own]
+                own = _floor(module, words)
+                seen = _floor(target, words)
+                wrong = (
+                    own != seen
+                    and own in floors
+                    and seen in floors
+                    and floors[seen] >= floors[own]
+                )
             if wrong:
                 found.append(f"{module} -> {target}")
     return found
@@ -144,19 +178,31 @@ def _circle(sources: list[tuple[str, ast.AST]]) -> list[str]:
     packages = {module.rpartition(".")[0] for module in names}
     imports = {}
     for module, tree in sources:
-        seen = {target if target in names else target.rpartition(".")[0] for target in _imports(tree, nested=True)}
+        seen = {
+            target if target in names else target.rpartition(".")[0]
+            for target in _imports(tree, nested=True)
+        }
         imports[module] = (seen & names) - packages - {module}
-    while leaves := {module for module in imports if not imports[module] & set(imports)}:
-        imports = {module: seen for module, seen in imports.items() if module not in leaves}
+    while leaves := {
+        module for module in imports if not imports[module] & set(imports)
+    }:
+        imports = {
+            module: seen for module, seen in imports.items() if module not in leaves
+        }
     return sorted(imports)
 
 
 def test_no_modules_import_each_other():
-    assert _circle([each for each in _sources() if not each[0].startswith(EXPLORER)]) == []
+    assert (
+        _circle([each for each in _sources() if not each[0].startswith(EXPLORER)]) == []
+    )
 
 
 def test_a_circle_is_found():
-    first = ("planarfriction.geometry", ast.parse("def f():\n    from planarfriction.errors import FrictionError"))
+    first = (
+        "planarfriction.geometry",
+        ast.parse("def f():\n    from planarfriction.errors import FrictionError"),
+    )
     second = ("planarfriction.errors", ast.parse("from planarfriction import geometry"))
     assert _circle([first, second]) == [second[0], first[0]]
 
@@ -165,7 +211,9 @@ def test_every_module_has_a_floor():
     floors = _floors()
     for module, _ in _sources():
         if "." in module and not module.startswith(EXPLORER):
-            assert _floor(module) in floors, f"{module}: add it to the layers in pyproject.toml"
+            assert _floor(module) in floors, (
+                f"{module}: add it to the layers in pyproject.toml"
+            )
 
 
 def test_maintainers_read_about_every_layer():
@@ -196,12 +244,30 @@ def test_an_import_that_goes_up_is_found(line):
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("planarfriction._engine.bristles.new", "from planarfriction._engine.cells import cells"),
-        ("planarfriction._engine.body.new", "from planarfriction._engine.coupled.steps import ready"),
-        ("planarfriction_studies.bench.new", "from planarfriction_studies.experiments import facts"),
-        ("planarfriction_studies.measured.new", "def later():\n    import planarfriction_studies.commands.bench"),
-        ("planarfriction_studies.measured.new", "from planarfriction_explorer.page import Page"),
-        ("planarfriction_explorer.page", "from planarfriction_studies.bench import run"),
+        (
+            "planarfriction._engine.bristles.new",
+            "from planarfriction._engine.cells import cells",
+        ),
+        (
+            "planarfriction._engine.body.new",
+            "from planarfriction._engine.coupled.steps import ready",
+        ),
+        (
+            "planarfriction_studies.bench.new",
+            "from planarfriction_studies.experiments import facts",
+        ),
+        (
+            "planarfriction_studies.measured.new",
+            "def later():\n    import planarfriction_studies.commands.bench",
+        ),
+        (
+            "planarfriction_studies.measured.new",
+            "from planarfriction_explorer.page import Page",
+        ),
+        (
+            "planarfriction_explorer.page",
+            "from planarfriction_studies.bench import run",
+        ),
     ],
 )
 def test_an_import_between_packages_that_goes_up_is_found(module, line):
@@ -209,13 +275,17 @@ def test_an_import_between_packages_that_goes_up_is_found(module, line):
 
 
 def test_the_contracts_allow_no_exceptions():
-    assert not [contract["name"] for contract in _contracts() if "ignore_imports" in contract]
+    assert not [
+        contract["name"] for contract in _contracts() if "ignore_imports" in contract
+    ]
 
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_every_picture_is_a_function_of_the_plots(name):
     module, _, function = PICTURES[name].partition(":")
-    assert callable(getattr(importlib.import_module(f"planarfriction.plots.{module}"), function))
+    assert callable(
+        getattr(importlib.import_module(f"planarfriction.plots.{module}"), function)
+    )
 
 
 def test_heavy_packages_load_only_where_they_live():
@@ -224,38 +294,69 @@ def test_heavy_packages_load_only_where_they_live():
         floor = "compiled" if _is_compiled(module) else floor
         for target in _imports(tree, nested=False):
             package = target.split(".")[0]
-            adapted = any(module.startswith(name) and package == its for name, its in SIMULATORS.items())
+            adapted = any(
+                module.startswith(name) and package == its
+                for name, its in SIMULATORS.items()
+            )
             if package in HEAVY and not adapted:
-                assert floor in HOMES.get(package, ()), f"{module} imports {target} when it loads"
+                assert floor in HOMES.get(package, ()), (
+                    f"{module} imports {target} when it loads"
+                )
 
 
 def test_numba_stays_where_code_is_compiled():
     for module, tree in _sources():
         for target in _imports(tree, nested=True):
-            assert target.split(".")[0] != "numba" or _is_compiled(module), f"{module} imports {target}"
+            assert target.split(".")[0] != "numba" or _is_compiled(module), (
+                f"{module} imports {target}"
+            )
 
 
 def test_compiled_functions_stand_in_folders_that_the_digest_covers():
-    decorators = {f"planarfriction._engine.compiler.{name}" for name in ("callback", "entry", "jit", "kernel")}
-    using = [module for module, tree in _sources() if decorators & set(_imports(tree, nested=True))]
+    decorators = {
+        f"planarfriction._engine.compiler.{name}"
+        for name in ("callback", "entry", "jit", "kernel")
+    }
+    using = [
+        module
+        for module, tree in _sources()
+        if decorators & set(_imports(tree, nested=True))
+    ]
     for name in COMPILED[1:]:
-        assert [each for each in using if f"{each}.".startswith(f"planarfriction.{name}.")], name
-    assert [module for module in using if not _is_compiled(module)] == ["planarfriction.extend"]  # hands them on
+        assert [
+            each for each in using if f"{each}.".startswith(f"planarfriction.{name}.")
+        ], name
+    assert [module for module in using if not _is_compiled(module)] == [
+        "planarfriction.extend"
+    ]  # hands them on
 
 
 def test_compiled_code_depends_on_nothing_outside_the_digest():
     # a constant of another file would stay in the machine code after a change of that file
-    compiled = {"planarfriction.formulas", *(f"planarfriction.{name}" for name in COMPILED)}
+    compiled = {
+        "planarfriction.formulas",
+        *(f"planarfriction.{name}" for name in COMPILED),
+    }
     for module, tree in _sources():
-        if _is_compiled(module) and not module.endswith("compiler.machine_code"):  # nothing of it is compiled
+        if _is_compiled(module) and not module.endswith(
+            "compiler.machine_code"
+        ):  # nothing of it is compiled
             for target in _imports(tree, nested=True):
                 inside = any(f"{target}.".startswith(f"{name}.") for name in compiled)
-                assert inside or not target.startswith("planarfriction"), f"{module} imports {target}"
+                assert inside or not target.startswith("planarfriction"), (
+                    f"{module} imports {target}"
+                )
 
 
 def _loaded_after(code: str) -> set[str]:
     program = f"import sys\n{code}\nprint(*sorted(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
     return {name.split(".")[0] for name in done.stdout.split()}
 
 

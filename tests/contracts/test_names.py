@@ -16,10 +16,16 @@ from planarfriction.errors import FrictionError, InvalidValueError
 SQUARE = pf.ContactPatch.rectangle(0.02, cells=3)
 LAW = pf.LuGre()
 NAMED = {
-    "name of a contact": lambda name: pf.Contact(pf.DistributedModel(SQUARE, LAW), 1.0, name=name),
-    "name": lambda name: pf.Scene(pf.Body(1, 1), pf.Contact(pf.DistributedModel(SQUARE, LAW), 1.0), 1.0, name=name),
+    "name of a contact": lambda name: pf.Contact(
+        pf.DistributedModel(SQUARE, LAW), 1.0, name=name
+    ),
+    "name": lambda name: pf.Scene(
+        pf.Body(1, 1), pf.Contact(pf.DistributedModel(SQUARE, LAW), 1.0), 1.0, name=name
+    ),
     "name of a disc": lambda name: pf.ContactPatch.disc(0.01, 3, name=name),
-    "name of a map": lambda name: pf.ContactPatch.from_pressure(np.ones((2, 2)), 0.01, name=name),
+    "name of a map": lambda name: pf.ContactPatch.from_pressure(
+        np.ones((2, 2)), 0.01, name=name
+    ),
 }
 
 
@@ -37,7 +43,10 @@ def test_what_is_no_name_is_refused(what):
         " toe",
         "toe ",
     ):
-        with pytest.raises(InvalidValueError, match=r"name.* must be a text that is not empty, is printable, and"):
+        with pytest.raises(
+            InvalidValueError,
+            match=r"name.* must be a text that is not empty, is printable, and",
+        ):
             NAMED[what](name)
     for name in ("a\nb", "a\0", "\ud800", "\x1b[31m"):
         with pytest.raises(InvalidValueError, match="printable") as caught:
@@ -54,14 +63,17 @@ def test_dates_in_scene_files_are_no_names(tmp_path):
     for old in ('name = "fingers"', 'name = "in-hand"', 'name = "rectangle"'):
         (tmp_path / "other.toml").write_text(text.replace(old, "name = 2024-01-01"))
         with pytest.raises(
-            FrictionError, match=r"other\.toml: .*name.* must be a text .* got datetime.date\(2024, 1, 1\)"
+            FrictionError,
+            match=r"other\.toml: .*name.* must be a text .* got datetime.date\(2024, 1, 1\)",
         ):
             pf.Scene.from_file(tmp_path / "other.toml")
 
 
 def test_names_are_different():
     toe = pf.Contact(pf.DistributedModel(SQUARE, LAW), 1.0, name="toe")
-    with pytest.raises(InvalidValueError, match="contacts must have different names, got 'toe' 2 times"):
+    with pytest.raises(
+        InvalidValueError, match="contacts must have different names, got 'toe' 2 times"
+    ):
         pf.Scene(pf.Body(1, 1), [toe, toe], 1.0)
 
 
@@ -84,9 +96,13 @@ ODD_NAMES = [
 
 
 def test_results_are_reached_by_any_name(tmp_path):
-    reduced, distributed = pf.ReducedModel(SQUARE, LAW), pf.DistributedModel(SQUARE, LAW)
+    reduced = pf.ReducedModel(SQUARE, LAW)
+    distributed = pf.DistributedModel(SQUARE, LAW)
     models = [reduced if i % 2 else distributed for i in range(len(ODD_NAMES))]
-    contacts = [pf.Contact(model, 1.0, name=name) for model, name in zip(models, ODD_NAMES, strict=True)]
+    contacts = [
+        pf.Contact(model, 1.0, name=name)
+        for model, name in zip(models, ODD_NAMES, strict=True)
+    ]
     scene = pf.Scene(pf.Body(1, 1), contacts, 0.02, name="φ")
     solution = pf.simulate(scene, bristles="all")
     again = pf.Solution.load(solution.save(tmp_path / "x.nc"))
@@ -106,7 +122,22 @@ def test_millimetres_at_the_command_line_are_one_line(tmp_path, capsys, monkeypa
     with warnings.catch_warnings():
         warnings.simplefilter("always")
         before = warnings.showwarning
-        assert main(["limit-surface", "--patch", "pad.csv", "--cell-size", "2", "--csv", "surface.csv"]) == 0
+        assert (
+            main(
+                [
+                    "limit-surface",
+                    "--patch",
+                    "pad.csv",
+                    "--cell-size",
+                    "2",
+                    "--csv",
+                    "surface.csv",
+                ]
+            )
+            == 0
+        )
         assert warnings.showwarning is before
     said = [line for line in capsys.readouterr().err.splitlines() if "m wide" in line]
-    assert said == ["warning: patch 'pad' is 4 m wide, larger than 1 m: are its lengths in metres?"]
+    assert said == [
+        "warning: patch 'pad' is 4 m wide, larger than 1 m: are its lengths in metres?"
+    ]

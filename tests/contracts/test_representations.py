@@ -27,25 +27,43 @@ class Samples(NamedTuple):
 
 @pytest.fixture(scope="module")
 def solution():
-    return pf.simulate(pf.scenes.in_hand(pf.ReducedModelPublished(DISC, LAW)), t_end=0.02)
+    return pf.simulate(
+        pf.scenes.in_hand(pf.ReducedModelPublished(DISC, LAW)), t_end=0.02
+    )
 
 
 def test_records_are_one_short_and_telling_line(solution):
     model = pf.ReducedModel(DISC, LAW, cells=16)
-    assert repr(model) == "ReducedModel('disc' of 77 cells, LuGre(mu_c=1, mu_s=1.2, ...), cells=16)"
     assert (
-        repr(pf.LimitSurfaceExact(SOFT, normal_force=2.0)) == "LimitSurfaceExact('disc' of 77 cells, normal_force=2.0)"
+        repr(model)
+        == "ReducedModel('disc' of 77 cells, LuGre(mu_c=1, mu_s=1.2, ...), cells=16)"
+    )
+    assert (
+        repr(pf.LimitSurfaceExact(SOFT, normal_force=2.0))
+        == "LimitSurfaceExact('disc' of 77 cells, normal_force=2.0)"
     )
     assert repr(pf.solvers.RODAS3) == "Method(RODAS3, order 3, 4 stages)"
     grip = pf.Signal.sampled([0.0, 1.0], [1.0, 2.5])
-    contact = pf.Contact(pf.DistributedModel(DISC, pf.Dahl(0.5)), grip, count=2, name="pads")
+    contact = pf.Contact(
+        pf.DistributedModel(DISC, pf.Dahl(0.5)), grip, count=2, name="pads"
+    )
     line = "Contact('pads': 2 x DistributedModel('disc' of 77 cells, Dahl(mu_c=0.5, ...)) on the world, 1 to 2.5 N)"
     assert repr(contact) == line
     scene = pf.Scene(pf.Body(0.5, 2e-4), contact, 0.1, name="grip")
     assert repr(scene) == f"Scene('grip': 0.1 s, body of 0.5 kg, 0.0002 kg m^2; {line})"
-    assert repr(solution).startswith("Solution('in-hand', success: 3 samples to t=0.02 s, x=")
+    assert repr(solution).startswith(
+        "Solution('in-hand', success: 3 samples to t=0.02 s, x="
+    )
     assert re.search(r", \d+ steps in [\d.]+ ms\)$", repr(solution))
-    for each in (model, contact, scene, solution, solution.statistics, SOFT, pf.solvers.RODAS4):
+    for each in (
+        model,
+        contact,
+        scene,
+        solution,
+        solution.statistics,
+        SOFT,
+        pf.solvers.RODAS4,
+    ):
         assert len(repr(each)) < 250 and "\n" not in repr(each)
 
 
@@ -59,11 +77,25 @@ def test_large_parts_of_a_record_are_shown_by_their_size():
     class Pair(pf.derivatives.Rollout):
         pass
 
-    for long, shown in ((np.ones((40, 3)), "[40, 3]"), (np.ones((2, 2)), "[2, 2]"), (np.ones(20), "[20]")):
-        assert repr(Record(np.ones(2), long)).endswith(f"Record(short=[1., 1.], long=array {shown})")
-    assert repr(Pair(np.ones(3), np.ones((40, 3)))) == "Pair(state=[1., 1., 1.], wrenches=array [40, 3])"
+    for long, shown in (
+        (np.ones((40, 3)), "[40, 3]"),
+        (np.ones((2, 2)), "[2, 2]"),
+        (np.ones(20), "[20]"),
+    ):
+        assert repr(Record(np.ones(2), long)).endswith(
+            f"Record(short=[1., 1.], long=array {shown})"
+        )
     assert (
-        repr(by_parts(type("One", (tuple,), {"_asdict": lambda self: {"a": list(range(12))}}))()) == "One(a=list of 12)"
+        repr(Pair(np.ones(3), np.ones((40, 3))))
+        == "Pair(state=[1., 1., 1.], wrenches=array [40, 3])"
+    )
+    assert (
+        repr(
+            by_parts(
+                type("One", (tuple,), {"_asdict": lambda self: {"a": list(range(12))}})
+            )()
+        )
+        == "One(a=list of 12)"
     )
 
 
@@ -73,22 +105,34 @@ def pictures(page: str) -> list[Image.Image]:
 
 
 def test_notebooks_show_a_patch_with_its_pressure():
-    patch = pf.ContactPatch.from_pressure(np.array([[9.0, 0.0], [1.0, 1.0]]), 1e-3, name="<b>")
+    patch = pf.ContactPatch.from_pressure(
+        np.array([[9.0, 0.0], [1.0, 1.0]]), 1e-3, name="<b>"
+    )
     shown = patch._repr_html_()
     (picture,) = pictures(shown)
     assert "&lt;b&gt;" in shown and "<b><b>" not in shown
     assert "2 x 2 mm" in shown and "(-0.41, 0.32) mm" in shown
     pixels = np.asarray(picture.convert("RGB"), dtype=float)
     height, width, _ = pixels.shape
-    corner = {(r, c): pixels[int(height * r), int(width * c)] for r in (0.3, 0.7) for c in (0.3, 0.7)}
-    assert corner[0.3, 0.3].sum() > corner[0.7, 0.7].sum() + 100  # row 0 is the top, and the most loaded is brightest
+    corner = {
+        (r, c): pixels[int(height * r), int(width * c)]
+        for r in (0.3, 0.7)
+        for c in (0.3, 0.7)
+    }
+    assert (
+        corner[0.3, 0.3].sum() > corner[0.7, 0.7].sum() + 100
+    )  # row 0 is the top, and the most loaded is brightest
     assert np.abs(corner[0.7, 0.3] - corner[0.7, 0.7]).max() < 2.0
     assert corner[0.3, 0.7].min() > 250  # no load, no colour
 
 
 def test_notebooks_show_every_kind_of_patch_surface_and_solution(solution):
     assert "shown at" in SOFT._repr_html_()
-    for patch in (pf.ContactPatch.points([(0.0, 0.0)]), pf.ContactPatch.line(0.02, 5), SOFT):
+    for patch in (
+        pf.ContactPatch.points([(0.0, 0.0)]),
+        pf.ContactPatch.line(0.02, 5),
+        SOFT,
+    ):
         assert len(pictures(patch._repr_html_())) == 1
     assert "20 x 0 mm" not in pf.ContactPatch.line(0.02, 5)._repr_html_()
     assert "0 x 20 mm" in pf.ContactPatch.line(0.02, 5)._repr_html_()
@@ -96,24 +140,38 @@ def test_notebooks_show_every_kind_of_patch_surface_and_solution(solution):
     without_load = pf.LimitSurfaceCells(SOFT)._repr_html_()
     assert not pictures(without_load) and "give a normal_force" in without_load
     shown = solution._repr_html_()
-    assert len(pictures(shown)) == 1 and "in-hand" in shown and "reached the end" in shown
+    assert (
+        len(pictures(shown)) == 1 and "in-hand" in shown and "reached the end" in shown
+    )
     assert not pictures(dataclasses.replace(solution, scene=None)._repr_html_())
 
 
-@pytest.mark.parametrize("law", [pf.LuGre(mu_c=0.4, v_s=2e-3), pf.Dahl(0.4), pf.CoulombStribeck(0.4)])
+@pytest.mark.parametrize(
+    "law", [pf.LuGre(mu_c=0.4, v_s=2e-3), pf.Dahl(0.4), pf.CoulombStribeck(0.4)]
+)
 def test_notebooks_show_laws_models_and_scenes(law):
     shown = law._repr_html_()
-    assert type(law).__name__ in shown and ">0.4<" in shown and len(pictures(shown)) == 1
+    assert (
+        type(law).__name__ in shown and ">0.4<" in shown and len(pictures(shown)) == 1
+    )
     assert (">0.002 m/s<" in shown) == (law == pf.LuGre(mu_c=0.4, v_s=2e-3))
     for patch in (DISC, SOFT):
         model = pf.ReducedModelPublished(patch, law)
-        assert repr(patch.name) in html.unescape(model._repr_html_()) and len(pictures(model._repr_html_())) == 1
+        assert (
+            repr(patch.name) in html.unescape(model._repr_html_())
+            and len(pictures(model._repr_html_())) == 1
+        )
     scene = pf.scenes.in_hand(pf.ReducedModelPublished(DISC, pf.LuGre()))
     shown = html.unescape(scene._repr_html_())
-    assert f"{scene.body.mass:g} kg" in shown and f"contact {scene.contacts[0].name!r}" in shown
+    assert (
+        f"{scene.body.mass:g} kg" in shown
+        and f"contact {scene.contacts[0].name!r}" in shown
+    )
 
 
 def test_dir_lists_what_is_public_and_nothing_else():
     listed = dir(pf)
-    assert set(listed) == {*pf.__all__, "__version__"} and len(listed) == len(set(listed))
+    assert set(listed) == {*pf.__all__, "__version__"} and len(listed) == len(
+        set(listed)
+    )
     assert all(hasattr(pf, name) for name in listed)

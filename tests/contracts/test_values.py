@@ -42,15 +42,32 @@ def a_solution() -> pf.Solution:
 
 def an_identification() -> identify.Identification:
     nothing = np.full(1, np.nan)
-    history = {"name": "log", "time": TIMES, "measured": np.ones((30, 3)), "predicted": np.zeros((30, 3))}
+    history = {
+        "name": "log",
+        "time": TIMES,
+        "measured": np.ones((30, 3)),
+        "predicted": np.zeros((30, 3)),
+    }
     model = pf.ReducedModel(SQUARE, LAW)
     return identify.Identification(
-        ("mu_c",), np.ones(1), nothing, np.eye(1), (), nothing, (("fx", "N"),), (history,), LAW, model, (1, 2)
+        ("mu_c",),
+        np.ones(1),
+        nothing,
+        np.eye(1),
+        (),
+        nothing,
+        (("fx", "N"),),
+        (history,),
+        LAW,
+        model,
+        (1, 2),
     )
 
 
 MODELS = {
-    f"{kind.__name__} of a {name}": lambda kind=kind, patch=patch: used(kind(patch, LAW))
+    f"{kind.__name__} of a {name}": lambda kind=kind, patch=patch: used(
+        kind(patch, LAW)
+    )
     for kind in (pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished)
     for name, patch in (("square", SQUARE), ("finger", FINGER))
 }
@@ -73,8 +90,12 @@ MAKERS = {
     "polygon": lambda: pf.ContactPatch.polygon([(0, 0), (0.1, 0), (0, 0.1)], 5),
     "outline": lambda: pf.ContactPatch.polygon([(0, 0), (0.1, 0), (0, 0.1)], 5).outline,
     "points": lambda: pf.ContactPatch.points([(0.0, 0.0), (0.1, 0.0)], [1.0, 2.0]),
-    "grain": lambda: SQUARE.with_friction_metric(pf.friction_metric(0.3, 1.0, 2.0), (0.1, 0.2)),
-    "maps": lambda: pf.ContactPatch.from_pressure([np.ones((2, 2)), np.eye(2)], 0.01, loads=[1.0, 2.0]),
+    "grain": lambda: SQUARE.with_friction_metric(
+        pf.friction_metric(0.3, 1.0, 2.0), (0.1, 0.2)
+    ),
+    "maps": lambda: pf.ContactPatch.from_pressure(
+        [np.ones((2, 2)), np.eye(2)], 0.01, loads=[1.0, 2.0]
+    ),
     "grid": lambda: pf.ContactPatch.disc(0.01, 6).grid,
     "uniform": pf.Uniform,
     "gradient": lambda: pf.LinearGradient((1.0, 2.0)),
@@ -95,14 +116,22 @@ MAKERS = {
     "statistics": lambda: solvers.Statistics(steps=3),
     "RODAS4": lambda: copy.deepcopy(solvers.RODAS4),
     "RODAS3": lambda: copy.deepcopy(solvers.RODAS3),
-    "comparison": lambda: SURFACES["LimitSurfaceCells"]().compare(SURFACES["LimitSurfaceEllipsoid"]()),
-    "jacobians": lambda: MODELS["ReducedModelPublished of a square"]().jacobians(np.zeros(3), (0.1, 0.0, 0.0), 1.0),
-    "step jacobians": lambda: MODELS["ReducedModelPublished of a square"]().step_jacobians(
-        np.zeros(3), (1, 0, 0), 1.0, 1e-3
+    "comparison": lambda: SURFACES["LimitSurfaceCells"]().compare(
+        SURFACES["LimitSurfaceEllipsoid"]()
     ),
-    "published shape": lambda: MODELS["ReducedModelPublished of a finger"]().shape_at(1.0),
+    "jacobians": lambda: MODELS["ReducedModelPublished of a square"]().jacobians(
+        np.zeros(3), (0.1, 0.0, 0.0), 1.0
+    ),
+    "step jacobians": lambda: MODELS[
+        "ReducedModelPublished of a square"
+    ]().step_jacobians(np.zeros(3), (1, 0, 0), 1.0, 1e-3),
+    "published shape": lambda: MODELS["ReducedModelPublished of a finger"]().shape_at(
+        1.0
+    ),
     "surface numbers": lambda: SURFACES["LimitSurfaceTable"]().numbers,
-    "rollout": lambda: pf.rollout(MODELS["DistributedModel of a square"](), None, np.ones((5, 3)), 1.0, 1e-3),
+    "rollout": lambda: pf.rollout(
+        MODELS["DistributedModel of a square"](), None, np.ones((5, 3)), 1.0, 1e-3
+    ),
     "log": lambda: identify.Log(TIMES, np.ones((30, 3)), np.ones((30, 3)), 1.0),
     "slide": lambda: identify.Slide(TIMES, np.ones((30, 3))),
     "mass properties": lambda: identify.MassProperties(1.0, 1.0),
@@ -129,13 +158,20 @@ def test_objects_of_equal_content_are_equal_however_they_came(name):
 def test_everything_compares_with_everything():
     made = {name: make() for name, make in MAKERS.items()}
     for name, one in made.items():
-        for other_name, other in [*made.items(), ("number", 1.0), ("none", None), ("text", "x")]:
+        for other_name, other in [
+            *made.items(),
+            ("number", 1.0),
+            ("none", None),
+            ("text", "x"),
+        ]:
             assert (one == other) is (name == other_name), (name, other_name)
 
 
 def test_what_differs_is_not_equal():
     assert pf.ContactPatch.disc(0.01, 5) != pf.ContactPatch.disc(0.01, 5, name="other")
-    assert pf.ContactPatch.points([(0, 0), (0.1, 0)]) != pf.ContactPatch.points([(0, 0), (0.1, 0)], [1.0, 2.0])
+    assert pf.ContactPatch.points([(0, 0), (0.1, 0)]) != pf.ContactPatch.points(
+        [(0, 0), (0.1, 0)], [1.0, 2.0]
+    )
     assert pf.Body(1, 1, outline=[[0, 0], [0, 1], [1, 1]]) != pf.Body(1, 1)
     assert pf.ReducedModel(SQUARE, LAW) != pf.ReducedModel(SQUARE, LAW, cells=8)
     assert pf.ReducedModelPublished(SQUARE, LAW) != pf.ReducedModelPublished(
@@ -159,7 +195,9 @@ def test_solutions(tmp_path):
         assert (solution == other) is False
     model = pickle.loads(pickle.dumps(solution)).scene.contacts[0].model
     state, wrench = used(model).step(model.rest(), (0.1, 0.0, 1.0), 1.3, 1e-3)
-    here = solution.scene.contacts[0].model.step(model.rest(), (0.1, 0.0, 1.0), 1.3, 1e-3)
+    here = solution.scene.contacts[0].model.step(
+        model.rest(), (0.1, 0.0, 1.0), 1.3, 1e-3
+    )
     assert state.tolist() == here[0].tolist() and wrench.tolist() == here[1].tolist()
 
 
@@ -180,16 +218,26 @@ RAISED = {
 
 
 def test_no_class_of_errors_is_left_out():
-    classes = {kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, BaseException)}
+    classes = {
+        kind
+        for kind in vars(errors).values()
+        if isinstance(kind, type) and issubclass(kind, BaseException)
+    }
     assert {type(error) for error in RAISED.values()} == classes
 
 
 @pytest.mark.parametrize("name", RAISED)
-@pytest.mark.parametrize("way", [copy.copy, copy.deepcopy, lambda error: pickle.loads(pickle.dumps(error))])
+@pytest.mark.parametrize(
+    "way", [copy.copy, copy.deepcopy, lambda error: pickle.loads(pickle.dumps(error))]
+)
 def test_errors_keep_message_and_attributes(name, way):
     error = RAISED[name]
     again = way(error)
-    assert type(again) is type(error) and str(again) == str(error) and again.args == error.args
+    assert (
+        type(again) is type(error)
+        and str(again) == str(error)
+        and again.args == error.args
+    )
     assert vars(again) == vars(error)
 
 
@@ -200,7 +248,9 @@ def test_errors_keep_what_was_computed():
 
 
 def test_an_attribute_that_cannot_be_pickled_stays_behind():
-    error = pickle.loads(pickle.dumps(InvalidValueError("radius", "be a number", lambda: 1.0)))
+    error = pickle.loads(
+        pickle.dumps(InvalidValueError("radius", "be a number", lambda: 1.0))
+    )
     assert error.value is None and error.name == "radius" and "function" in str(error)
 
 
@@ -209,12 +259,20 @@ def _radius(radius: float) -> float:
 
 
 def test_a_bad_parameter_in_a_worker_arrives():
-    spawned = multiprocessing.get_context("spawn")  # forks copy the threads of other tests
+    spawned = multiprocessing.get_context(
+        "spawn"
+    )  # forks copy the threads of other tests
     with spawned.Pool(1) as pool:
         result = pool.map_async(_radius, [0.01, -1.0, 0.02])
-        with pytest.raises(InvalidValueError, match=r"radius must be > 0, got -1\.0") as caught:
+        with pytest.raises(
+            InvalidValueError, match=r"radius must be > 0, got -1\.0"
+        ) as caught:
             result.get(timeout=120.0)
-        assert (caught.value.name, caught.value.rule, caught.value.value) == ("radius", "be > 0", -1.0)
+        assert (caught.value.name, caught.value.rule, caught.value.value) == (
+            "radius",
+            "be > 0",
+            -1.0,
+        )
         assert pool.apply_async(_radius, [0.01]).get(timeout=60.0) == _radius(0.01)
     with concurrent.futures.ProcessPoolExecutor(1, mp_context=spawned) as executor:
         futures = [executor.submit(_radius, radius) for radius in ("wide", 0.01)]
@@ -236,4 +294,7 @@ SHOWN = {
 def test_values_are_shown_on_one_line_of_eighty_characters(name):
     value, text = SHOWN[name]
     assert errors.shown(value) == text
-    assert str(InvalidValueError("x", "be a number", value)) == f"x must be a number, got {text}"
+    assert (
+        str(InvalidValueError("x", "be a number", value))
+        == f"x must be a number, got {text}"
+    )

@@ -32,14 +32,28 @@ ROOMS = {
         "identify",
         "jax",
     ),
-    *("models", "online", "planning", "plots", "records", "scenes", "solvers", "sweeps", "tensors", "torch", "warp"),
+    *(
+        "models",
+        "online",
+        "planning",
+        "plots",
+        "records",
+        "scenes",
+        "solvers",
+        "sweeps",
+        "tensors",
+        "torch",
+        "warp",
+    ),
 }
 """Layers that a call goes through; what describes (patches, surfaces, laws) may be asked from everywhere."""
 
 READERS = {"trace.py", "twins.py", "rewriting.py", "elements.py"}
 """Files that run the source of kernels over symbols or arrays."""
 
-LAW = pf.LuGre(mu_c=0.5, mu_s=0.6, v_s=2e-3, sigma_0=2e4, sigma_1=30.0, elasto_plastic=0.9)
+LAW = pf.LuGre(
+    mu_c=0.5, mu_s=0.6, v_s=2e-3, sigma_0=2e4, sigma_1=30.0, elasto_plastic=0.9
+)
 MODEL = pf.DistributedModel(pf.ContactPatch.disc(0.01, 7), LAW)
 TWISTS = 1e-3 * np.sin(np.arange(60.0).reshape(20, 3))
 
@@ -49,7 +63,11 @@ def step(folder: Path) -> None:
 
 
 def scene(folder: Path) -> None:
-    pf.simulate(pf.Scene(pf.Body(0.2, 1e-4, velocity=(0.1, 0.0, 0.0)), pf.Contact(MODEL, 2.0), 0.02))
+    pf.simulate(
+        pf.Scene(
+            pf.Body(0.2, 1e-4, velocity=(0.1, 0.0, 0.0)), pf.Contact(MODEL, 2.0), 0.02
+        )
+    )
 
 
 def gradient(folder: Path) -> None:
@@ -58,23 +76,38 @@ def gradient(folder: Path) -> None:
 
 def log(folder: Path) -> None:
     time = 1e-3 * np.arange(60)
-    twists = 0.02 * np.sin(np.stack([30.0 * time, 50.0 * time, 3.0 * time], -1)) * [1.0, 1.0, 100.0]
+    twists = (
+        0.02
+        * np.sin(np.stack([30.0 * time, 50.0 * time, 3.0 * time], -1))
+        * [1.0, 1.0, 100.0]
+    )
     _, wrenches = derivatives.rollout(MODEL, None, twists[1:], 2.0, 1e-3)
-    measured = identify.Log(time, twists, np.concatenate([np.zeros((1, 3)), wrenches]), 2.0)
+    measured = identify.Log(
+        time, twists, np.concatenate([np.zeros((1, 3)), wrenches]), 2.0
+    )
     options = identify.FitOptions(elasto_plastic=0.9, starts=1, nuisance=())
     identify.identify_lugre(
-        measured, MODEL.patch, parameters=["mu_c"], model="reduced-published", start=LAW, options=options
+        measured,
+        MODEL.patch,
+        parameters=["mu_c"],
+        model="reduced-published",
+        start=LAW,
+        options=options,
     )
 
 
 @functools.cache
 def torch_model() -> Any:
     pytest.importorskip("torch")
-    return importlib.import_module("planarfriction.torch").DistributedModel(MODEL.patch, LAW)
+    return importlib.import_module("planarfriction.torch").DistributedModel(
+        MODEL.patch, LAW
+    )
 
 
 def torch_rollout(folder: Path) -> None:
-    model, torch, ours = torch_model(), sys.modules["torch"], sys.modules["planarfriction.torch"]
+    model = torch_model()
+    torch = sys.modules["torch"]
+    ours = sys.modules["planarfriction.torch"]
     twists = torch.tensor(TWISTS, requires_grad=True)
     _, wrenches = ours.rollout(model, model.rest(), twists, torch.tensor(2.0), 1e-3)
     wrenches.sum().backward()
@@ -117,9 +150,14 @@ def _rooms(frame: FrameType | None) -> list[str]:
     found: list[str] = []
     while frame is not None:
         file = Path(frame.f_code.co_filename)
-        inside = file.relative_to(HOME) if file.is_relative_to(HOME) else Path("elsewhere")
+        inside = (
+            file.relative_to(HOME) if file.is_relative_to(HOME) else Path("elsewhere")
+        )
         room = inside.parts[0].removesuffix(".py")
-        if inside.parts[:2] in (("_engine", "records"), ("_engine", "compiler")):  # the latter is no room of a call
+        if inside.parts[:2] in (
+            ("_engine", "records"),
+            ("_engine", "compiler"),
+        ):  # the latter is no room of a call
             room = inside.parts[1]
         if inside.name in READERS:
             found.clear()
@@ -131,9 +169,14 @@ def _rooms(frame: FrameType | None) -> list[str]:
 
 def ways() -> dict[str, list[str]]:
     """Return the rooms of each call from the figure."""
-    figure = re.search(r"```text\n(step .*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+    figure = re.search(
+        r"```text\n(step .*?)```", PAGE.read_text(encoding="utf-8"), re.S
+    )
     assert figure is not None
-    lines = (re.split(r"\s{2,}", line.strip(), maxsplit=1) for line in figure[1].strip().splitlines())
+    lines = (
+        re.split(r"\s{2,}", line.strip(), maxsplit=1)
+        for line in figure[1].strip().splitlines()
+    )
     return {name: rooms.split(" > ") for name, rooms in lines}
 
 

@@ -33,7 +33,8 @@ np.savetxt("log.csv", rows, delimiter=",", header="t,vx,vy,omega,fx,fy,tau,norma
 
 @pytest.mark.slow
 def test_wheel_in_an_empty_environment(tmp_path):
-    source, elsewhere = tmp_path / "source", tmp_path / "elsewhere"
+    source = tmp_path / "source"
+    elsewhere = tmp_path / "elsewhere"
     for folder in (".", "studies"):
         ignored = shutil.ignore_patterns("__pycache__", "*.egg-info")
         shutil.copytree(ROOT / folder / "src", source / folder / "src", ignore=ignored)
@@ -41,16 +42,35 @@ def test_wheel_in_an_empty_environment(tmp_path):
             shutil.copy(ROOT / folder / name, source / folder)
     shutil.copy(ROOT / "build_backend.py", source)
     elsewhere.mkdir()
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA"))}
+    environment = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("PYTHON", "NUMBA"))
+    }
 
     def run(*command) -> str:
         done = subprocess.run(
-            [str(word) for word in command], cwd=elsewhere, env=environment, capture_output=True, text=True, check=False
+            [str(word) for word in command],
+            cwd=elsewhere,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr
         return done.stdout + done.stderr
 
-    run(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", tmp_path, source, source / "studies")
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--no-deps",
+        "--wheel-dir",
+        tmp_path,
+        source,
+        source / "studies",
+    )
     run(sys.executable, "-m", "venv", tmp_path / "empty")
     python = tmp_path / "empty" / "bin" / "python"
     wheels = {name: next(tmp_path.glob(f"{name}-*.whl")) for name in DISTRIBUTIONS}
@@ -61,7 +81,9 @@ def test_wheel_in_an_empty_environment(tmp_path):
     listed = run(command, "--help")
     assert " ".join(listed.split()).endswith(ELSEWHERE)
     assert run(python, "-m", "planarfriction", "--help") == listed
-    for name in re.findall(r"^  (\w[\w-]*)", listed.partition("Commands:")[2], re.MULTILINE):
+    for name in re.findall(
+        r"^  (\w[\w-]*)", listed.partition("Commands:")[2], re.MULTILINE
+    ):
         run(command, name, "--help")
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"^```python\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
@@ -69,11 +91,29 @@ def test_wheel_in_an_empty_environment(tmp_path):
     run(python, "-c", LOG)
     assert "times faster than real time" in run(command, "run", "in-hand")
     run(python, "-m", "pip", "install", "--no-deps", wheels["planarfriction_studies"])
-    assert "0 out of tolerance" in run(command, "reproduce", "--only", "drift", "--quick")
-    assert "exact surface" in run(command, "measured", "--list") and "in_hand" in run(command, "bench", "--help")
-    asked = subprocess.run([command, "explore"], env=environment, capture_output=True, text=True, check=False)
-    assert asked.returncode == 2 and "run pip install 'planarfriction[explore]'" in asked.stderr
-    start = ["--start=mu_s=0.65", "--start=v_s=2e-3", "--start=sigma_0=2e4", "--start=sigma_1=30"]
+    assert "0 out of tolerance" in run(
+        command, "reproduce", "--only", "drift", "--quick"
+    )
+    assert "exact surface" in run(command, "measured", "--list") and "in_hand" in run(
+        command, "bench", "--help"
+    )
+    asked = subprocess.run(
+        [command, "explore"],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (
+        asked.returncode == 2
+        and "run pip install 'planarfriction[explore]'" in asked.stderr
+    )
+    start = [
+        "--start=mu_s=0.65",
+        "--start=v_s=2e-3",
+        "--start=sigma_0=2e4",
+        "--start=sigma_1=30",
+    ]
     found = run(
         command,
         "identify",

@@ -12,12 +12,15 @@ from tests.support.repository import ROOT
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 MAKEFILE = ROOT / "Makefile"
 
-pytestmark = pytest.mark.skipif(not WORKFLOWS or not MAKEFILE.exists(), reason="no workflows beside these tests")
+pytestmark = pytest.mark.skipif(
+    not WORKFLOWS or not MAKEFILE.exists(), reason="no workflows beside these tests"
+)
 
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.stem)
 def test_each_step_calls_a_target(path):
-    text, made = path.read_text(encoding="utf-8"), MAKEFILE.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    made = MAKEFILE.read_text(encoding="utf-8")
     steps = re.findall(r"^ *(?:- )?run: *(.*)$", text, re.MULTILINE)
     steps = [step for step in steps if step]  # `defaults` has a table of that name
     assert steps
@@ -28,7 +31,9 @@ def test_each_step_calls_a_target(path):
 
 
 def test_compared_benchmarks_exist():
-    (names,) = re.findall(r"^COMPARED \?= (.*)$", MAKEFILE.read_text(encoding="utf-8"), re.MULTILINE)
+    (names,) = re.findall(
+        r"^COMPARED \?= (.*)$", MAKEFILE.read_text(encoding="utf-8"), re.MULTILINE
+    )
     assert set(names.split()) <= set(BENCHMARKS)
 
 

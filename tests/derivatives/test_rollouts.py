@@ -56,11 +56,18 @@ def drive(model, seed: int = 0, steps: int = T):
 
 
 def test_parameters_take_the_place_of_the_models_own():
-    model, other = model_of("ellipsoid"), pf.LuGre(0.4, 0.9, 2e-3, 3e5, 50.0, 0.7, 1.3, pf.ElastoPlastic(0.5))
-    changed = pf.ReducedModelPublished(PATCH, other, surface=pf.LimitSurfaceEllipsoid(PATCH))
+    model = model_of("ellipsoid")
+    other = pf.LuGre(0.4, 0.9, 2e-3, 3e5, 50.0, 0.7, 1.3, pf.ElastoPlastic(0.5))
+    changed = pf.ReducedModelPublished(
+        PATCH, other, surface=pf.LimitSurfaceEllipsoid(PATCH)
+    )
     state, twists, loads = drive(model)
-    got = derivatives.rollout(model, state, twists, loads, DT, parameters=derivatives.parameters_of(changed))
-    assert np.array_equal(got.wrenches, derivatives.rollout(changed, state, twists, loads, DT).wrenches)
+    got = derivatives.rollout(
+        model, state, twists, loads, DT, parameters=derivatives.parameters_of(changed)
+    )
+    assert np.array_equal(
+        got.wrenches, derivatives.rollout(changed, state, twists, loads, DT).wrenches
+    )
 
 
 # ---------------------------------------------------------------------- closed forms
@@ -70,13 +77,17 @@ def test_parameters_take_the_place_of_the_models_own():
 def test_a_contact_at_rest_is_a_spring_and_two_dampers(law):
     """From rest at zero twist `W = -(sigma_0 u dt + sigma_1 u + sigma_2 U V) f_N` to first order."""
     model = model_of("ellipsoid", law)
-    j, numbers = model.step_jacobians(model.rest(), np.zeros(3), LOAD, DT), model.law
-    (x, y), r = model.shape_at(LOAD).centre_of_pressure, radius(model)
+    j = model.step_jacobians(model.rest(), np.zeros(3), LOAD, DT)
+    numbers = model.law
+    (x, y) = model.shape_at(LOAD).centre_of_pressure
+    r = radius(model)
     to_centre = np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
     bristle = (numbers.sigma_0 * DT + numbers.sigma_1) * np.diag([1.0, 1.0, r * r])
     viscous = numbers.sigma_2 * np.diag([1.0, 1.0, model.shape_at(LOAD).second_moment])
     # Rounding of ten operations.
-    assert j.wrench_twist == pytest.approx(-LOAD * to_centre.T @ (bristle + viscous) @ to_centre, rel=1e-13, abs=1e-15)
+    assert j.wrench_twist == pytest.approx(
+        -LOAD * to_centre.T @ (bristle + viscous) @ to_centre, rel=1e-13, abs=1e-15
+    )
     assert j.state_state == pytest.approx(np.eye(3), rel=1e-13)
 
 
@@ -84,20 +95,27 @@ def test_a_contact_at_rest_is_a_spring_and_two_dampers(law):
 @every_law
 def test_a_long_step_ends_in_the_steady_state_of_its_parameters(kind, law):
     """`W = -(g(v) S h + sigma_2 U V) f_N`: neither stiffness nor damping nor the start matter."""
-    model, twist = model_of(kind, law), np.array([2e-3, -1e-3, 0.3])
-    _, wrenches, slopes = derivatives.rollout_jacobian(model, model.rest(), twist[None], LOAD, 1e6)
+    model = model_of(kind, law)
+    twist = np.array([2e-3, -1e-3, 0.3])
+    _, wrenches, slopes = derivatives.rollout_jacobian(
+        model, model.rest(), twist[None], LOAD, 1e6
+    )
     by = dict(zip(PARAMETERS, slopes[0].T, strict=True))
-    numbers, shape = model.law, model.shape_at(LOAD)
+    numbers = model.law
+    shape = model.shape_at(LOAD)
     unit = LOAD * model.surface.wrench(twist)
     v = np.hypot(
-        np.hypot(*(twist[:2] + twist[2] * shape.centre_of_pressure[::-1] * (-1, 1))), shape.contact_radius * 0.3
+        np.hypot(*(twist[:2] + twist[2] * shape.centre_of_pressure[::-1] * (-1, 1))),
+        shape.contact_radius * 0.3,
     )
     share = np.exp(-((v / numbers.v_s) ** numbers.gamma))
     # What the bristle remembers: 1e-9 of the step. Rounding of g over h.
     assert by["mu_c"] == pytest.approx((1.0 - share) * unit, rel=1e-8)
     assert by["mu_s"] == pytest.approx(share * unit, rel=1e-8, abs=1e-12)
     for name in ("sigma_0", "sigma_1", "breakaway_ratio"):
-        assert by[name] * max(getattr(numbers, name, 1.0), 1.0) == pytest.approx(np.zeros(3), abs=1e-8), name
+        assert by[name] * max(getattr(numbers, name, 1.0), 1.0) == pytest.approx(
+            np.zeros(3), abs=1e-8
+        ), name
     assert by["sigma_2"][:2] == pytest.approx(
         (wrenches[0] - unit * _friction(numbers, v))[:2] / numbers.sigma_2, rel=1e-6
     )
@@ -118,10 +136,24 @@ def test_gradients_are_finite_at_every_kink(kind, law):
     model = model_of(kind, law)
     r = radius(model)
     z = np.array([4e-7, -3e-7, 2e-7 * r])
-    rotation, (x, y) = 0.5, model.shape_at(LOAD).centre_of_pressure
-    spin = np.array([rotation * y, -rotation * x, rotation])  # about the centre of pressure: the axis of the tables
-    twists = [np.zeros(3), spin, -spin, 1e-300 * spin, 1e-160 * spin, [1e-3, 0, 0], [0, 1e-3, 0], [1e-3, 1e-3, 0]]
-    back = -z / DT / np.array([1.0, 1.0, r * r])  # takes the ellipsoid's bristle exactly to zero
+    rotation = 0.5
+    (x, y) = model.shape_at(LOAD).centre_of_pressure
+    spin = np.array(
+        [rotation * y, -rotation * x, rotation]
+    )  # about the centre of pressure: the axis of the tables
+    twists = [
+        np.zeros(3),
+        spin,
+        -spin,
+        1e-300 * spin,
+        1e-160 * spin,
+        [1e-3, 0, 0],
+        [0, 1e-3, 0],
+        [1e-3, 1e-3, 0],
+    ]
+    back = (
+        -z / DT / np.array([1.0, 1.0, r * r])
+    )  # takes the ellipsoid's bristle exactly to zero
     twists.append([back[0] + y * back[2], back[1] - x * back[2], back[2]])
     states = [np.zeros(3), z, 1e-300 * z, 1e-160 * z, -z, 1e4 * z]
     for state in states:
@@ -129,7 +161,13 @@ def test_gradients_are_finite_at_every_kink(kind, law):
             for load in (0.0, LOAD):
                 for dt in (0.0, 1e-12, DT, 1e9):
                     gradient = derivatives.rollout_vjp(
-                        model, state, np.tile(twist, (2, 1)), load, dt, np.ones((2, 3)), np.ones(3)
+                        model,
+                        state,
+                        np.tile(twist, (2, 1)),
+                        load,
+                        dt,
+                        np.ones((2, 3)),
+                        np.ones(3),
                     )
                     for name, value in gradient._asdict().items():
                         assert np.isfinite(value).all(), (name, state, twist, load, dt)
@@ -141,14 +179,22 @@ def test_without_load_nothing_passes_but_the_load(kind):
     state, twists, loads = drive(model)
     loads[6] = 0.0
     bar = np.ones((T, 3))
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar * (np.arange(T) >= 6)[:, None], np.ones(3))
+    gradient = derivatives.rollout_vjp(
+        model, state, twists, loads, DT, bar * (np.arange(T) >= 6)[:, None], np.ones(3)
+    )
     _, wrenches = derivatives.rollout(model, state, twists, loads, DT)
     assert str(wrenches[6]) == "[0. 0. 0.]"  # not even a negative zero
-    assert not gradient.state.any() and not gradient.twist[:7].any() and not gradient.normal_force[:6].any()
+    assert (
+        not gradient.state.any()
+        and not gradient.twist[:7].any()
+        and not gradient.normal_force[:6].any()
+    )
     assert gradient.twist[7:].all()
     # The slope to the load: the wrench per newton that a small load would have.
     before = derivatives.rollout_states(model, state, twists, loads, DT).states[6]
-    assert gradient.normal_force[6] == pytest.approx(model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10)
+    assert gradient.normal_force[6] == pytest.approx(
+        model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10
+    )
 
 
 # ---------------------------------------------------------------------- against differences
@@ -173,23 +219,43 @@ def test_slopes_of_a_step_lie_between_those_of_its_sides(kind, law):
     @given(**sliding_or_stuck)
     @settings(deadline=None, max_examples=30)
     def check(log_dt, seed, log_size, log_speed, turn):
-        random, dt = np.random.default_rng(seed), 10.0**log_dt
+        random = np.random.default_rng(seed)
+        dt = 10.0**log_dt
         direction = random.normal(size=3)
         state = direction * 10.0**log_size * scale
-        twist = (turn * direction + 0.3 * random.normal(size=3)) * 10.0**log_speed / scale
-        move, turned = random.normal(size=3), random.normal(size=3)
+        twist = (
+            (turn * direction + 0.3 * random.normal(size=3)) * 10.0**log_speed / scale
+        )
+        move = random.normal(size=3)
+        turned = random.normal(size=3)
         moves = move * 10.0**log_size * scale, turned * 10.0**log_speed / scale, 1.0
         j = model.step_jacobians(state, twist, LOAD, dt)
-        got = j.wrench_state @ moves[0] + j.wrench_twist @ moves[1] + j.wrench_load * moves[2]
+        got = (
+            j.wrench_state @ moves[0]
+            + j.wrench_twist @ moves[1]
+            + j.wrench_load * moves[2]
+        )
         got_state = j.state_state @ moves[0] + j.state_twist @ moves[1]
 
         def at(length):
-            return model.step(state + length * moves[0], twist + length * moves[1], LOAD + length * moves[2], dt)
+            return model.step(
+                state + length * moves[0],
+                twist + length * moves[1],
+                LOAD + length * moves[2],
+                dt,
+            )
 
-        h, (here_state, here) = 1e-6, at(0.0)
-        (high_state, high), (low_state, low) = at(h), at(-h)
+        h = 1e-6
+        (here_state, here) = at(0.0)
+        (high_state, high) = at(h)
+        (low_state, low) = at(-h)
         for slope, right, left, value in (
-            (got / scale, (high - here) / h / scale, (here - low) / h / scale, here / scale),
+            (
+                got / scale,
+                (high - here) / h / scale,
+                (here - low) / h / scale,
+                here / scale,
+            ),
             (
                 got_state / scale,
                 (high_state - here_state) / h / scale,
@@ -198,8 +264,12 @@ def test_slopes_of_a_step_lie_between_those_of_its_sides(kind, law):
             ),
         ):
             # Rounding of the values over the step, and half the difference of the sides (curvature, or a kink).
-            size = np.abs(value).max() + np.abs(here_state / scale).max() * (1.0 if value is not here else 0.0)
-            allowed = 2e-9 * size + 1e-5 * np.abs(slope).max() + 0.51 * np.abs(right - left)
+            size = np.abs(value).max() + np.abs(here_state / scale).max() * (
+                1.0 if value is not here else 0.0
+            )
+            allowed = (
+                2e-9 * size + 1e-5 * np.abs(slope).max() + 0.51 * np.abs(right - left)
+            )
             assert (np.abs(slope - 0.5 * (right + left)) <= allowed).all()
 
     check()
@@ -211,55 +281,102 @@ def test_jacobians_of_a_step_are_those_of_differences(kind, law):
     model = model_of(kind, law)
     for seed, size in enumerate((2e-7, 6e-7, 1.1e-6, 3e-6)):
         random = np.random.default_rng(seed)
-        units = np.ones(model.state_shape) if kind == "distributed" else np.array([1.0, 1.0, radius(model)])
+        units = (
+            np.ones(model.state_shape)
+            if kind == "distributed"
+            else np.array([1.0, 1.0, radius(model)])
+        )
         state = random.normal(size=model.state_shape) * size * units
         twist = random.normal(size=3) * (5e-3, 5e-3, 1.0)
-        moves = random.normal(size=model.state_shape) * size * units, random.normal(size=3) * (5e-3, 5e-3, 1.0), 0.7
+        moves = (
+            random.normal(size=model.state_shape) * size * units,
+            random.normal(size=3) * (5e-3, 5e-3, 1.0),
+            0.7,
+        )
         j = model.step_jacobians(state, twist, LOAD, DT)
         if kind == "distributed":
-            got = np.einsum("abn,bn->an", j.state_state, moves[0]) + j.state_twist @ moves[1]
+            got = (
+                np.einsum("abn,bn->an", j.state_state, moves[0])
+                + j.state_twist @ moves[1]
+            )
             pulled = np.einsum("dbn,bn->d", j.wrench_state, moves[0])
         else:
-            got, pulled = j.state_state @ moves[0] + j.state_twist @ moves[1], j.wrench_state @ moves[0]
+            got = j.state_state @ moves[0] + j.state_twist @ moves[1]
+            pulled = j.wrench_state @ moves[0]
         pulled = pulled + j.wrench_twist @ moves[1] + j.wrench_load * moves[2]
         high, low = (
-            model.step(state + h * moves[0], twist + h * moves[1], LOAD + h * moves[2], DT) for h in (1e-6, -1e-6)
+            model.step(
+                state + h * moves[0], twist + h * moves[1], LOAD + h * moves[2], DT
+            )
+            for h in (1e-6, -1e-6)
         )
         # Rounding 1e-16/1e-6 of the values; truncation 1e-12 of the curvature, 1e-6 where that jumps.
-        expected, expected_wrench = (high[0] - low[0]) / 2e-6, (high[1] - low[1]) / 2e-6
-        assert got / units == pytest.approx(expected / units, abs=1e-6 * np.abs(expected / units).max())
-        assert pulled == pytest.approx(expected_wrench, rel=1e-6, abs=1e-6 * np.abs(expected_wrench[:2]).max() * 0.01)
+        expected = (high[0] - low[0]) / 2e-6
+        expected_wrench = (high[1] - low[1]) / 2e-6
+        assert got / units == pytest.approx(
+            expected / units, abs=1e-6 * np.abs(expected / units).max()
+        )
+        assert pulled == pytest.approx(
+            expected_wrench,
+            rel=1e-6,
+            abs=1e-6 * np.abs(expected_wrench[:2]).max() * 0.01,
+        )
 
 
 def test_a_bristle_brought_back_to_full_deflection_slides_along_the_cap():
     model = model_of("ellipsoid")
     scale = np.array([1.0, 1.0, radius(model)])
-    state, dt = np.array([-2.52e-8, -4.02e-7, 8.58e-7]) * scale, 5.53e-7
+    state = np.array([-2.52e-8, -4.02e-7, 8.58e-7]) * scale
+    dt = 5.53e-7
     twist = np.array([-4.2e-2, -3.4e-2, 202.0])
     end, _ = model.step(state, twist, LOAD, dt)
     v = np.linalg.norm(model.surface._frame() @ twist)
-    assert np.linalg.norm(end / scale) == pytest.approx(_friction(model.law, v) / model.law.sigma_0, rel=1e-14)
+    assert np.linalg.norm(end / scale) == pytest.approx(
+        _friction(model.law, v) / model.law.sigma_0, rel=1e-14
+    )
     j = model.step_jacobians(state, twist, LOAD, dt)
     # Along the cap only: the length of the new bristle is full deflection whatever the old one was.
-    assert (end / scale) @ (j.state_state / scale[:, None] * scale) == pytest.approx(np.zeros(3), abs=1e-6 * 1e-12)
+    assert (end / scale) @ (j.state_state / scale[:, None] * scale) == pytest.approx(
+        np.zeros(3), abs=1e-6 * 1e-12
+    )
     for move in np.eye(3):
         change = 1e-5 * move * scale * 1e-6
-        difference = model.step(state + change, twist, LOAD, dt)[0] - model.step(state - change, twist, LOAD, dt)[0]
-        assert 2.0 * j.state_state @ change / scale == pytest.approx(difference / scale, rel=1e-5, abs=1e-19)
+        difference = (
+            model.step(state + change, twist, LOAD, dt)[0]
+            - model.step(state - change, twist, LOAD, dt)[0]
+        )
+        assert 2.0 * j.state_state @ change / scale == pytest.approx(
+            difference / scale, rel=1e-5, abs=1e-19
+        )
 
 
 @pytest.mark.parametrize("kind", ["distributed", "published"])
 def test_jacobians_of_a_batch_of_steps_are_those_of_each(kind):
-    model, random = model_of(kind), np.random.default_rng(9)
+    model = model_of(kind)
+    random = np.random.default_rng(9)
     states = random.normal(size=(3, 1, *model.state_shape)) * 1e-7
-    twists, loads = random.normal(size=(2, 3)) * (1e-2, 1e-2, 2.0), np.array([0.0, 2.0])
+    twists = random.normal(size=(2, 3)) * (1e-2, 1e-2, 2.0)
+    loads = np.array([0.0, 2.0])
     batch = model.step_jacobians(states, twists, loads, DT)
     for i, j in np.ndindex(3, 2):
-        one = model.step_jacobians(states[i, 0].tolist(), tuple(twists[j]), float(loads[j]), DT)
+        one = model.step_jacobians(
+            states[i, 0].tolist(), tuple(twists[j]), float(loads[j]), DT
+        )
         for name, value in one._asdict().items():
             assert np.array_equal(getattr(batch, name)[i, j], value), name
-    for bad in ({"normal_force": -1.0}, {"dt": np.nan}, {"twist": (0.0, 1.0)}, {"state": [0.0, 0.0, np.inf]}):
-        inputs = {"state": model.rest(), "twist": np.zeros(3), "normal_force": 1.0, "dt": DT, **bad}
+    for bad in (
+        {"normal_force": -1.0},
+        {"dt": np.nan},
+        {"twist": (0.0, 1.0)},
+        {"state": [0.0, 0.0, np.inf]},
+    ):
+        inputs = {
+            "state": model.rest(),
+            "twist": np.zeros(3),
+            "normal_force": 1.0,
+            "dt": DT,
+            **bad,
+        }
         with pytest.raises(InvalidValueError, match=next(iter(bad))):
             model.step_jacobians(**inputs)
 
@@ -276,7 +393,9 @@ def test_one_load_for_each_contact_and_rest():
     assert each.wrenches[1] == pytest.approx(
         derivatives.rollout(model, model.rest(), twists, 2.0, DT).wrenches, rel=1e-12
     )
-    gradient = derivatives.rollout_vjp(model, None, twists, [[1.0], [2.0]], DT, np.ones((T, 3)))
+    gradient = derivatives.rollout_vjp(
+        model, None, twists, [[1.0], [2.0]], DT, np.ones((T, 3))
+    )
     assert gradient.state.shape == (3,) and gradient.normal_force.shape == (2, 1)
 
 
@@ -287,7 +406,8 @@ def test_a_rollout_of_any_model_takes_its_steps():
     surface = pf.LimitSurfaceTablePublished(FINGER, segments=4, normal_force=1.0)
     model = pf.ReducedModelPublished(FINGER, ELASTIC, surface)
     twists = np.random.default_rng(3).normal(size=(2, 5, 3)) * (1e-3, 1e-3, 0.3)
-    loads, steps = np.linspace(0.5, 1.5, 5), np.linspace(1e-4, 2e-4, 5)
+    loads = np.linspace(0.5, 1.5, 5)
+    steps = np.linspace(1e-4, 2e-4, 5)
     end, wrenches = pf.rollout(model, None, twists, loads, steps)
     state = model.rest()
     for t in range(5):
@@ -298,7 +418,9 @@ def test_a_rollout_of_any_model_takes_its_steps():
     assert wrenches.shape == (0, 3) and np.array_equal(end, state[0])
     with pytest.raises(InvalidValueError, match=r"twist must have shape \[..., T, 3\]"):
         pf.rollout(model, None, np.zeros(3), 1.0, 1e-4)
-    with pytest.raises(InvalidValueError, match="state, twist and normal_force must broadcast"):
+    with pytest.raises(
+        InvalidValueError, match="state, twist and normal_force must broadcast"
+    ):
         pf.rollout(model, None, twists, np.ones((3, 5)), 1e-4)
     with pytest.raises(InvalidValueError, match="model must"):
         pf.rollout(model, None, twists, loads, steps, parameters=np.ones(7))
@@ -307,33 +429,57 @@ def test_a_rollout_of_any_model_takes_its_steps():
 # ---------------------------------------------------------------------- ends of the range
 
 
-@pytest.mark.parametrize("surface", [pf.LimitSurfaceCells, pf.LimitSurfaceTable, pf.LimitSurfaceTablePublished])
+@pytest.mark.parametrize(
+    "surface",
+    [pf.LimitSurfaceCells, pf.LimitSurfaceTable, pf.LimitSurfaceTablePublished],
+)
 def test_twists_whose_squares_leave_the_range_of_numbers_are_rest(surface):
-    generator, model = np.random.default_rng(0), pf.ReducedModelPublished(PATCH, ELASTIC, surface=surface(PATCH))
-    twist = 10.0 ** generator.uniform(-163.0, -160.0, (1000, 1, 1)) * generator.normal(size=(1000, 1, 3)) * [1, 1, 150]
+    generator = np.random.default_rng(0)
+    model = pf.ReducedModelPublished(PATCH, ELASTIC, surface=surface(PATCH))
+    twist = (
+        10.0 ** generator.uniform(-163.0, -160.0, (1000, 1, 1))
+        * generator.normal(size=(1000, 1, 3))
+        * [1, 1, 150]
+    )
     start = generator.normal(size=(1000, 3)) * [1e-7, 1e-7, 1e-9]
-    ours, still = (derivatives.rollout(model, start, each, 1.0, 1e-3) for each in (twist, 0.0 * twist))
+    ours, still = (
+        derivatives.rollout(model, start, each, 1.0, 1e-3)
+        for each in (twist, 0.0 * twist)
+    )
     np.testing.assert_array_equal(ours.wrenches, still.wrenches)
-    for each in derivatives.rollout_vjp(model, start, twist, 1.0, 1e-3, np.ones((1, 3))):
+    for each in derivatives.rollout_vjp(
+        model, start, twist, 1.0, 1e-3, np.ones((1, 3))
+    ):
         assert np.isfinite(each).all()
 
 
 # ---------------------------------------------------------------------- errors
 
 FINGER = pf.ContactPatch.rectangle(
-    0.02, cells=21, pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01)
+    0.02,
+    cells=21,
+    pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01),
 )
 
 
 def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
     surface = pf.LimitSurfaceEllipsoid(FINGER, normal_force=1.0)
-    kept = pf.ReducedModelPublished(FINGER, ELASTIC, surface=surface, on_load_change="keep")
+    kept = pf.ReducedModelPublished(
+        FINGER, ELASTIC, surface=surface, on_load_change="keep"
+    )
     _, twists, loads = drive(kept)
     _, wrenches = derivatives.rollout(kept, kept.rest(), twists, loads, DT)
-    assert wrenches[0] == pytest.approx(kept.step(kept.rest(), twists[0], loads[0], DT)[1], rel=1e-12)
+    assert wrenches[0] == pytest.approx(
+        kept.step(kept.rest(), twists[0], loads[0], DT)[1], rel=1e-12
+    )
     for how in ("rebuild", "rescale"):
-        model = pf.ReducedModelPublished(FINGER, ELASTIC, surface=surface, on_load_change=how)
-        with pytest.raises(InvalidValueError, match=f"shape that does not follow the load.*on_load_change='{how}'"):
+        model = pf.ReducedModelPublished(
+            FINGER, ELASTIC, surface=surface, on_load_change=how
+        )
+        with pytest.raises(
+            InvalidValueError,
+            match=f"shape that does not follow the load.*on_load_change='{how}'",
+        ):
             derivatives.rollout_states(model, model.rest(), twists, loads, DT)
 
 
@@ -343,14 +489,23 @@ def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
         ({"state": np.zeros(2)}, r"state must have shape \[..., 3\]"),
         ({"twist": np.zeros(3)}, r"twist must have shape \[..., T, 3\]"),
         ({"twist": np.full((T, 3), np.nan)}, "twist must be finite"),
-        ({"normal_force": np.ones(T - 1)}, rf"normal_force must broadcast with \[..., {T}\]"),
+        (
+            {"normal_force": np.ones(T - 1)},
+            rf"normal_force must broadcast with \[..., {T}\]",
+        ),
         ({"normal_force": -1.0}, "normal_force must be >= 0, got -1.0"),
         ({"dt": np.ones((T, 1))}, rf"dt must be one number or have shape \[{T}\]"),
         ({"parameters": np.ones(11)}, r"parameters must have shape \[..., 12\]"),
         ({"parameters": np.zeros(12)}, "sigma_0 must be > 0, got 0.0"),
         ({"parameters": np.ones(12)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
-        ({"state": np.zeros((2, 3)), "twist": np.zeros((3, T, 3))}, "batch axes must broadcast"),
-        ({"wrenches_bar": np.ones((T + 1, 3))}, rf"wrenches_bar must have shape \[..., {T}, 3\]"),
+        (
+            {"state": np.zeros((2, 3)), "twist": np.zeros((3, T, 3))},
+            "batch axes must broadcast",
+        ),
+        (
+            {"wrenches_bar": np.ones((T + 1, 3))},
+            rf"wrenches_bar must have shape \[..., {T}, 3\]",
+        ),
         ({"model": "a"}, "model must be one that has compiled rollouts, got str"),
     ],
 )

@@ -15,7 +15,9 @@ GRAIN = pf.friction_metric(0.6, along=0.5, across=1.0)
 LAW = pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.6))
 PATCHES = {
     "grain": PLAIN.with_friction_metric(GRAIN),
-    "of each cell": PLAIN.with_friction_metric([pf.friction_metric(0.3 * i, 0.6, 1.1) for i in range(PLAIN.cells)]),
+    "of each cell": PLAIN.with_friction_metric(
+        [pf.friction_metric(0.3 * i, 0.6, 1.1) for i in range(PLAIN.cells)]
+    ),
 }
 MODELS = [("reduced", "grain"), ("reduced", "of each cell"), ("published", "grain")]
 DT, T = 1e-4, 10
@@ -26,7 +28,9 @@ every_model = pytest.mark.parametrize(("kind", "patch"), MODELS)
 @functools.cache
 def model_of(kind: str, patch: str):
     if kind == "published":
-        return pf.ReducedModelPublished(PATCHES[patch], LAW, pf.LimitSurfaceTable(PATCHES[patch]))
+        return pf.ReducedModelPublished(
+            PATCHES[patch], LAW, pf.LimitSurfaceTable(PATCHES[patch])
+        )
     return pf.ReducedModel(PATCHES[patch], LAW)
 
 
@@ -40,37 +44,57 @@ def drive(model, seed: int = 0):
 
 
 def bars(model, seed: int = 1):
-    random, sizes_of_state = np.random.default_rng(seed), [1e6, 1e6, 1e8] if model.state_shape == (3,) else 1e6
-    return random.normal(size=(T, 3)) * [1.0, 1.0, 150.0], random.normal(size=model.state_shape) * sizes_of_state
+    random = np.random.default_rng(seed)
+    sizes_of_state = [1e6, 1e6, 1e8] if model.state_shape == (3,) else 1e6
+    return random.normal(size=(T, 3)) * [1.0, 1.0, 150.0], random.normal(
+        size=model.state_shape
+    ) * sizes_of_state
 
 
 @pytest.mark.torch
 @every_model
 def test_pytorch_has_the_same_numbers_and_gradients(kind, patch):
-    torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
+    torch = pytest.importorskip(
+        "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
+    )
     from planarfriction.torch import ReducedModel, ReducedModelPublished, rollout
 
-    model, options = model_of(kind, patch), {"dtype": torch.float64}
+    model = model_of(kind, patch)
+    options = {"dtype": torch.float64}
     if kind == "published":
         module = ReducedModelPublished(PATCHES[patch], LAW, model.surface, **options)
     else:
         module = ReducedModel(PATCHES[patch], LAW, **options)
     state, twists, loads = drive(model)
     got = module(*map(torch.tensor, (state, twists[3], loads[3])))
-    assert got[0].detach().numpy() == pytest.approx(model.rate(state, twists[3], loads[3]), rel=1e-12, abs=1e-18)
-    assert got[1].detach().numpy() == pytest.approx(model.wrench(state, twists[3], loads[3]), rel=1e-12, abs=1e-15)
+    assert got[0].detach().numpy() == pytest.approx(
+        model.rate(state, twists[3], loads[3]), rel=1e-12, abs=1e-18
+    )
+    assert got[1].detach().numpy() == pytest.approx(
+        model.wrench(state, twists[3], loads[3]), rel=1e-12, abs=1e-15
+    )
     bar, end_bar = map(torch.tensor, bars(model))
-    wanted = derivatives.rollout_vjp(model, state, twists, loads, DT, bar.numpy(), end_bar.numpy())
+    wanted = derivatives.rollout_vjp(
+        model, state, twists, loads, DT, bar.numpy(), end_bar.numpy()
+    )
     for method in ("adjoint", "eager"):
-        free = [torch.tensor(value, requires_grad=True) for value in (state, twists, loads)]
+        free = [
+            torch.tensor(value, requires_grad=True) for value in (state, twists, loads)
+        ]
         free.append(module.physical().detach().requires_grad_())
         run = rollout(module, *free[:3], DT, parameters=free[3], method=method)
         exact = derivatives.rollout(model, state, twists, loads, DT)
-        assert run.wrenches.detach().numpy() == pytest.approx(exact.wrenches, rel=1e-12, abs=1e-13), method
-        slopes = torch.autograd.grad((bar * run.wrenches).sum() + (end_bar * run.state).sum(), free)
+        assert run.wrenches.detach().numpy() == pytest.approx(
+            exact.wrenches, rel=1e-12, abs=1e-13
+        ), method
+        slopes = torch.autograd.grad(
+            (bar * run.wrenches).sum() + (end_bar * run.state).sum(), free
+        )
         for slope, want in zip(slopes, wanted, strict=True):
             # sums in another order; slopes of the stiff steps amplify that
-            assert slope.numpy() == pytest.approx(want, rel=1e-8, abs=1e-9 * np.abs(want).max()), method
+            assert slope.numpy() == pytest.approx(
+                want, rel=1e-8, abs=1e-9 * np.abs(want).max()
+            ), method
 
 
 @pytest.mark.jax
@@ -88,8 +112,14 @@ def test_jax_has_the_same_numbers_and_gradients(kind, patch):
         else:
             pytree = pj.ReducedModel(PATCHES[patch], LAW)
         state, twists, loads = drive(model)
-        step = jax.jit(lambda *given: pytree.step(*given, DT))  # one program instead of one for each operation
-        for got, want in zip(step(state, twists[3], loads[3]), model.step(state, twists[3], loads[3], DT), strict=True):
+        step = jax.jit(
+            lambda *given: pytree.step(*given, DT)
+        )  # one program instead of one for each operation
+        for got, want in zip(
+            step(state, twists[3], loads[3]),
+            model.step(state, twists[3], loads[3], DT),
+            strict=True,
+        ):
             assert np.asarray(got) == pytest.approx(want, rel=1e-12, abs=1e-15)
         bar, end_bar = bars(model)
 
@@ -97,9 +127,13 @@ def test_jax_has_the_same_numbers_and_gradients(kind, patch):
             run = pj.rollout(pytree, state, twists, loads, DT, parameters=parameters)
             return (bar * run.wrenches).sum() + (end_bar * run.state).sum()
 
-        by, *slopes = jax.grad(value, (0, 1, 2, 3))(pytree.parameters, state, twists, loads)
+        by, *slopes = jax.grad(value, (0, 1, 2, 3))(
+            pytree.parameters, state, twists, loads
+        )
         wanted = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
         for slope, want in zip((*slopes, np.stack(by)), wanted, strict=True):
-            assert np.asarray(slope) == pytest.approx(want, rel=1e-11, abs=1e-12 * np.abs(want).max())
+            assert np.asarray(slope) == pytest.approx(
+                want, rel=1e-11, abs=1e-12 * np.abs(want).max()
+            )
     finally:
         jax.config.update("jax_enable_x64", before)

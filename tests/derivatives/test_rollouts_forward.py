@@ -26,16 +26,29 @@ def drive(seed: int = 0, shape: tuple[int, ...] = (3,)):
     random = np.random.default_rng(seed)
     sizes = np.array([1.0, 1.0, 150.0])
     twists = np.cumsum(random.normal(size=(T, 3)), axis=0) * 3e-3 * sizes
-    state, loads = random.normal(size=shape) * [3e-7, 3e-7, 2e-9], random.uniform(1.0, 3.0, T)
-    twists[5], loads[9] = 0.0, 0.0
-    changes = [random.normal(size=shape) * [1e-7, 1e-7, 1e-9], random.normal(size=(T, 3)) * 1e-3 * sizes]
+    state = random.normal(size=shape) * [3e-7, 3e-7, 2e-9]
+    loads = random.uniform(1.0, 3.0, T)
+    twists[5] = 0.0
+    loads[9] = 0.0
+    changes = [
+        random.normal(size=shape) * [1e-7, 1e-7, 1e-9],
+        random.normal(size=(T, 3)) * 1e-3 * sizes,
+    ]
     return (state, twists, loads), [*changes, random.normal(size=T)]
 
 
 def test_changes_broadcast_with_contacts():
-    model, (inputs, changes) = model_of(), drive(4)
+    model = model_of()
+    (inputs, changes) = drive(4)
     twists = inputs[1] * np.array([0.5, 1.0, 2.0])[:, None, None]
-    found = derivatives.rollout_jvp(model, inputs[0], twists, 2.0, DT, derivatives.RolloutTangent(changes[0], 0.0, 1.0))
+    found = derivatives.rollout_jvp(
+        model,
+        inputs[0],
+        twists,
+        2.0,
+        DT,
+        derivatives.RolloutTangent(changes[0], 0.0, 1.0),
+    )
     assert found.wrenches_dot.shape == (3, T, 3)
     for each, twist in zip(found.wrenches_dot, twists, strict=True):
         tangent = derivatives.RolloutTangent(changes[0], normal_force=np.ones(T))
@@ -48,15 +61,26 @@ def test_changes_broadcast_with_contacts():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"twist": np.zeros((T, 2))}, r"tangent.twist must have shape \[..., 14, 3\], got shape \[14, 2\]"),
-        ({"parameters": np.zeros(7)}, r"tangent.parameters must have shape \[..., 12\]"),
+        (
+            {"twist": np.zeros((T, 2))},
+            r"tangent.twist must have shape \[..., 14, 3\], got shape \[14, 2\]",
+        ),
+        (
+            {"parameters": np.zeros(7)},
+            r"tangent.parameters must have shape \[..., 12\]",
+        ),
         ({"state": [np.nan, 0.0, 0.0]}, "tangent.state must be finite"),
-        ({"normal_force": np.zeros((4, T)), "state": np.zeros((5, 3))}, "batch axes must broadcast"),
+        (
+            {"normal_force": np.zeros((4, T)), "state": np.zeros((5, 3))},
+            "batch axes must broadcast",
+        ),
     ],
 )
 def test_wrong_changes_are_one_clear_line(changes, message):
     with pytest.raises(InvalidValueError, match=message) as caught:
-        derivatives.rollout_jvp(model_of(), *drive()[0], DT, derivatives.RolloutTangent(**changes))
+        derivatives.rollout_jvp(
+            model_of(), *drive()[0], DT, derivatives.RolloutTangent(**changes)
+        )
     assert "\n" not in str(caught.value)
 
 

@@ -21,7 +21,9 @@ DT, T, SIZES = 1e-4, len(LOADS), np.array([1.0, 1.0, 250.0])
 def drive(model: pf.models.FrictionModel, seed: int = 0):
     """A state, and twists that start, slide, spin and turn back."""
     random = np.random.default_rng(seed)
-    return random.normal(size=model.state_shape) * 3e-7, np.cumsum(random.normal(size=(T, 3)), axis=0) * 3e-3 * SIZES
+    return random.normal(size=model.state_shape) * 3e-7, np.cumsum(
+        random.normal(size=(T, 3)), axis=0
+    ) * 3e-3 * SIZES
 
 
 def test_the_torque_of_a_slide_follows_the_centre_of_pressure():
@@ -29,35 +31,56 @@ def test_the_torque_of_a_slide_follows_the_centre_of_pressure():
     x, y = np.array([[0.01, -0.01, 0.0], [0.0, 0.002, 0.012]])
     shares = np.array([[0.6, 0.3, 0.1], [0.1, 0.3, 0.6]])
     feet = pf.ContactPatch.points(np.stack([x, y], 1))
-    patch = pf.ContactPatch(feet.positions, feet.areas, pf.PressureMaps((1.0, 3.0), shares))
+    patch = pf.ContactPatch(
+        feet.positions, feet.areas, pf.PressureMaps((1.0, 3.0), shares)
+    )
     model = pf.DistributedModel(patch, pf.LuGre(mu_c=0.8, mu_s=0.8, sigma_2=0.0))
-    load, bar = 1.6, np.array([[0.0, 0.0, 1.0]])
+    load = 1.6
+    bar = np.array([[0.0, 0.0, 1.0]])
     found = derivatives.rollout_vjp(model, None, [[0.01, 0.0, 0.0]], load, 1e6, bar)
     low, high = shares @ y
-    centre, slope = low + (load - 1.0) * (high - low) / 2.0, (high - low) / 2.0
+    centre = low + (load - 1.0) * (high - low) / 2.0
+    slope = (high - low) / 2.0
     # slopes of the weights err by 1e-10
-    assert float(found.normal_force) == pytest.approx(0.8 * (centre + load * slope), rel=1e-9)
+    assert float(found.normal_force) == pytest.approx(
+        0.8 * (centre + load * slope), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("metric", [None, METRIC], ids=["isotropic", "grain"])
 def test_a_shape_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(metric):
-    measured = pf.ContactPatch.from_pressure({0.5: HEAVY, 4.0: 2.0 * HEAVY}, cell_size=1e-3)
+    measured = pf.ContactPatch.from_pressure(
+        {0.5: HEAVY, 4.0: 2.0 * HEAVY}, cell_size=1e-3
+    )
     fixed = pf.ContactPatch.from_pressure(HEAVY, cell_size=1e-3)
     if metric is not None:
-        measured, fixed = (patch.with_friction_metric(metric) for patch in (measured, fixed))
-    changing, single = (pf.DistributedModel(patch, ELASTIC) for patch in (measured, fixed))
-    (state, twists), random = drive(changing), np.random.default_rng(1)
-    bars = random.normal(size=(T, 3)) * SIZES, random.normal(size=changing.state_shape) * 1e6
+        measured, fixed = (
+            patch.with_friction_metric(metric) for patch in (measured, fixed)
+        )
+    changing, single = (
+        pf.DistributedModel(patch, ELASTIC) for patch in (measured, fixed)
+    )
+    (state, twists) = drive(changing)
+    random = np.random.default_rng(1)
+    bars = (
+        random.normal(size=(T, 3)) * SIZES,
+        random.normal(size=changing.state_shape) * 1e6,
+    )
     loads = LOADS.copy()
     loads[4] = 0.0
-    found, wanted = (derivatives.rollout_vjp(m, state, twists, loads, DT, *bars) for m in (changing, single))
+    found, wanted = (
+        derivatives.rollout_vjp(m, state, twists, loads, DT, *bars)
+        for m in (changing, single)
+    )
     for got, want in zip(found, wanted, strict=True):
         # weights at another load differ by rounding, and so do their slopes: 1e-16 over the step of 1e-5
         assert got == pytest.approx(want, rel=1e-8, abs=1e-9 * np.abs(want).max())
 
 
 def test_without_load_the_slope_is_the_wrench_per_newton_of_a_small_one():
-    model = pf.DistributedModel(pf.ContactPatch.from_pressure({0.5: LIGHT, 4.0: HEAVY}, cell_size=1e-3), ELASTIC)
+    model = pf.DistributedModel(
+        pf.ContactPatch.from_pressure({0.5: LIGHT, 4.0: HEAVY}, cell_size=1e-3), ELASTIC
+    )
     state, twists = drive(model, 7)
     loads = LOADS.copy()
     loads[4] = 0.0

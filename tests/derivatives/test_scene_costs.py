@@ -27,24 +27,32 @@ def last_x(time: np.ndarray, motion: np.ndarray) -> np.ndarray:
     return np.pad([[0.0, 0.0, 0.0, 1.0, 0.0, 0.0]], ((len(motion) - 1, 0), (0, 0)))
 
 
-def block(sigma_0: float, sigma_1: float, velocity=(0.0, 0.0, 0.0), force=None) -> pf.Scene:
-    law = pf.LuGre(mu_c=0.62, sigma_0=sigma_0, sigma_1=sigma_1, sigma_2=0.0, elasto_plastic=0.9)
+def block(
+    sigma_0: float, sigma_1: float, velocity=(0.0, 0.0, 0.0), force=None
+) -> pf.Scene:
+    law = pf.LuGre(
+        mu_c=0.62, sigma_0=sigma_0, sigma_1=sigma_1, sigma_2=0.0, elasto_plastic=0.9
+    )
     model = pf.ReducedModel(pf.ContactPatch.rectangle(0.03, 0.02), law)
     body = pf.Body(MASS, 1e-4, velocity=velocity, gravity=(0.0, 0.0))
-    return pf.Scene(body, [pf.Contact(model, LOAD, mounted_on="body")], 1.0, force=force)
+    return pf.Scene(
+        body, [pf.Contact(model, LOAD, mounted_on="body")], 1.0, force=force
+    )
 
 
 @pytest.fixture
 def steps(monkeypatch) -> Callable[[], int]:
     """Return a function that tells the steps of the adjoint since it was asked last."""
-    taken, propagate_back = [0], path.adjoint.propagate_back
+    taken = [0]
+    propagate_back = path.adjoint.propagate_back
 
     def counted(*arguments):
         taken[0] += (done := propagate_back(*arguments))
         return done
 
     def since() -> int:
-        count, taken[0] = taken[0], 0
+        count = taken[0]
+        taken[0] = 0
         return count
 
     monkeypatch.setattr(path.adjoint, "propagate_back", counted)
@@ -63,11 +71,15 @@ def test_a_block_that_sticks_at_the_end_costs_no_steps_there(steps):
     Two million steps were taken here for six thousand of the motion.
     """
     t = np.linspace(0.0, 1.0, 101)
-    push = np.stack([1.4 * np.sin(6.0 * t) + 1.8 * t, 0.0 * t, 0.004 * np.cos(5.0 * t)], axis=1)
+    push = np.stack(
+        [1.4 * np.sin(6.0 * t) + 1.8 * t, 0.0 * t, 0.004 * np.cos(5.0 * t)], axis=1
+    )
     scene = block(5e3, 50.0, force=pf.Signal(t, push, "linear"))
     found = scene_gradient(scene, last_x, ("mu",))
     assert steps() < trials(scene)
-    assert found.gradient[0] == pytest.approx(scene_sensitivities(scene, ("mu",)).d_motion[-1, 3, 0], rel=1e-6)
+    assert found.gradient[0] == pytest.approx(
+        scene_sensitivities(scene, ("mu",)).d_motion[-1, 3, 0], rel=1e-6
+    )
 
 
 def test_stiff_bristles_under_a_fast_body_cost_no_steps(steps):
@@ -87,7 +99,12 @@ def test_a_gradient_that_needs_far_more_steps_than_its_motion_says_so(monkeypatc
     monkeypatch.setattr(path, "PER_JUMP", 0)
     scene = block(5e3, 50.0, velocity=(8.0, 0.1, 1.0))
     with pytest.raises(SolverError, match="raise rtol, or use scene_sensitivities"):
-        scene_gradient(scene, lambda _, motion: motion, ("mu",), options=SolverOptions(save_every=1e-3))
+        scene_gradient(
+            scene,
+            lambda _, motion: motion,
+            ("mu",),
+            options=SolverOptions(save_every=1e-3),
+        )
 
 
 class Measured(NamedTuple):
@@ -118,15 +135,20 @@ class Measured(NamedTuple):
 def measured(seed: int, steps: Callable[[], int]) -> Measured:
     """Return price and errors of the gradient of a random scene."""
     made = example(seed)
-    scene, numbers = made.scene, made.numbers
+    scene = made.scene
+    numbers = made.numbers
     forwards = scene_sensitivities(scene, **numbers)
     motion, wrenches = made.cotangents(forwards.motion, forwards.wrenches)
     seen = int((motion.any(axis=1) | wrenches.any(axis=(1, 2))).sum())
-    costs: dict[str, Any] = {"cotangent": lambda *_: motion, "wrench_cotangent": lambda *_: wrenches}
+    costs: dict[str, Any] = {
+        "cotangent": lambda *_: motion,
+        "wrench_cotangent": lambda *_: wrenches,
+    }
     steps()
     begin = time.process_time()
     reverse = scene_gradient(scene, **costs, **numbers)
-    middle, taken = time.process_time(), steps()
+    middle = time.process_time()
+    taken = steps()
     run = trials(scene)
     clock = (middle - begin) / (time.process_time() - middle)
     expected = np.einsum("mi,mip->p", motion, forwards.d_motion)
@@ -134,32 +156,61 @@ def measured(seed: int, steps: Callable[[], int]) -> Measured:
     size = np.einsum("mi,mip->p", np.abs(motion), np.abs(forwards.d_motion))
     size += np.einsum("mci,mcip->p", np.abs(wrenches), np.abs(forwards.d_wrenches))
     missed = np.abs(reverse.gradient - expected)
-    least = 1e-3 * (np.abs(motion * forwards.motion).sum() + np.abs(wrenches * forwards.wrenches).sum())
-    error = max(missed[here].max() / max(size[here].max(), least) for here in reverse.columns.values())
+    least = 1e-3 * (
+        np.abs(motion * forwards.motion).sum()
+        + np.abs(wrenches * forwards.wrenches).sum()
+    )
+    error = max(
+        missed[here].max() / max(size[here].max(), least)
+        for here in reverse.columns.values()
+    )
 
     function, values, way = in_a_direction(made)
     changes = []
     for h in (1e-4, 1e-5, 1e-7):
         moved = [function.run((values + sign * h * way)[None]) for sign in (1.0, -1.0)]
-        last, first = (float((motion * m[0]).sum() + (wrenches * w[0]).sum()) for m, w in moved)
+        last, first = (
+            float((motion * m[0]).sum() + (wrenches * w[0]).sum()) for m, w in moved
+        )
         changes.append((last - first) / (2.0 * h))
     off = np.abs(np.array(changes) - reverse.gradient @ way).min()
-    return Measured(made.told, seen, run, taken, clock, error, float(off / max(size @ np.abs(way), least)))
+    return Measured(
+        made.told,
+        seen,
+        run,
+        taken,
+        clock,
+        error,
+        float(off / max(size @ np.abs(way), least)),
+    )
 
 
 def in_a_direction(made: Example) -> tuple[SceneFunction, np.ndarray, np.ndarray]:
     """Return the scene as a function of its numbers, tightly simulated, their values and a random change of them."""
-    body, load = made.scene.body, made.scene.contacts[0].normal_force
+    body = made.scene.body
+    load = made.scene.contacts[0].normal_force
     start = dict(zip(MOTION, (*body.velocity, *body.position, body.angle), strict=True))
-    parameters, initial, signals = made.numbers["parameters"], made.numbers["initial"], made.numbers.get("signals", {})
+    parameters = made.numbers["parameters"]
+    initial = made.numbers["initial"]
+    signals = made.numbers.get("signals", {})
     values = [1.0] * len(parameters) + [start[name] for name in initial]
     scale = [1.0] * len(parameters) + [max(abs(start[name]), 1e-3) for name in initial]
     for name in signals:
         signal = made.scene.force if name == "force" else load
         values += signal.values.ravel().tolist()
-        scale += np.broadcast_to(np.abs(signal.values).max(axis=0), signal.values.shape).ravel().tolist()
-    function = SceneFunction(made.scene, parameters, signals, initial, rtol=1e-10, atol=1e-10)
-    return function, np.array(values), np.array(scale) * np.random.default_rng(made.seed).normal(size=len(scale))
+        scale += (
+            np.broadcast_to(np.abs(signal.values).max(axis=0), signal.values.shape)
+            .ravel()
+            .tolist()
+        )
+    function = SceneFunction(
+        made.scene, parameters, signals, initial, rtol=1e-10, atol=1e-10
+    )
+    return (
+        function,
+        np.array(values),
+        np.array(scale) * np.random.default_rng(made.seed).normal(size=len(scale)),
+    )
 
 
 @pytest.mark.slow
@@ -174,15 +225,25 @@ def test_gradients_of_random_scenes_cost_few_runs(steps, capsys):
         "runs, processor time": [each.clock for each in found],
         "runs, by steps": [1.0 + STEP * each.steps / each.trials for each in found],
         "runs, by steps, without transients": [
-            1.0 + STEP * max(each.steps - 60 * each.instants, 0) / each.trials for each in found
+            1.0 + STEP * max(each.steps - 60 * each.instants, 0) / each.trials
+            for each in found
         ],
         "against the derivatives forwards": [each.forwards for each in found],
         "against differences": [each.differences for each in found],
     }
     with capsys.disabled():
         for name, values in shares.items():
-            print(f"\n{name}:", *(f"{q} % {np.percentile(values, q):.2g}," for q in (50, 90, 99, 100)), end="")
+            print(
+                f"\n{name}:",
+                *(f"{q} % {np.percentile(values, q):.2g}," for q in (50, 90, 99, 100)),
+                end="",
+            )
     assert max(shares["runs, by steps, without transients"]) <= 8.0
-    for errors in shares["against the derivatives forwards"], shares["against differences"]:
-        assert np.percentile(errors, 90) < 1e-4  # a slip that barely happens is more sensitive than differences tell
+    for errors in (
+        shares["against the derivatives forwards"],
+        shares["against differences"],
+    ):
+        assert (
+            np.percentile(errors, 90) < 1e-4
+        )  # a slip that barely happens is more sensitive than differences tell
         assert max(errors) < 5e-2

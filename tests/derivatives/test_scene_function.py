@@ -25,11 +25,21 @@ def scene(stop: float | None = None) -> pf.Scene:
     """A plate that slides and turns; with `stop` it comes to rest before the end."""
     body = pf.Body(0.4, 6e-4, velocity=(0.08, 0.03, 1.5), gravity=(0.0, 0.0))
     contacts = [
-        pf.Contact(model_of("ellipsoid"), 1.5, position=(3e-3, 0.0), mounted_on="body", name="own"),
-        pf.Contact(model_of("ellipsoid"), pf.Signal(KNOTS, LOAD, "linear"), name="fixed"),
+        pf.Contact(
+            model_of("ellipsoid"),
+            1.5,
+            position=(3e-3, 0.0),
+            mounted_on="body",
+            name="own",
+        ),
+        pf.Contact(
+            model_of("ellipsoid"), pf.Signal(KNOTS, LOAD, "linear"), name="fixed"
+        ),
     ]
     end = 0.06 if stop is None else 0.4
-    return pf.Scene(body, contacts, end, save_every=0.02 if stop is None else 0.1, stop_speed=stop)
+    return pf.Scene(
+        body, contacts, end, save_every=0.02 if stop is None else 0.1, stop_speed=stop
+    )
 
 
 SIGNALS = {"fixed.normal_force": KNOTS, "force": KNOTS}
@@ -47,7 +57,10 @@ def test_its_values_stand_in_the_scene():
     changed = dataclasses.replace(
         own,
         body=dataclasses.replace(own.body, mass=0.28, velocity=(0.1, 0.03, 1.5)),
-        contacts=[dataclasses.replace(c, model=dataclasses.replace(c.model, law=law)) for c in own.contacts],
+        contacts=[
+            dataclasses.replace(c, model=dataclasses.replace(c.model, law=law))
+            for c in own.contacts
+        ],
         force=pf.Signal(KNOTS, FORCE * SCALE, "linear"),
     )
     motion, wrenches = function.run(np.stack([VALUES, more]))
@@ -60,7 +73,8 @@ def test_its_values_stand_in_the_scene():
 
 def test_forwards_and_backwards_are_each_other_s_transpose():
     """Right to a few 1e-6 each, factors away from 1 among them."""
-    function, rng = SceneFunction(scene(), *NAMES), np.random.default_rng(0)
+    function = SceneFunction(scene(), *NAMES)
+    rng = np.random.default_rng(0)
     values = np.stack([VALUES, VALUES])
     values[1, :2] = 1.2, 0.8
     changes = rng.normal(size=values.shape) * np.maximum(np.abs(values), 1e-3)
@@ -71,7 +85,10 @@ def test_forwards_and_backwards_are_each_other_s_transpose():
     for known in (kept, None):
         slopes = function.pull(values, *bars, known)
         pushed = function.push(values, changes)
-        forwards = sum((bar * dot).reshape(2, -1).sum(axis=1) for bar, dot in zip(bars, pushed, strict=True))
+        forwards = sum(
+            (bar * dot).reshape(2, -1).sum(axis=1)
+            for bar, dot in zip(bars, pushed, strict=True)
+        )
         assert (slopes * changes).sum(axis=1) == pytest.approx(forwards, rel=1e-5)
 
 
@@ -88,12 +105,20 @@ def test_a_motion_that_ends_early_stays():
 
 
 def test_wrong_numbers_are_named():
-    with pytest.raises(InvalidValueError, match="parameters must be one of mu, mass, inertia, load"):
+    with pytest.raises(
+        InvalidValueError, match="parameters must be one of mu, mass, inertia, load"
+    ):
         SceneFunction(scene(), ("r",))
     law = pf.CoulombStribeck(mu_c=0.3)
-    own = dataclasses.replace(scene(), contacts=[pf.Contact(pf.DistributedModel(pf.ContactPatch.disc(0.01), law), 1.0)])
+    own = dataclasses.replace(
+        scene(),
+        contacts=[
+            pf.Contact(pf.DistributedModel(pf.ContactPatch.disc(0.01), law), 1.0)
+        ],
+    )
     with pytest.raises(
-        InvalidValueError, match="must not contain mu: CoulombStribeck has other friction coefficients too"
+        InvalidValueError,
+        match="must not contain mu: CoulombStribeck has other friction coefficients too",
     ):
         SceneFunction(own, ("mu",)).run(np.array([[1.1]]))
 
@@ -109,14 +134,24 @@ def test_pytorch_agrees_with_differences():
 
     def motion(mu, load, force, vx):
         signals = {"fixed.normal_force": (KNOTS, load), "force": (KNOTS, force * scale)}
-        found = simulate_scene(scene(), {"mu": mu}, signals=signals, initial={"vx": vx}, save_every=0.06)
+        found = simulate_scene(
+            scene(), {"mu": mu}, signals=signals, initial={"vx": vx}, save_every=0.06
+        )
         return found.motion[..., -1, :], found.wrenches[..., -1, :, :2]
 
     inputs = ([1.0, 1.1], LOAD, FORCE, 0.08)
-    tensors = [torch.tensor(value, dtype=torch.float64, requires_grad=True) for value in inputs]
+    tensors = [
+        torch.tensor(value, dtype=torch.float64, requires_grad=True) for value in inputs
+    ]
     assert motion(*tensors)[0].shape == (2, 6)
     # the step of the differences is a thousandth, whose square is what they are off by
-    options = {"eps": 1e-4, "atol": 1e-5, "rtol": 1e-4, "check_batched_grad": False, "fast_mode": True}
+    options = {
+        "eps": 1e-4,
+        "atol": 1e-5,
+        "rtol": 1e-4,
+        "check_batched_grad": False,
+        "fast_mode": True,
+    }
     assert torch.autograd.gradcheck(motion, tensors, check_forward_ad=True, **options)
 
 
@@ -127,8 +162,10 @@ def test_pytorch_maps_and_goes_forwards():
     def end(vx):
         return simulate_scene(scene(), initial={"vx": vx}, save_every=0.06).motion[-1]
 
-    one, two = torch.tensor(0.08, dtype=torch.float64), torch.tensor([0.08, 0.1], dtype=torch.float64)
-    backwards, forwards = torch.func.jacrev(end)(one), torch.func.jacfwd(end)(one)
+    one = torch.tensor(0.08, dtype=torch.float64)
+    two = torch.tensor([0.08, 0.1], dtype=torch.float64)
+    backwards = torch.func.jacrev(end)(one)
+    forwards = torch.func.jacfwd(end)(one)
     assert backwards.numpy() == pytest.approx(forwards.numpy(), rel=1e-5, abs=1e-7)
     mapped = torch.func.vmap(torch.func.grad(lambda v: end(v).sum()))(two)
     assert mapped[0].item() == pytest.approx(forwards.sum().item(), rel=1e-5)
@@ -142,11 +179,18 @@ def test_pytorch_names_wrong_numbers():
 
     with pytest.raises(InvalidValueError, match="mu must be > 0, got -1"):
         simulate_scene(scene(), {"mu": torch.tensor(-1.0)})
-    with pytest.raises(InvalidValueError, match=r"values of force must have shape \[..., 3, 3\], got shape \[3\]"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"values of force must have shape \[..., 3, 3\], got shape \[3\]",
+    ):
         simulate_scene(scene(), signals={"force": (KNOTS, torch.ones(3))})
-    with pytest.raises(InvalidValueError, match="signals of force must be a pair of times and values"):
+    with pytest.raises(
+        InvalidValueError, match="signals of force must be a pair of times and values"
+    ):
         simulate_scene(scene(), signals={"force": torch.ones(3)})
-    with pytest.raises(InvalidValueError, match="the numbers of a scene must have axes that broadcast"):
+    with pytest.raises(
+        InvalidValueError, match="the numbers of a scene must have axes that broadcast"
+    ):
         simulate_scene(scene(), {"mu": torch.ones(2), "mass": torch.ones(3)})
 
 
@@ -163,7 +207,13 @@ def test_jax_agrees_with_the_derivatives_forwards():
 
         def motion(mu, load, vx):
             signals = {"fixed.normal_force": (KNOTS, load)}
-            found = simulate_scene(scene(), {"mu": mu}, signals=signals, initial={"vx": vx}, save_every=0.06)
+            found = simulate_scene(
+                scene(),
+                {"mu": mu},
+                signals=signals,
+                initial={"vx": vx},
+                save_every=0.06,
+            )
             return found.motion[..., -1, :]
 
         at = jnp.array(1.0), jnp.array(LOAD), jnp.array(0.08)
@@ -177,8 +227,12 @@ def test_jax_agrees_with_the_derivatives_forwards():
         for transform in (jax.jacrev, jax.jacfwd, lambda *f: jax.jit(jax.jacrev(*f))):
             by_mu, by_load, by_vx = transform(motion, (0, 1, 2))(*at)
             found = np.concatenate([by_mu[:, None], by_vx[:, None], by_load], axis=1)
-            assert found == pytest.approx(expected, rel=1e-5, abs=1e-6 * np.abs(expected).max())
-        mapped = jax.vmap(jax.grad(lambda v: motion(at[0], at[1], v).sum()))(jnp.array([0.08, 0.1]))
+            assert found == pytest.approx(
+                expected, rel=1e-5, abs=1e-6 * np.abs(expected).max()
+            )
+        mapped = jax.vmap(jax.grad(lambda v: motion(at[0], at[1], v).sum()))(
+            jnp.array([0.08, 0.1])
+        )
         assert mapped[0] == pytest.approx(expected[:, 1].sum(), rel=1e-5)
         with pytest.raises(FrictionError, match="first derivatives only"):
             jax.grad(jax.grad(lambda v: motion(at[0], at[1], v).sum()))(0.08)

@@ -8,7 +8,9 @@ import pytest
 import planarfriction as pf
 from tests.support.repository import script
 
-torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
+torch = pytest.importorskip(
+    "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
+)
 
 pytestmark = pytest.mark.torch
 
@@ -28,12 +30,18 @@ def test_turns_about_many_points_find_the_map(example, fits):
     errors = example.summary(truth, rich.weights)
     assert example.moved_load(truth, np.full(64, 1 / 64)) > 0.3  # where it starts
     assert errors["moved load"] < 0.2
-    assert errors["centre"] < 2e-4 and errors["radius"] < 0.01 and errors["second moment"] < 0.02
+    assert (
+        errors["centre"] < 2e-4
+        and errors["radius"] < 0.01
+        and errors["second moment"] < 0.02
+    )
 
 
 def test_one_spin_fits_its_wrenches_with_a_wrong_map(example, fits):
     truth, _, poor = fits
-    assert np.sqrt(poor.losses[-1]) < 2.0 * np.sqrt(3) * example.NOISE * example.LAW.mu_c
+    assert (
+        np.sqrt(poor.losses[-1]) < 2.0 * np.sqrt(3) * example.NOISE * example.LAW.mu_c
+    )
     assert example.moved_load(truth, poor.weights) > 0.3
 
 
@@ -41,10 +49,15 @@ def test_torques_about_a_line_do_not_distinguish_mirror_images(example):
     truth = example.true_patch()
     mirrored = pf.ContactPatch.points(truth.positions * [1.0, -1.0], truth.weights())
     for c in np.linspace(-0.02, 0.02, 7):
-        wrenches = [pf.LimitSurfaceCells(patch).wrench((0.0, -3.0 * c, 3.0)) for patch in (truth, mirrored)]
+        wrenches = [
+            pf.LimitSurfaceCells(patch).wrench((0.0, -3.0 * c, 3.0))
+            for patch in (truth, mirrored)
+        ]
         about_c = [wrench[2] - c * wrench[1] for wrench in wrenches]
         assert about_c[0] == pytest.approx(about_c[1], rel=1e-12)
-        assert abs(wrenches[0][0] + wrenches[1][0]) < 1e-12 < abs(wrenches[0][0])  # the force across the line does
+        assert (
+            abs(wrenches[0][0] + wrenches[1][0]) < 1e-12 < abs(wrenches[0][0])
+        )  # the force across the line does
 
 
 def test_it_draws(example, tmp_path, capsys):

@@ -9,8 +9,12 @@ import pytest
 
 from tests.support.repository import script
 
-pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'planarfriction[mujoco]'")
-pytest.importorskip("gymnasium", reason="needs Gymnasium: pip install 'planarfriction[examples]'")
+pytest.importorskip(
+    "mujoco", reason="needs MuJoCo: pip install 'planarfriction[mujoco]'"
+)
+pytest.importorskip(
+    "gymnasium", reason="needs Gymnasium: pip install 'planarfriction[examples]'"
+)
 
 pytestmark = pytest.mark.mujoco
 
@@ -53,7 +57,10 @@ def test_worlds_have_friction_of_their_own(example):
     with contextlib.closing(example.TurnInHand(2)) as env:
         env.reset(seed=0)
         drawn = [env.friction.parameters(m) for m in env.models]
-        assert all(abs(drawn[0][name] - drawn[1][name]).min() > 1e-3 for name in example.FRICTION)
+        assert all(
+            abs(drawn[0][name] - drawn[1][name]).min() > 1e-3
+            for name in example.FRICTION
+        )
         for m, mu in zip(env.models, (1.5, 0.7), strict=True):
             for name, value in (("mu_c", mu), ("mu_s", mu), ("scale", 1.0)):
                 env.friction.parameters(m)[name][:] = value
@@ -65,7 +72,9 @@ def test_worlds_have_friction_of_their_own(example):
 
 
 def test_a_policy_for_patches_fails_with_points_on_the_rim(example):
-    patches, rim, lever = (missed(example, points) for points in example.POINTS.values())
+    patches, rim, lever = (
+        missed(example, points) for points in example.POINTS.values()
+    )
     assert np.median(patches) < 2.0 and patches.max() < 8.0
     assert np.median(rim) > 2.0 * np.median(patches)
     assert np.median(lever) < 2.0
@@ -81,4 +90,7 @@ def test_it_draws(example, tmp_path, capsys):
     example.main(["--out", str(tmp_path), "--rounds", "1", "--worlds", "16"])
     assert (tmp_path / "learn-to-turn.png").stat().st_size > 10_000
     assert (tmp_path / "learn-to-turn.gif").stat().st_size > 10_000
-    assert "on patches, learned with points at the rim: missed by" in capsys.readouterr().out
+    assert (
+        "on patches, learned with points at the rim: missed by"
+        in capsys.readouterr().out
+    )

@@ -24,7 +24,10 @@ def built(tmp_path_factory):
         pytest.skip(f"needs {' and '.join(missing)}")
     folder = tmp_path_factory.mktemp("realtime") / "source"
     shutil.copytree(FOLDER, folder)
-    assert main(["export", str(folder / "model.toml"), "--out", str(folder / "friction")]) == 0
+    assert (
+        main(["export", str(folder / "model.toml"), "--out", str(folder / "friction")])
+        == 0
+    )
     for command in (["cmake", "-S", ".", "-B", "build"], ["cmake", "--build", "build"]):
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
     return folder / "build", read_model(folder / "model.toml", None)
@@ -32,15 +35,22 @@ def built(tmp_path_factory):
 
 def output(built, name):
     """Return the lines that a program prints."""
-    return subprocess.run([built[0] / name], check=True, capture_output=True, text=True).stdout.splitlines()
+    return subprocess.run(
+        [built[0] / name], check=True, capture_output=True, text=True
+    ).stdout.splitlines()
 
 
 def test_loop(built):
     """Speeds and forces are those of the same implicit steps in Python, sticking, sliding and at rest again."""
-    body, dt = pf.SlidingBody(0.2, 1e-4, built[1]), 1e-3
-    state, twist, rows = body.rest(), np.zeros(3), []
+    body = pf.SlidingBody(0.2, 1e-4, built[1])
+    dt = 1e-3
+    state = body.rest()
+    twist = np.zeros(3)
+    rows = []
     for i in range(1000):
-        state, twist, wrench = body.step(state, twist, 2.0, dt, (4e-3 * i if i < 700 else 0.0, 0.0, 0.0))
+        state, twist, wrench = body.step(
+            state, twist, 2.0, dt, (4e-3 * i if i < 700 else 0.0, 0.0, 0.0)
+        )
         if i % 100 == 99:
             rows.append([(i + 1) * dt, twist[0], wrench[0]])
     found = np.array([line.split() for line in output(built, "loop")], float)
@@ -49,7 +59,8 @@ def test_loop(built):
 
 
 def test_contact(built):
-    model, state = built[1], built[1].rest()
+    model = built[1]
+    state = built[1].rest()
     for _ in range(99):  # one of a hundred was broken
         state, wrench = model.step(state, (0.01, 0.0, 1.0), 2.0, 1e-3)
     said, numbers = output(built, "contact")

@@ -9,7 +9,10 @@ import planarfriction as pf
 from tests.support.repository import script
 
 pytest.importorskip("casadi", reason="needs the extra [casadi]")
-pytestmark = [pytest.mark.casadi, pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")]
+pytestmark = [
+    pytest.mark.casadi,
+    pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc"),
+]
 
 
 def test_ipopt_and_the_library_turn_the_plate_alike():
@@ -19,4 +22,6 @@ def test_ipopt_and_the_library_turn_the_plate_alike():
     for end in ends:
         assert float(end.theta) == pytest.approx(example.GOAL, abs=np.radians(0.1))
     slides = [np.array([float(end.x), float(end.y)]) for end in ends]
-    assert np.abs(slides[0] - slides[1]).max() < 2e-4  # 0.03 mm apart along the slide of 1.0 mm
+    assert (
+        np.abs(slides[0] - slides[1]).max() < 2e-4
+    )  # 0.03 mm apart along the slide of 1.0 mm

@@ -23,9 +23,15 @@ from planarfriction_explorer.state import State
 pytestmark = [pytest.mark.slow, pytest.mark.explore]
 
 pytest.importorskip("panel", reason="needs Panel, the extra [explore]")
-playwright = pytest.importorskip("playwright.sync_api", reason="needs Playwright, the extra [browser]")
+playwright = pytest.importorskip(
+    "playwright.sync_api", reason="needs Playwright, the extra [browser]"
+)
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+CHROMIUM = (
+    shutil.which("chromium")
+    or shutil.which("chromium-browser")
+    or shutil.which("google-chrome")
+)
 SOFTWARE_GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 NEXT_ANSWER = """async (before) => {
@@ -66,8 +72,15 @@ BOXES = """(wanted) => {
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    command = [sys.executable, "-c", "import sys; from planarfriction.cli import main; sys.exit(main())", "explore"]
-    with subprocess.Popen([*command, "--no-browser"], stderr=subprocess.PIPE, text=True) as process:
+    command = [
+        sys.executable,
+        "-c",
+        "import sys; from planarfriction.cli import main; sys.exit(main())",
+        "explore",
+    ]
+    with subprocess.Popen(
+        [*command, "--no-browser"], stderr=subprocess.PIPE, text=True
+    ) as process:
         try:
             yield re.search(r"http://localhost:\d+", process.stderr.readline())[0]
         finally:
@@ -77,7 +90,9 @@ def address() -> Iterator[str]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[object]:
     if CHROMIUM is None:
-        pytest.skip("needs Chromium: no chromium, chromium-browser or google-chrome on the path")
+        pytest.skip(
+            "needs Chromium: no chromium, chromium-browser or google-chrome on the path"
+        )
     with playwright.sync_playwright() as driver:
         chromium = driver.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_GL)
         yield chromium
@@ -90,22 +105,36 @@ class Visitor:
     def __init__(self, browser, address: str):
         context = browser.new_context(viewport={"width": 1500, "height": 1100})
         context.grant_permissions(["clipboard-read", "clipboard-write"], origin=address)
-        self.page, self.errors, self.elsewhere = context.new_page(), [], []
+        self.page = context.new_page()
+        self.errors = []
+        self.elsewhere = []
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("request", lambda asked: self.elsewhere.append(asked.url) if self._outside(asked.url) else None)
+        self.page.on(
+            "request",
+            lambda asked: (
+                self.elsewhere.append(asked.url) if self._outside(asked.url) else None
+            ),
+        )
         self.address = address
         self.page.goto(address)
         self.page.wait_for_selector("#answer", timeout=60_000)
 
     def _outside(self, url: str) -> bool:
-        return not url.startswith((self.address, "data:", "blob:", self.address.replace("http", "ws")))
+        return not url.startswith(
+            (self.address, "data:", "blob:", self.address.replace("http", "ws"))
+        )
 
     def text(self) -> str:
         return self.page.locator("#answer").inner_text()
 
     def numbers(self) -> np.ndarray:
         """Wrenches of law, surface and ellipsoid, `[3, 3]` [N, N, N mm]."""
-        return np.array([[float(each) for each in row.split("\t")[1:]] for row in self.text().splitlines()[1:4]])
+        return np.array(
+            [
+                [float(each) for each in row.split("\t")[1:]]
+                for row in self.text().splitlines()[1:4]
+            ]
+        )
 
     def message(self) -> str:
         return self.page.locator("#message").inner_text(timeout=5000)
@@ -140,7 +169,10 @@ class Visitor:
         """The whole ladder once `act` has changed it."""
         act()
         for _ in range(600):
-            whole = self.page.locator("#ladder tr").count() == 6 and "For the patch" in self.status()
+            whole = (
+                self.page.locator("#ladder tr").count() == 6
+                and "For the patch" in self.status()
+            )
             if whole and self.ladder() != before:
                 return self.ladder()
             self.page.wait_for_timeout(200)
@@ -194,10 +226,16 @@ def visitor(browser, address) -> Iterator[Visitor]:
 def test_a_drag_moves_the_centre_of_rotation_to_the_pointer(visitor):
     visitor.after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0), (5.0, -4.0)))
     visitor.page.wait_for_timeout(500)
-    x, y = map(float, re.search(r"rotation: \((.*?), (.*?)\) mm", visitor.text()).groups())
+    x, y = map(
+        float, re.search(r"rotation: \((.*?), (.*?)\) mm", visitor.text()).groups()
+    )
     assert (x, y) == pytest.approx((5.0, -4.0), abs=0.1)  # a pixel is 0.05 mm
-    twist = re.search(r"twist, normal_force = \((.*?), (.*?), 1.0\)", visitor.code()).groups()
-    assert [float(each) for each in twist] == pytest.approx([1e-3 * y, -1e-3 * x], abs=1e-5)
+    twist = re.search(
+        r"twist, normal_force = \((.*?), (.*?), 1.0\)", visitor.code()
+    ).groups()
+    assert [float(each) for each in twist] == pytest.approx(
+        [1e-3 * y, -1e-3 * x], abs=1e-5
+    )
 
 
 def test_a_drag_gives_the_velocity_and_friction_points_against_it(visitor):
@@ -213,10 +251,16 @@ def test_the_section_follows_the_friction_on_the_page(visitor):
     visitor.after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0), (5.0, -4.0)))
     visitor.page.wait_for_timeout(500)
     plot = """Bokeh.index.query_one((each) => each.model.name === "section").model.renderers"""
-    *curves, friction = visitor.page.evaluate(f"{plot}.map(({{data_source: {{data}}}}) => [data.force, data.torque])")
+    *curves, friction = visitor.page.evaluate(
+        f"{plot}.map(({{data_source: {{data}}}}) => [data.force, data.torque])"
+    )
     fx, fy, torque = visitor.numbers()[0]
-    assert np.ravel(friction) == pytest.approx([np.hypot(fx, fy), torque], abs=1e-4)  # four digits are shown
-    assert [np.max(each[0]) for each in curves] == pytest.approx([1.0, 1.0], abs=1e-3)  # N, of mu_c f_N
+    assert np.ravel(friction) == pytest.approx(
+        [np.hypot(fx, fy), torque], abs=1e-4
+    )  # four digits are shown
+    assert [np.max(each[0]) for each in curves] == pytest.approx(
+        [1.0, 1.0], abs=1e-3
+    )  # N, of mu_c f_N
 
 
 def test_a_brush_paints_and_an_eraser_takes_away(visitor):
@@ -224,7 +268,10 @@ def test_a_brush_paints_and_an_eraser_takes_away(visitor):
     visitor.tool("Eraser")
     visitor.after(lambda: visitor.drag((-3.0, 0.0), (3.0, 0.0)))
     visitor.page.wait_for_timeout(1000)
-    assert visitor.says("from_pressure([") and visitor.page.locator(".patch select").input_value() == "own map"
+    assert (
+        visitor.says("from_pressure([")
+        and visitor.page.locator(".patch select").input_value() == "own map"
+    )
     erased = visitor.code()
     visitor.tool("Brush")
     visitor.page.locator(".brush .noUi-handle").press("ArrowRight")
@@ -256,24 +303,38 @@ def test_every_other_control_changes_what_is_said(visitor):
     visitor.after(lambda: visitor.choose("law", "dahl"))
     assert visitor.says("pf.Dahl(") and visitor.page.locator(".parameter").count() == 3
     for name in ("vx", "vy", "omega"):
-        visitor.after(lambda name=name: visitor.page.locator(f".{name} .noUi-handle").press("ArrowRight"))
+        visitor.after(
+            lambda name=name: visitor.page.locator(f".{name} .noUi-handle").press(
+                "ArrowRight"
+            )
+        )
 
 
 def test_a_value_that_breaks_a_rule_is_one_line_and_the_page_goes_on(visitor):
     visitor.fill("mu_s", "0.5")
     assert "mu_s must be >= mu_c" in visitor.message()
-    assert (visitor.boxes(".stale")[:, -1] == 0.3).all() and len(visitor.boxes(".stale")) == 3
+    assert (visitor.boxes(".stale")[:, -1] == 0.3).all() and len(
+        visitor.boxes(".stale")
+    ) == 3
     visitor.after(lambda: visitor.fill("mu_s", "1.5"))
     assert visitor.says("mu_s=1.5") and len(visitor.boxes(".stale")) == 0
 
 
 @pytest.mark.parametrize(
     ("name", "content", "words"),
-    [("pad.txt", b"1", "unknown kind"), ("pad.csv", b"1,x\n", "line 1"), ("pad.png", b"\x89PNG", "not a readable")],
+    [
+        ("pad.txt", b"1", "unknown kind"),
+        ("pad.csv", b"1,x\n", "line 1"),
+        ("pad.png", b"\x89PNG", "not a readable"),
+    ],
 )
-def test_a_wrong_file_is_one_line_and_a_right_one_is_loaded_after_it(visitor, name, content, words):
+def test_a_wrong_file_is_one_line_and_a_right_one_is_loaded_after_it(
+    visitor, name, content, words
+):
     before = visitor.text()
-    visitor.page.locator(".file input").set_input_files({"name": name, "mimeType": "", "buffer": content})
+    visitor.page.locator(".file input").set_input_files(
+        {"name": name, "mimeType": "", "buffer": content}
+    )
     message = visitor.message()
     assert name in message and words in message and visitor.text() == before
     right = {"name": "right.csv", "mimeType": "text/csv", "buffer": b"0,1,0\n1,2,1\n"}
@@ -293,12 +354,18 @@ def test_the_ladder_of_the_models_follows_what_is_on_the_screen(visitor):
     visitor.page.get_by_text("Models", exact=True).click()
     visitor.ladder_after(lambda: None, "")
     before = visitor.ladder()
-    assert [row.split("\t")[0].removeprefix("● ") for row in before.splitlines()[1:]] == list(RUNGS)
+    assert [
+        row.split("\t")[0].removeprefix("● ") for row in before.splitlines()[1:]
+    ] == list(RUNGS)
     after = visitor.ladder_after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0)), before)
     visitor.choose("law", "coulomb-stribeck")
-    while float(after.splitlines()[-1].split("\t")[2]) < 2.0:  # error of the published model, 1 % with the law before
+    while (
+        float(after.splitlines()[-1].split("\t")[2]) < 2.0
+    ):  # error of the published model, 1 % with the law before
         after = visitor.ladder_after(lambda: None, after)
-    assert [float(row.split("\t")[2]) < 2.0 for row in after.splitlines()[2:]] == [True] * 3 + [False]
+    assert [float(row.split("\t")[2]) < 2.0 for row in after.splitlines()[2:]] == [
+        True
+    ] * 3 + [False]
     visitor.page.locator(".clear button").click()
     visitor.page.locator("#ladder").wait_for(state="detached")
 
@@ -306,7 +373,9 @@ def test_the_ladder_of_the_models_follows_what_is_on_the_screen(visitor):
 def test_a_drag_is_not_held_up_by_the_ladder(visitor):
     visitor.page.get_by_text("Models", exact=True).click()
     visitor.page.locator("#ladder").wait_for(timeout=120_000)
-    for step in range(4):  # each begins in the pause in which the models of a new law are made
+    for step in range(
+        4
+    ):  # each begins in the pause in which the models of a new law are made
         visitor.fill("sigma_0", str(2e5 + step))
         visitor.page.wait_for_timeout(400)
         visitor.after(lambda step=step: visitor.drag((0.0, 10.0), (3.0, 5.0 - step)))
@@ -327,10 +396,17 @@ def test_a_scene_is_run_and_watched_while_the_page_goes_on(visitor):
     run.click()
     visitor.after(lambda: visitor.fill("load", "3"))  # meanwhile
     film = visitor.page.frame_locator("#film")
-    picture, slider = film.locator("img"), film.locator("input[type=range]")
+    picture = film.locator("img")
+    slider = film.locator("input[type=range]")
     picture.wait_for(timeout=120_000)
-    assert picture.evaluate("(each) => each.naturalWidth") > 500 and run.inner_text() == "Run"
-    assert visitor.page.locator("#histories").evaluate("(each) => each.naturalWidth") > 1000
+    assert (
+        picture.evaluate("(each) => each.naturalWidth") > 500
+        and run.inner_text() == "Run"
+    )
+    assert (
+        visitor.page.locator("#histories").evaluate("(each) => each.naturalWidth")
+        > 1000
+    )
     visitor.page.wait_for_timeout(1000)
     assert int(slider.input_value()) > 0  # it plays by itself
     film.get_by_title("Pause").click()
@@ -349,7 +425,9 @@ def test_a_scene_file_is_run_as_it_is_and_a_wrong_one_is_one_line(visitor):
     visitor.page.locator(".scene-file input").set_input_files(wrong)
     assert "mine.toml: not valid TOML" in visitor.message()
     text = code.toml(State(law=pf.Dahl(mu_c=0.3))).replace("t_end = 1.0", "t_end = 0.1")
-    visitor.page.locator(".scene-file input").set_input_files({**wrong, "buffer": text.encode()})
+    visitor.page.locator(".scene-file input").set_input_files(
+        {**wrong, "buffer": text.encode()}
+    )
     visitor.page.locator(".model").wait_for(state="hidden")
     assert visitor.page.locator(".scene select").input_value() == "mine.toml"
     visitor.page.locator(".run button").click()
@@ -365,7 +443,9 @@ def test_a_scene_that_cannot_be_run_is_one_line(visitor):
     assert visitor.page.locator(".run button").inner_text() == "Run"
 
 
-def test_a_link_opens_what_was_on_the_screen_and_another_one_replaces_it(visitor, browser):
+def test_a_link_opens_what_was_on_the_screen_and_another_one_replaces_it(
+    visitor, browser
+):
     visitor.after(lambda: visitor.choose("example", "L-shaped foot"))
     visitor.after(lambda: visitor.fill("mass", "70.3"))
     visitor.after(lambda: visitor.choose("law", "dahl"))
@@ -374,8 +454,13 @@ def test_a_link_opens_what_was_on_the_screen_and_another_one_replaces_it(visitor
     visitor.page.wait_for_function("location.hash.length > 100")
     other = Visitor(browser, visitor.address)
     first = other.text()
-    other.after(lambda: other.page.goto(visitor.page.url))  # an address of the same page: no new visit
-    assert other.says("pf.Dahl(", "from_pressure(") and (other.numbers() == visitor.numbers()).all()
+    other.after(
+        lambda: other.page.goto(visitor.page.url)
+    )  # an address of the same page: no new visit
+    assert (
+        other.says("pf.Dahl(", "from_pressure(")
+        and (other.numbers() == visitor.numbers()).all()
+    )
     assert other.page.locator(".mass input").input_value() == "70.3"
     other.after(other.page.locator(".undo button").click)
     assert other.text().splitlines()[:4] == first.splitlines()[:4]
@@ -394,7 +479,9 @@ def test_undo_takes_a_drag_back_at_once(visitor):
     slider = visitor.page.locator(".vx .noUi-handle").bounding_box()
     visitor.page.mouse.move(slider["x"] + 5, slider["y"] + 5)
     visitor.page.mouse.down()
-    visitor.after(lambda: visitor.page.mouse.move(slider["x"] + 40, slider["y"] + 5, steps=10))
+    visitor.after(
+        lambda: visitor.page.mouse.move(slider["x"] + 40, slider["y"] + 5, steps=10)
+    )
     visitor.page.mouse.up()
     visitor.page.wait_for_timeout(500)
     for _ in range(2):
@@ -431,12 +518,19 @@ def test_a_phone_sees_what_is_wrong_at_the_field_and_below(visitor):
     visitor.fill("mu_s", "0.5")
     line, field = visitor.page.locator("#message"), visitor.page.locator(".mu_s")
     line.wait_for()
-    line, field = line.bounding_box(), field.bounding_box()
+    line = line.bounding_box()
+    field = field.bounding_box()
     assert field["height"] > before[3] - before[2] + 20.0  # for the reason
-    assert field["y"] > 0.0 and field["y"] + field["height"] < line["y"] and line["y"] + line["height"] < 800.0
+    assert (
+        field["y"] > 0.0
+        and field["y"] + field["height"] < line["y"]
+        and line["y"] + line["height"] < 800.0
+    )
 
 
-@pytest.mark.parametrize(("width", "height"), [(1280, 720), (800, 900), (400, 800), (360, 740)])
+@pytest.mark.parametrize(
+    ("width", "height"), [(1280, 720), (800, 900), (400, 800), (360, 740)]
+)
 def test_nothing_leaves_its_card_and_sliders_come_first(visitor, width, height):
     visitor.page.set_viewport_size({"width": width, "height": height})
     visitor.page.wait_for_timeout(1000)
@@ -445,7 +539,11 @@ def test_nothing_leaves_its_card_and_sliders_come_first(visitor, width, height):
         visitor.choose("law", kind)
         visitor.page.wait_for_timeout(300)
         marks = visitor.boxes(".bk-description, .bk-TooltipIcon")
-        assert len(marks) > 12 and (marks[:, 0] > marks[:, 4]).all() and (marks[:, 1] < marks[:, 5] - 13.0).all(), kind
+        assert (
+            len(marks) > 12
+            and (marks[:, 0] > marks[:, 4]).all()
+            and (marks[:, 1] < marks[:, 5] - 13.0).all()
+        ), kind
     tabs = visitor.boxes(".bk-tab")
     assert len(tabs) == 5 and (tabs[:, 1] < tabs[:, 5]).all()
     code = visitor.page.locator(".python textarea")
@@ -453,25 +551,53 @@ def test_nothing_leaves_its_card_and_sliders_come_first(visitor, width, height):
 
 
 def test_the_lesson_has_the_numbers_of_the_library_offline(browser):
-    page, errors, asked = browser.new_page(), [], []
+    page = browser.new_page()
+    errors = []
+    asked = []
     page.on("pageerror", lambda error: errors.append(str(error)))
     page.on("request", lambda one: asked.append(one.url))
     page.goto((Path(__file__).parents[2] / "docs" / "static" / "lesson.html").as_uri())
-    patches = {"disc": pf.ContactPatch.disc(0.01), "square": pf.ContactPatch.rectangle(0.02, 0.02)}
+    patches = {
+        "disc": pf.ContactPatch.disc(0.01),
+        "square": pf.ContactPatch.rectangle(0.02, 0.02),
+    }
     hertz = pf.patch.SoftFinger(c=0.01, n=0.0, k=2.0)
-    patches["soft fingertip (Hertz)"] = pf.ContactPatch.disc(0.01, cells=41, pressure=hertz)
+    patches["soft fingertip (Hertz)"] = pf.ContactPatch.disc(
+        0.01, cells=41, pressure=hertz
+    )
     for name, patch in patches.items():
-        for twist in ((0.01, 0.0, 2.0), (-0.02, 0.03, 1.0), (0.0, 0.0, -1.0), (0.02, 0.01, 0.0)):
-            for one, surface in (("wrench", pf.LimitSurfaceExact), ("ellipsoid", pf.LimitSurfaceEllipsoid)):
+        for twist in (
+            (0.01, 0.0, 2.0),
+            (-0.02, 0.03, 1.0),
+            (0.0, 0.0, -1.0),
+            (0.02, 0.01, 0.0),
+        ):
+            for one, surface in (
+                ("wrench", pf.LimitSurfaceExact),
+                ("ellipsoid", pf.LimitSurfaceEllipsoid),
+            ):
                 expected = np.divide(surface(patch).wrench(twist), [1.0, 1.0, 0.01])
                 found = page.evaluate(f"{one}(patch({name!r}), {list(twist)})")
-                np.testing.assert_allclose(np.divide(found, [1.0, 1.0, 0.01]), expected, atol=2e-3, err_msg=name)
+                np.testing.assert_allclose(
+                    np.divide(found, [1.0, 1.0, 0.01]),
+                    expected,
+                    atol=2e-3,
+                    err_msg=name,
+                )
     page.locator("#load").fill("2")
     page.locator("#shape").select_option("square")
-    shown = [float(each) for each in page.locator("#numbers tr").nth(1).inner_text().split("\t")[1:]]
-    assert shown == pytest.approx(np.multiply(page.evaluate("wrench(shown, [0.01, 0, 2])"), [2.0, 2.0, 2e3]), abs=1e-3)
+    shown = [
+        float(each)
+        for each in page.locator("#numbers tr").nth(1).inner_text().split("\t")[1:]
+    ]
+    assert shown == pytest.approx(
+        np.multiply(page.evaluate("wrench(shown, [0.01, 0, 2])"), [2.0, 2.0, 2e3]),
+        abs=1e-3,
+    )
     time, speed, spin = page.evaluate("rest(shown, [0.01, 0, 2], 1)").pop()
-    assert max(speed, spin) < 0.02 * 0.02 and 1.0 < 9.81 * time / 0.01 < 3.0  # later than v/(mu g), as it spins
+    assert (
+        max(speed, spin) < 0.02 * 0.02 and 1.0 < 9.81 * time / 0.01 < 3.0
+    )  # later than v/(mu g), as it spins
     page.close()
     assert errors == [] and len(asked) == 1
 
@@ -492,14 +618,21 @@ def test_nobody_else_in_the_network_can_reach_it(address):
     port = int(address.rpartition(":")[2])
     with socket.create_connection(("127.0.0.1", port), timeout=5):
         pass
-    others = {each[4][0] for each in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+    others = {
+        each[4][0]
+        for each in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)
+    }
     for host in (others | {"127.0.0.2"}) - {"127.0.0.1"}:
         with pytest.raises(OSError), socket.create_connection((host, port), timeout=5):
             pass
 
 
 def test_pages_of_other_sites_are_refused(address):
-    headers = {"Origin": "http://example.org", "Upgrade": "websocket", "Connection": "Upgrade"}
+    headers = {
+        "Origin": "http://example.org",
+        "Upgrade": "websocket",
+        "Connection": "Upgrade",
+    }
     headers |= {
         "Sec-WebSocket-Version": "13",
         "Sec-WebSocket-Protocol": "bokeh, none",

@@ -12,17 +12,34 @@ from planarfriction.errors import FrictionError
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_explorer.drawing import MOST_SIDE, Drawing
-from planarfriction_explorer.state import MOST_TEXT, State, answer, from_link, to_json, to_link
+from planarfriction_explorer.state import (
+    MOST_TEXT,
+    State,
+    answer,
+    from_link,
+    to_json,
+    to_link,
+)
 
-PAINTED = Drawing.published("Square").painted(0.004, 0.002, radius=0.003, pressure=0.1 + 0.2)
+PAINTED = Drawing.published("Square").painted(
+    0.004, 0.002, radius=0.003, pressure=0.1 + 0.2
+)
 
 
-@pytest.mark.parametrize("drawing", [*map(Drawing.published, PUBLISHED_PATCHES), PAINTED, PAINTED.cleared()])
+@pytest.mark.parametrize(
+    "drawing", [*map(Drawing.published, PUBLISHED_PATCHES), PAINTED, PAINTED.cleared()]
+)
 def test_a_state_comes_back_from_its_link_to_the_last_bit(drawing):
-    state = State(drawing, pf.Dahl(mu_c=0.3), 0.1 + 0.2, (1 / 3, -0.0, 1e-7), 0.07, -0.02)
+    state = State(
+        drawing, pf.Dahl(mu_c=0.3), 0.1 + 0.2, (1 / 3, -0.0, 1e-7), 0.07, -0.02
+    )
     text = to_link(state)
     found = from_link(text)
-    assert to_link(found) == text and " " not in text and found.drawing.name == drawing.name
+    assert (
+        to_link(found) == text
+        and " " not in text
+        and found.drawing.name == drawing.name
+    )
     np.testing.assert_array_equal(found.drawing.pressures, drawing.pressures)
     if drawing.pressures.any():
         np.testing.assert_array_equal(answer(found).points, answer(state).points)
@@ -30,7 +47,11 @@ def test_a_state_comes_back_from_its_link_to_the_last_bit(drawing):
 
 @pytest.mark.parametrize("kind", LAWS)
 def test_every_law_comes_back_from_its_link(kind):
-    for law in (State().with_law(kind).law, State().with_law(kind, mu_c=0.3).law, pf.LuGre(sigma_1=0.0)):
+    for law in (
+        State().with_law(kind).law,
+        State().with_law(kind, mu_c=0.3).law,
+        pf.LuGre(sigma_1=0.0),
+    ):
         assert from_link(to_link(State(law=law))).law == law
 
 
@@ -74,14 +95,21 @@ def patch(**values: object) -> str:
         (patch(pressures=[[-1.0]]), "pressures must be >= 0"),
         (patch(pressures=[[1.0], [1.0, 2.0]]), "rows of equal length"),
         (patch(pressures=[[]]), f"have from 1 to {MOST_SIDE} rows and columns"),
-        (patch(pressures=[[1.0] * (MOST_SIDE + 1)]), f"have from 1 to {MOST_SIDE} rows and columns"),
+        (
+            patch(pressures=[[1.0] * (MOST_SIDE + 1)]),
+            f"have from 1 to {MOST_SIDE} rows and columns",
+        ),
         (patch(pressures=[1.0]), "pressures must have shape [any, any]"),
     ],
 )
 def test_a_link_that_was_tampered_with_is_one_line(text, words):
     with pytest.raises(FrictionError) as error:
         from_link(text)
-    assert words in str(error.value) and "\n" not in str(error.value) and len(str(error.value)) < 500
+    assert (
+        words in str(error.value)
+        and "\n" not in str(error.value)
+        and len(str(error.value)) < 500
+    )
 
 
 def test_a_link_without_end_is_refused_before_it_is_read():

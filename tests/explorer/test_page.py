@@ -45,15 +45,30 @@ def shown(page: Page) -> np.ndarray:
 def test_what_stands_on_the_page_is_the_answer_to_what_is_set(page):
     page.controls.patch.value = "NonConvex2"
     page.controls.load.value = 2.5
-    page.controls.vx.value, page.controls.vy.value = 10.0, -7.0
+    page.controls.vx.value = 10.0
+    page.controls.vy.value = -7.0
     page.controls.omega.value = -2.0
-    assert page.state.twist == pytest.approx((0.01, -0.007, -2.0)) and page.state.normal_force == 2.5
+    assert (
+        page.state.twist == pytest.approx((0.01, -0.007, -2.0))
+        and page.state.normal_force == 2.5
+    )
     found = answer(page.state)
-    wrenches = np.stack([found.friction, found.surface, found.ellipsoid]) * [1.0, 1.0, 1e3]
-    np.testing.assert_allclose(shown(page), wrenches, atol=5e-5)  # four digits are shown
-    assert f"{found.force_error:.3f}" in page.numbers.object and f"{found.angle_error:.1f}°" in page.numbers.object
+    wrenches = np.stack([found.friction, found.surface, found.ellipsoid]) * [
+        1.0,
+        1.0,
+        1e3,
+    ]
+    np.testing.assert_allclose(
+        shown(page), wrenches, atol=5e-5
+    )  # four digits are shown
+    assert (
+        f"{found.force_error:.3f}" in page.numbers.object
+        and f"{found.angle_error:.1f}°" in page.numbers.object
+    )
     x, y = 1e3 * np.array(page.state.centre_of_rotation)
-    assert (x, y) == pytest.approx((-3.5, -5.0)) and f"({x:.2f}, {y:.2f}) mm" in page.numbers.object
+    assert (x, y) == pytest.approx(
+        (-3.5, -5.0)
+    ) and f"({x:.2f}, {y:.2f}) mm" in page.numbers.object
 
 
 def test_a_drag_over_the_map_does_what_the_tool_says(page):
@@ -61,7 +76,9 @@ def test_a_drag_over_the_map_does_what_the_tool_says(page):
     assert page.state.centre_of_rotation == pytest.approx((0.003, -0.004))
     page.controls.tool.value = "slide"
     page._follow_to(0.0, 0.005)
-    assert page.state.twist[:2] == pytest.approx((0.0, 0.05)) and page.controls.vy.value == pytest.approx(50.0)
+    assert page.state.twist[:2] == pytest.approx(
+        (0.0, 0.05)
+    ) and page.controls.vy.value == pytest.approx(50.0)
     page.controls.tool.value = "erase"
     page._dragged(0.0, 0.0)
     assert page.state.drawing.origin == "drawn" and page.controls.patch.value == OWN
@@ -70,10 +87,17 @@ def test_a_drag_over_the_map_does_what_the_tool_says(page):
 
 def test_a_file_is_loaded_and_a_wrong_one_leaves_the_map_as_it_is(page):
     before = page.state.drawing
-    page.controls.file.filename, page.controls.file.value = "pad.csv", b"1,x\n"
-    assert "pad.csv: line 1" in page.message.object and page.message.visible and page.state.drawing is before
+    page.controls.file.filename = "pad.csv"
+    page.controls.file.value = b"1,x\n"
+    assert (
+        "pad.csv: line 1" in page.message.object
+        and page.message.visible
+        and page.state.drawing is before
+    )
     page.controls.file.value = b"0,1\n2,0\n"
-    np.testing.assert_array_equal(page.state.drawing.pressures, [[0.0, 1.0], [2.0, 0.0]])
+    np.testing.assert_array_equal(
+        page.state.drawing.pressures, [[0.0, 1.0], [2.0, 0.0]]
+    )
     assert page.state.drawing.width == pytest.approx(before.width)
     assert "2 x 2 cells of 10 mm" in page.message.object and page.message.visible
 
@@ -83,22 +107,40 @@ def test_a_law_has_its_fields_and_a_value_that_breaks_a_rule_is_one_line(page):
     assert list(page.controls.law_values()) == ["mu_c", "sigma_0", "reference_load"]
     law = page.state.law
     page.controls.parameters[0].value = -1.0
-    assert "mu_c must be &gt; 0" in page.message.object and page.message.visible and page.state.law is law
+    assert (
+        "mu_c must be &gt; 0" in page.message.object
+        and page.message.visible
+        and page.state.law is law
+    )
     page.controls.parameters[0].value = 0.4
     assert page.state.law.mu_c == 0.4 and not page.message.visible
 
 
 def test_a_refused_value_is_told_at_its_field_beside_pale_results(page):
     page.layout()
-    static, mass = page.controls.parameters[1], page.controls.mass
+    static = page.controls.parameters[1]
+    mass = page.controls.mass
     static.value = 0.5
-    assert "mu_s must be >= mu_c, got mu_s=0.5, mu_c=1.0" in static.stylesheets[0] and "Pale" in page.message.object
-    assert len(page.cards) == 3 and all(each.css_classes == ["stale"] for each in page.cards)
+    assert (
+        "mu_s must be >= mu_c, got mu_s=0.5, mu_c=1.0" in static.stylesheets[0]
+        and "Pale" in page.message.object
+    )
+    assert len(page.cards) == 3 and all(
+        each.css_classes == ["stale"] for each in page.cards
+    )
     page.controls.parameters[0].value = 2.0  # refused too, and now the culprit
-    assert static.stylesheets == [] and "mu_c=2.0" in page.controls.parameters[0].stylesheets[0]
+    assert (
+        static.stylesheets == []
+        and "mu_c=2.0" in page.controls.parameters[0].stylesheets[0]
+    )
     page._try(lambda: page._follow_to(0.003, -0.004))
-    assert [each.value for each in page.controls.parameters[:2]] == [1.0, 1.2]  # those of the results
-    assert page.controls.parameters[0].stylesheets == [] and not any(each.css_classes for each in page.cards)
+    assert [each.value for each in page.controls.parameters[:2]] == [
+        1.0,
+        1.2,
+    ]  # those of the results
+    assert page.controls.parameters[0].stylesheets == [] and not any(
+        each.css_classes for each in page.cards
+    )
     mass.value = -1.0
     assert "mass must be > 0" in mass.stylesheets[0]
     page.controls.clear.clicks += 1
@@ -112,19 +154,30 @@ def test_a_law_that_is_chosen_again_has_its_values(page):
     page.controls.law.value = "dahl"
     page.controls.parameters[0].value = 0.4
     page.controls.law.value = "lugre"
-    assert page.state.law == first and first.mu_s == 1.2 and first.elasto_plastic is not None
+    assert (
+        page.state.law == first
+        and first.mu_s == 1.2
+        and first.elasto_plastic is not None
+    )
     assert page.controls.law_values()["mu_s"] == 1.2
     page.controls.law.value = "dahl"
     assert page.state.law.mu_c == 0.4
 
 
 def test_the_page_says_whether_a_part_is_held_with_its_mass_and_friction(page):
-    page.controls.mass.value, page.controls.lever.value = 80.0, 5.0
+    page.controls.mass.value = 80.0
+    page.controls.lever.value = 5.0
     page._show_slow()
     weight = 0.04 * 9.81
-    needed = holding_load((0.0, -weight, -0.005 * weight), page.state.drawing.patch, page.state.law.mu_s)
-    assert f"<b>{needed:.3g} N</b>" in page.grid.object and "<b>holds</b>" in page.grid.object
-    page.controls.parameters[0].value, page.controls.parameters[1].value = 0.2, 0.2
+    needed = holding_load(
+        (0.0, -weight, -0.005 * weight), page.state.drawing.patch, page.state.law.mu_s
+    )
+    assert (
+        f"<b>{needed:.3g} N</b>" in page.grid.object
+        and "<b>holds</b>" in page.grid.object
+    )
+    page.controls.parameters[0].value = 0.2
+    page.controls.parameters[1].value = 0.2
     page._show_slow()
     assert "slips</span>" in page.grid.object
     page.controls.mass.value = -1.0
@@ -133,8 +186,16 @@ def test_the_page_says_whether_a_part_is_held_with_its_mass_and_friction(page):
 
 def test_each_control_says_what_it_is_in_the_unit_of_its_label(page):
     rows = page.layout().select(pn.Row)
-    icons = {row[0]: row[1].value for row in rows if isinstance(row[1], pn.widgets.TooltipIcon)}
-    found = [each for name, each in vars(page.controls).items() if isinstance(each, pn.widgets.base.Widget)]
+    icons = {
+        row[0]: row[1].value
+        for row in rows
+        if isinstance(row[1], pn.widgets.TooltipIcon)
+    }
+    found = [
+        each
+        for name, each in vars(page.controls).items()
+        if isinstance(each, pn.widgets.base.Widget)
+    ]
     for kind in LAWS:
         page.controls.law.value = kind
         found += page.controls.parameters
@@ -142,26 +203,52 @@ def test_each_control_says_what_it_is_in_the_unit_of_its_label(page):
         words = getattr(each, "description", None) or icons[each]
         unit = re.search(r"\[[^]]+\]", each.label or "")
         assert len(words) > 5 and (unit is None or unit[0] in words), each.label
-    assert "Stribeck speed [m/s]" in {each.label: each.description for each in found if each.tags}["v_s [m/s]"]
+    assert (
+        "Stribeck speed [m/s]"
+        in {each.label: each.description for each in found if each.tags}["v_s [m/s]"]
+    )
 
 
-OTHER = State(Drawing(np.ones((2, 3)), 2e-3), Dahl(mu_c=0.3), 2.5, (0.01, -0.02, 3.0), 0.0703, -0.004)
+OTHER = State(
+    Drawing(np.ones((2, 3)), 2e-3),
+    Dahl(mu_c=0.3),
+    2.5,
+    (0.01, -0.02, 3.0),
+    0.0703,
+    -0.004,
+)
 
 
 def test_another_state_sets_every_control(page):
     page._follow_link(to_link(OTHER))
     controls = page.controls
-    assert to_json(page.state) == to_json(OTHER) and controls.patch.value == OWN and controls.law.value == "dahl"
-    found = [getattr(controls, name).value for name in ("cell_size", "load", "mass", "lever", "vx", "vy", "omega")]
-    assert found == [2.0, 2.5, 70.3, -4.0, 10.0, -20.0, 3.0] and controls.law_values()["mu_c"] == 0.3
-    np.testing.assert_allclose(shown(page)[1], answer(OTHER).surface * [1.0, 1.0, 1e3], atol=5e-5)
+    assert (
+        to_json(page.state) == to_json(OTHER)
+        and controls.patch.value == OWN
+        and controls.law.value == "dahl"
+    )
+    found = [
+        getattr(controls, name).value
+        for name in ("cell_size", "load", "mass", "lever", "vx", "vy", "omega")
+    ]
+    assert (
+        found == [2.0, 2.5, 70.3, -4.0, 10.0, -20.0, 3.0]
+        and controls.law_values()["mu_c"] == 0.3
+    )
+    np.testing.assert_allclose(
+        shown(page)[1], answer(OTHER).surface * [1.0, 1.0, 1e3], atol=5e-5
+    )
     assert "mu_c=0.3" in page.python.value and page.controls.example.value == CHANGED
 
 
 def test_a_link_that_holds_no_state_leaves_the_page_as_it_is(page):
     before = page.state
     page._try(lambda: page._follow_link("#%7B%22mass%22:-1%7D"))
-    assert "mass must be &gt; 0" in page.message.object and page.message.visible and page.state is before
+    assert (
+        "mass must be &gt; 0" in page.message.object
+        and page.message.visible
+        and page.state is before
+    )
     page._try(lambda: page._follow_link(""))
     assert page.state is before and page.controls.undo.disabled
 
@@ -169,11 +256,16 @@ def test_a_link_that_holds_no_state_leaves_the_page_as_it_is(page):
 @pytest.mark.parametrize("name", PRESETS)
 def test_an_example_is_shown_until_something_is_changed(page, name):
     page.controls.example.value = name
-    assert page.state is PRESETS[name] and shown(page).any() and not page.message.visible
+    assert (
+        page.state is PRESETS[name] and shown(page).any() and not page.message.visible
+    )
     page.controls.mass.value = 77.0
     assert page.controls.example.value == CHANGED and page.state.mass == 0.077
     page.controls.undo.clicks += 1
-    assert page.controls.example.value == name and page.controls.mass.value == pytest.approx(1e3 * page.state.mass)
+    assert (
+        page.controls.example.value == name
+        and page.controls.mass.value == pytest.approx(1e3 * page.state.mass)
+    )
 
 
 def test_undo_goes_back_step_by_step_and_a_drag_is_one(page):
@@ -184,7 +276,10 @@ def test_undo_goes_back_step_by_step_and_a_drag_is_one(page):
                 page._dragged(x, 0.0)
             else:
                 page._follow()
-                page._pointer = (x, 0.0)  # which `_dragged` leaves to be followed in the next tick
+                page._pointer = (
+                    x,
+                    0.0,
+                )  # which `_dragged` leaves to be followed in the next tick
         page._released()
 
     states = [page.state]
@@ -212,13 +307,18 @@ def test_undo_leaves_the_empty_map_and_brings_the_law_back(page):
     page.controls.undo.clicks += 1
     assert shown(page).any() and not page.message.visible
     page.controls.undo.clicks += 1
-    assert page.state.law is law and page.controls.law.value == "lugre" and page.controls.law_values()["mu_s"] == 1.2
+    assert (
+        page.state.law is law
+        and page.controls.law.value == "lugre"
+        and page.controls.law_values()["mu_s"] == 1.2
+    )
 
 
 def test_a_page_that_nobody_holds_is_freed():
     one = Page()
     one.controls.mass.value = 77.0
-    layout, kept = one.layout(), weakref.ref(one)
+    layout = one.layout()
+    kept = weakref.ref(one)
     del one, layout
     gc.collect()
     assert kept() is None
@@ -226,48 +326,82 @@ def test_a_page_that_nobody_holds_is_freed():
 
 def test_an_empty_map_leaves_no_numbers_of_another_one(page):
     page.controls.clear.clicks += 1
-    assert "Nothing presses" in page.message.object and page.controls.tool.value == "brush"
+    assert (
+        "Nothing presses" in page.message.object and page.controls.tool.value == "brush"
+    )
     assert page.numbers.object == page.grid.object == page.python.value == ""
     assert not page.surface.visible and not page.section.layout.visible
     page.controls.patch.value = "Line"
-    assert shown(page).any() and page.surface.visible and page.section.layout.visible and "'Line'" in page.python.value
+    assert (
+        shown(page).any()
+        and page.surface.visible
+        and page.section.layout.visible
+        and "'Line'" in page.python.value
+    )
     assert str(page.state.drawing.patch.grid_error()) in page.grid.object
 
 
 def test_a_scene_file_is_offered_and_a_wrong_one_is_one_line(page):
     scenes = page.scenes
-    scenes.file.filename, scenes.file.value = "mine.toml", b"t_end ="
-    assert "mine.toml: not valid TOML" in page.message.object and scenes.scene.value == "in-hand"
+    scenes.file.filename = "mine.toml"
+    scenes.file.value = b"t_end ="
+    assert (
+        "mine.toml: not valid TOML" in page.message.object
+        and scenes.scene.value == "in-hand"
+    )
     scenes.file.value = page.toml.value.encode()
-    assert scenes.scene.value == "mine.toml" and not scenes.model.visible and not page.message.visible
+    assert (
+        scenes.scene.value == "mine.toml"
+        and not scenes.model.visible
+        and not page.message.visible
+    )
     scenes.scene.value = "free-slide"
     assert scenes.model.visible
 
 
 def test_the_map_has_room_around_it_and_shows_each_picture():
     places: list[tuple[float, float] | str] = []
-    view = MapView(lambda x, y: places.append((x, y)), lambda: places.append("released"))
+    view = MapView(
+        lambda x, y: places.append((x, y)), lambda: places.append("released")
+    )
     view.draw(OTHER.drawing)
-    assert [(axis.start, axis.end) for axis in (view.figure.x_range, view.figure.y_range)] == [
-        (pytest.approx(-3.6), pytest.approx(3.6))
-    ] * 2  # 0.6 of 6 mm x 4 mm
+    assert [
+        (axis.start, axis.end) for axis in (view.figure.x_range, view.figure.y_range)
+    ] == [(pytest.approx(-3.6), pytest.approx(3.6))] * 2  # 0.6 of 6 mm x 4 mm
     view.move(OTHER, found := answer(OTHER))
     shown = {name: dict(source.data) for name, source in view._sources.items()}
-    assert shown["slip"] == pictures.slip_arrows(OTHER) and shown["wrench"] == pictures.wrench_arrows(OTHER, found)
-    assert shown["centre"] == pictures.points_of_interest(OTHER) and "image" in shown["map"]
-    for event in (events.Pan(view.figure, x=2.0, y=-1.0), events.Tap(view.figure, x=3.0, y=4.0)):
+    assert shown["slip"] == pictures.slip_arrows(OTHER) and shown[
+        "wrench"
+    ] == pictures.wrench_arrows(OTHER, found)
+    assert (
+        shown["centre"] == pictures.points_of_interest(OTHER)
+        and "image" in shown["map"]
+    )
+    for event in (
+        events.Pan(view.figure, x=2.0, y=-1.0),
+        events.Tap(view.figure, x=3.0, y=4.0),
+    ):
         view.figure._trigger_event(event)
-    assert places[:2] == [pytest.approx((0.002, -0.001)), pytest.approx((0.003, 0.004))] and places[2:] == ["released"]
+    assert places[:2] == [
+        pytest.approx((0.002, -0.001)),
+        pytest.approx((0.003, 0.004)),
+    ] and places[2:] == ["released"]
 
 
 def test_the_section_is_that_of_the_friction_or_is_not_seen():
-    view, found = SectionView(), answer(OTHER)
+    view = SectionView()
+    found = answer(OTHER)
     view.move(OTHER, found)
     angle, lines = pictures.section_lines(OTHER, found)
-    assert view._plot.xaxis[0].axis_label == f"force at {angle:.0f}° to x [N]" and view.layout.visible
+    assert (
+        view._plot.xaxis[0].axis_label == f"force at {angle:.0f}° to x [N]"
+        and view.layout.visible
+    )
     for name, points in lines.items():
         data = view._sources[name].data
-        np.testing.assert_array_equal(np.stack([data["force"], data["torque"]], -1), points)
+        np.testing.assert_array_equal(
+            np.stack([data["force"], data["torque"]], -1), points
+        )
     view.move(OTHER, None)
     assert not view.layout.visible
 
@@ -280,7 +414,8 @@ class Document:
 
     def __init__(self):
         self.session_context = self
-        self.destroyed, self.told = False, []
+        self.destroyed = False
+        self.told = []
 
     def add_next_tick_callback(self, act: Any) -> None:
         self.told.append(act)
@@ -296,13 +431,19 @@ def document(monkeypatch) -> Document:
 def finished() -> None:
     """Wait for the threads of work."""
     for each in threading.enumerate():
-        if each is not threading.current_thread() and each.daemon and "run" in each.name:
+        if (
+            each is not threading.current_thread()
+            and each.daemon
+            and "run" in each.name
+        ):
             each.join(10.0)
 
 
 def test_a_new_wish_gives_up_the_last_one_and_what_it_said_too_late(document):
     said: list[str] = []
-    live, go_on, ends = Live(said.append), threading.Event(), []
+    live = Live(said.append)
+    go_on = threading.Event()
+    ends = []
 
     def first(task: Any) -> None:
         task.tell(said.append, "first")
@@ -350,7 +491,10 @@ def test_the_server_is_local_and_a_taken_port_is_one_line():
         addresses = {each.getsockname()[0] for each in server._http._sockets.values()}
         assert addresses == {"127.0.0.1"}
         # Tornado leaves the socket that found no port to the garbage collector, which warns.
-        with warnings.catch_warnings(), pytest.raises(InvalidValueError, match="port must be free"):
+        with (
+            warnings.catch_warnings(),
+            pytest.raises(InvalidValueError, match="port must be free"),
+        ):
             warnings.simplefilter("ignore", ResourceWarning)
             open_server(server.port)
             gc.collect()
@@ -369,7 +513,9 @@ def test_a_server_leaves_ctrl_c_as_it_was():
 def test_pages_of_other_sites_are_not_let_in():
     server = open_server(0)
     try:
-        assert server._tornado.websocket_origins == {f"{host}:{server.port}" for host in ("localhost", "127.0.0.1")}
+        assert server._tornado.websocket_origins == {
+            f"{host}:{server.port}" for host in ("localhost", "127.0.0.1")
+        }
     finally:
         server.stop()
 
@@ -384,7 +530,11 @@ def test_both_names_of_this_computer_open_a_socket():
     answers = {}
 
     async def knock():
-        for origin in (f"http://localhost:{server.port}", f"http://127.0.0.1:{server.port}", "http://example.org"):
+        for origin in (
+            f"http://localhost:{server.port}",
+            f"http://127.0.0.1:{server.port}",
+            "http://example.org",
+        ):
             # Of another host: from 6.6 on Tornado itself lets in an origin that is the host.
             headers = {"Origin": origin, "Host": f"another:{server.port}"}
             request = HTTPRequest(f"ws://127.0.0.1:{server.port}/ws", headers=headers)

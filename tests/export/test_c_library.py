@@ -11,7 +11,19 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import parameter_names, parameters_of, rollout_vjp
-from tests.support.c_libraries import DISC, FIXED, KINDS, LAW, MODELS, STRICT, VECTOR, library, run, run_steady, samples
+from tests.support.c_libraries import (
+    DISC,
+    FIXED,
+    KINDS,
+    LAW,
+    MODELS,
+    STRICT,
+    VECTOR,
+    library,
+    run,
+    run_steady,
+    samples,
+)
 from tests.support.rate_laws import BoucWen
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
@@ -29,7 +41,8 @@ def misfit(name, precision, count, seed=0):
     new, wrench = made.model.step(*inputs)
     found, pressed = run(made, inputs)
     # damping alone gives 100 f_N at 0.3 m/s: so the errors stand beside the largest wrench of all samples
-    lever, load = np.array([1.0, 1.0, made.model.patch.contact_radius()]), inputs[2]
+    lever = np.array([1.0, 1.0, made.model.patch.contact_radius()])
+    load = inputs[2]
     per_load = 1.0 / lever / np.maximum(load, 1e-9)[:, None]
     off = np.abs(pressed - wrench) * per_load / np.abs(wrench * per_load).max()
     assert np.all(found[load == 0.0] == 0.0) and np.all(pressed[load == 0.0] == 0.0)
@@ -49,19 +62,33 @@ def test_steps(name, precision):
 @pytest.mark.parametrize("name", ["discs", "turned discs"])
 def test_all_speeds(name, precision):
     """Steps from rest, and from deflections as faint, are numbers at any speed, and those of the model."""
-    made, rng = library(name, precision), np.random.default_rng(2)
+    made = library(name, precision)
+    rng = np.random.default_rng(2)
     speed = 10.0 ** np.repeat(np.arange(-30.0, 4.0), 12)
     twist = speed[:, None] * rng.normal(size=(len(speed), 3)) * [1.0, 1.0, 150.0]
-    twist[::4, 2], twist[1::4, :2] = 0.0, 0.0
-    state = np.minimum(speed, 1e-6)[:, None, None] * rng.normal(size=(len(speed), *made.model.state_shape))
+    twist[::4, 2] = 0.0
+    twist[1::4, :2] = 0.0
+    state = np.minimum(speed, 1e-6)[:, None, None] * rng.normal(
+        size=(len(speed), *made.model.state_shape)
+    )
     state[::3] = 0.0
-    inputs = [each.astype(made.kind).astype(float) for each in (state, twist, np.ones_like(speed), speed * 0.0 + 1e-4)]
+    inputs = [
+        each.astype(made.kind).astype(float)
+        for each in (state, twist, np.ones_like(speed), speed * 0.0 + 1e-4)
+    ]
     found, pressed, slopes = run(made, inputs, slopes=True)
     new, wrench = made.model.step(*inputs)
     assert all(np.isfinite(slopes[field]).all() for field in slopes.dtype.names)
-    off, scale = np.abs(pressed - wrench) * [1.0, 1.0, 100.0], np.abs(wrench * [1.0, 1.0, 100.0])
-    assert np.all(off.max(axis=1) <= (1e-11 if precision == "double" else 1e-3) * scale.max(axis=1))
-    assert np.abs(found - new).max() < (1e-11 if precision == "double" else 1e-4) * LAW.largest_deflection
+    off = np.abs(pressed - wrench) * [1.0, 1.0, 100.0]
+    scale = np.abs(wrench * [1.0, 1.0, 100.0])
+    assert np.all(
+        off.max(axis=1)
+        <= (1e-11 if precision == "double" else 1e-3) * scale.max(axis=1)
+    )
+    assert (
+        np.abs(found - new).max()
+        < (1e-11 if precision == "double" else 1e-4) * LAW.largest_deflection
+    )
 
 
 @pytest.mark.slow
@@ -70,7 +97,10 @@ def test_all_speeds(name, precision):
 def test_a_million_steps(name, precision):
     errors = [misfit(name, precision, 10_000, seed) for seed in range(100)]
     of_wrenches = np.concatenate([each for _, each in errors])
-    print(f"\n{name} {precision}: {max(each for each, _ in errors):.1e} {of_wrenches.max():.1e}", end=" ")
+    print(
+        f"\n{name} {precision}: {max(each for each, _ in errors):.1e} {of_wrenches.max():.1e}",
+        end=" ",
+    )
     print(f"{np.quantile(of_wrenches, 0.999):.1e}")
     assert of_wrenches.max() < (1e-12 if precision == "double" else 1e-3)
     assert np.quantile(of_wrenches, 0.999) < (1e-12 if precision == "double" else 1e-5)
@@ -84,9 +114,14 @@ def test_steady_sliding(name):
     state = np.zeros((300, *made.model.state_shape))
     for _ in range(3):
         state, wrench = made.model.step(state, twist, load, 3600.0)
-    found, moves = run_steady(made, twist, load), twist.any(axis=1)
+    found = run_steady(made, twist, load)
+    moves = twist.any(axis=1)
     assert np.all(found[~moves] == 0.0)
-    off = np.abs(found - wrench)[moves] / np.maximum(load, 1e-9)[moves, None] / [1.0, 1.0, 0.01]
+    off = (
+        np.abs(found - wrench)[moves]
+        / np.maximum(load, 1e-9)[moves, None]
+        / [1.0, 1.0, 0.01]
+    )
     assert off.max() < 1e-9
 
 
@@ -108,31 +143,47 @@ def test_slopes(name):
     inputs[2][::25] = 0.0
     found, pressed, slopes = run(made, inputs, slopes=True)
     for one, other in zip((found, pressed), run(made, inputs), strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())
-    exact, per_load = made.model.step_jacobians(*inputs), 1.0 / np.maximum(inputs[2], 1e-9)
+        np.testing.assert_allclose(
+            one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max()
+        )
+    exact = made.model.step_jacobians(*inputs)
+    per_load = 1.0 / np.maximum(inputs[2], 1e-9)
     for field in exact._fields:
         if field == "state_load" and name not in FIXED:  # zero, and not exported
             continue
         own = slopes[field]
-        scale = per_load if field.startswith("wrench") and field != "wrench_load" else np.ones(len(per_load))
+        scale = (
+            per_load
+            if field.startswith("wrench") and field != "wrench_load"
+            else np.ones(len(per_load))
+        )
         scale = scale.reshape(-1, *[1] * (own.ndim - 1))
         wanted = by_cell(field, getattr(exact, field), own.shape) * scale
-        near = 1e-6 if name in FIXED and field.endswith("_load") else 1e-9  # Python has differences there
+        near = (
+            1e-6 if name in FIXED and field.endswith("_load") else 1e-9
+        )  # Python has differences there
         assert np.abs(own * scale - wanted).max() < near * np.abs(wanted).max(), field
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_slopes_by_parameters(name):
-    made, rng, count = library(name), np.random.default_rng(1), 40
+    made = library(name)
+    rng = np.random.default_rng(1)
+    count = 40
     inputs = [each[1::2] for each in samples(made.model, made.kind, 2 * count)]
     *_, slopes = run(made, inputs, slopes=True)
-    bars = rng.normal(size=(count, 3)) * [1.0, 1.0, 100.0], rng.normal(size=inputs[0].shape)
+    bars = (
+        rng.normal(size=(count, 3)) * [1.0, 1.0, 100.0],
+        rng.normal(size=inputs[0].shape),
+    )
     given = parameters_of(made.model)
     wanted = np.array([
         rollout_vjp(made.model, z, v[None], load[None], dt[None], w_bar[None], z_bar, parameters=given).parameters
         for z, v, load, dt, w_bar, z_bar in zip(*inputs, *bars, strict=True)
     ])  # fmt: skip
-    names = re.findall(r"friction_real (\w+); /\*", (made.folder / "friction.h").read_text())
+    names = re.findall(
+        r"friction_real (\w+); /\*", (made.folder / "friction.h").read_text()
+    )
     wanted = wanted[:, [parameter_names(made.model).index(each) for each in names]]
     own = np.einsum("bi,bip->bp", bars[0], slopes["wrench_params"])
     own += np.einsum("bi,bip->bp", bars[1].reshape(count, -1), slopes["state_params"])
@@ -145,7 +196,10 @@ def test_slopes_by_parameters(name):
 
 @pytest.mark.parametrize("options", [(), VECTOR], ids=["", "vectors"])
 @pytest.mark.parametrize("slopes", [False, True])
-@pytest.mark.parametrize("place, value", [("twist", np.nan), ("state", np.inf), ("load", -1.0), ("dt", np.nan)])
+@pytest.mark.parametrize(
+    "place, value",
+    [("twist", np.nan), ("state", np.inf), ("load", -1.0), ("dt", np.nan)],
+)
 def test_bad_numbers(place, value, slopes, options):
     made = library("few", "double", *options)
     given = {
@@ -153,18 +207,30 @@ def test_bad_numbers(place, value, slopes, options):
         "dt": np.full(1, 1e-3),
     }  # fmt: skip
     given[place].flat[0] = value
-    before, wrench, room = given["state"].copy(), np.full(3, 7.0), np.empty(10_000)
-    pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (*given.values(), wrench, room)]
+    before = given["state"].copy()
+    wrench = np.full(3, 7.0)
+    room = np.empty(10_000)
+    pointers = [
+        each.ctypes.data_as(ctypes.c_void_p) for each in (*given.values(), wrench, room)
+    ]
     assert made.functions.run(1, *pointers[:5], pointers[5] if slopes else None) == 2
-    assert np.array_equal(given["state"], before, equal_nan=True) and np.all(wrench == 7.0)
+    assert np.array_equal(given["state"], before, equal_nan=True) and np.all(
+        wrench == 7.0
+    )
 
 
 @pytest.mark.parametrize(
     "options, words",
     [
-        ({"name": "2d"}, "name must be a letter, then letters, digits and _, 40 in all"),
+        (
+            {"name": "2d"},
+            "name must be a letter, then letters, digits and _, 40 in all",
+        ),
         ({"name": "_"}, "name must be a letter"),
-        ({"name": "n" * 41}, "name must be a letter, then letters, digits and _, 40 in all"),
+        (
+            {"name": "n" * 41},
+            "name must be a letter, then letters, digits and _, 40 in all",
+        ),
         ({"name": "math"}, "name must not be that of a header of C, got math"),
         ({"name": "stdDef"}, "name must not be that of a header of C"),
         ({"precision": "half"}, "precision must be one of double, float"),
@@ -180,14 +246,20 @@ def test_bad_options(options, words, tmp_path):
 
 def test_models_without_source(tmp_path):
     soft = pf.ReducedModelPublished(
-        pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0)), LAW
+        pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0)),
+        LAW,
     )
-    with pytest.raises(pf.FrictionError, match="model must have a patch whose shape does not depend on the load"):
+    with pytest.raises(
+        pf.FrictionError,
+        match="model must have a patch whose shape does not depend on the load",
+    ):
         pf.export_c(soft, tmp_path)
     with pytest.raises(pf.FrictionError, match="model must be one of DistributedModel"):
         pf.export_c(object(), tmp_path)
     for kind in (pf.DistributedModel, pf.ReducedModel):
-        with pytest.raises(pf.FrictionError, match=r"with a law of LuGre bristles, got \w+, BoucWen"):
+        with pytest.raises(
+            pf.FrictionError, match=r"with a law of LuGre bristles, got \w+, BoucWen"
+        ):
             pf.export_c(kind(DISC, BoucWen()), tmp_path)
     assert not list(tmp_path.iterdir())
 
@@ -195,7 +267,11 @@ def test_models_without_source(tmp_path):
 def test_names(tmp_path):
     """A library has any name, also that of the loops in it, and words of the user's write no C."""
     patch = dataclasses.replace(DISC, name="/* a */ int pad; é")
-    pf.export_c(pf.ReducedModel(patch, LAW, cells=9), tmp_path, name="tilt", casadi=True)
+    pf.export_c(
+        pf.ReducedModel(patch, LAW, cells=9), tmp_path, name="tilt", casadi=True
+    )
     for each in ("tilt.c", "tilt_test.c", "tilt_casadi.c"):
-        subprocess.run(["gcc", *STRICT, "-c", each, "-o", "one.o"], cwd=tmp_path, check=True)
+        subprocess.run(
+            ["gcc", *STRICT, "-c", each, "-o", "one.o"], cwd=tmp_path, check=True
+        )
     assert "of / * a * / int pad; \\xe9," in (tmp_path / "tilt.h").read_text()

@@ -25,13 +25,16 @@ def misfit(made, given):
     """Return errors of wrenches [count] in the largest per load."""
     _, wrench = made.model.step(*given)
     per_load = 1.0 / np.array([1.0, 1.0, 0.01]) / given[2][:, None]
-    return (np.abs(run(made, given)[1] - wrench) * per_load).max(axis=1) / np.abs(wrench * per_load).max()
+    return (np.abs(run(made, given)[1] - wrench) * per_load).max(axis=1) / np.abs(
+        wrench * per_load
+    ).max()
 
 
 @pytest.mark.parametrize("precision", ["double", "float"])
 def test_steps(precision):
     """On rungs, steps are those of the model; between them, shapes are interpolated."""
-    made, rng = library("soft", precision), np.random.default_rng(0)
+    made = library("soft", precision)
+    rng = np.random.default_rng(0)
     rungs = ladder(made).rungs
     rungs = rungs[(rungs > 1e-2) & (rungs < 100.0)]
     exact = misfit(made, inputs(made, rng.choice(rungs, 200)))
@@ -45,10 +48,18 @@ def test_measured_maps():
     """Rungs hold the loads of the measurements, between which shapes are exact; beyond, the last shape stays."""
     made = library("maps")
     assert {0.5, 1.0, 3.0} <= set(ladder(made).rungs)
-    assert misfit(made, inputs(made, np.random.default_rng(1).uniform(0.5, 3.0, 300))).max() < 1e-12
+    assert (
+        misfit(
+            made, inputs(made, np.random.default_rng(1).uniform(0.5, 3.0, 300))
+        ).max()
+        < 1e-12
+    )
     twist = np.array([[0.01, 0.02, 1.0]])
     for inside, outside in ((3.0, 9.0), (0.5, 0.1)):
-        wrenches = [run_steady(made, twist, np.array([load])) / load for load in (inside, outside)]
+        wrenches = [
+            run_steady(made, twist, np.array([load])) / load
+            for load in (inside, outside)
+        ]
         np.testing.assert_allclose(*wrenches, rtol=1e-9)
 
 
@@ -57,21 +68,34 @@ def test_slopes_by_the_load():
     given = inputs(made, np.random.default_rng(2).uniform(0.5, 5.0, 200))
     *_, slopes = run(made, given, slopes=True)
     step = 1e-6
-    wrenches = [run(made, [*given[:2], given[2] + sign * step, given[3]])[1] for sign in (1.0, -1.0)]
+    wrenches = [
+        run(made, [*given[:2], given[2] + sign * step, given[3]])[1]
+        for sign in (1.0, -1.0)
+    ]
     wanted = (wrenches[0] - wrenches[1]) / (2.0 * step)
     off = np.abs(slopes["wrench_load"] - wanted).max(axis=1) / np.abs(wanted).max()
     assert np.quantile(off, 0.98) < 1e-7  # the others are beside rungs
-    assert np.abs(run(made, given)[1] / given[2][:, None] - wanted).max() > 1e-2 * np.abs(wanted).max()
+    assert (
+        np.abs(run(made, given)[1] / given[2][:, None] - wanted).max()
+        > 1e-2 * np.abs(wanted).max()
+    )
 
 
 def test_the_test_that_is_written():
     folder = library("soft").folder
-    subprocess.run(["gcc", "-O1", "friction.c", "friction_test.c", "-o", "tested", "-lm"], cwd=folder, check=True)
+    subprocess.run(
+        ["gcc", "-O1", "friction.c", "friction_test.c", "-o", "tested", "-lm"],
+        cwd=folder,
+        check=True,
+    )
     subprocess.run(["./tested"], cwd=folder, check=True)
     assert "friction_twist" not in (folder / "friction.h").read_text()
 
 
 def test_too_many_rungs(monkeypatch):
     monkeypatch.setattr(pieces, "MOST_RUNGS", 20)
-    with pytest.raises(pieces.InvalidValueError, match="model must have a patch whose shape 20 loads describe"):
+    with pytest.raises(
+        pieces.InvalidValueError,
+        match="model must have a patch whose shape 20 loads describe",
+    ):
         ladder(library("soft"))

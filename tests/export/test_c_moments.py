@@ -23,38 +23,69 @@ def inputs(made):
     if made.model.depends_on_load:
         rungs = ladder_of(made.model.reduction.patch).rungs
         load = rng.choice(rungs[(rungs > 1e-2) & (rungs < 100.0)], COUNT)
-    angle, far = rng.uniform(-np.pi, np.pi, COUNT), made.model.patch.contact_radius(1.0) * rng.uniform(0.0, 3.0, COUNT)
-    moments = load[:, None] * far[:, None] * np.column_stack([np.sin(angle), -np.cos(angle)])
-    return [np.asarray(each, made.kind).astype(float) for each in (state, twist, load, dt, moments)]
+    angle = rng.uniform(-np.pi, np.pi, COUNT)
+    far = made.model.patch.contact_radius(1.0) * rng.uniform(0.0, 3.0, COUNT)
+    moments = (
+        load[:, None] * far[:, None] * np.column_stack([np.sin(angle), -np.cos(angle)])
+    )
+    return [
+        np.asarray(each, made.kind).astype(float)
+        for each in (state, twist, load, dt, moments)
+    ]
 
 
 def run(made, state, twist, load, dt, moments):
     """Return the new state and the wrench of one step in C, and its result."""
     real = ctypes.c_double if made.kind is np.float64 else ctypes.c_float
-    state, wrench = np.array(state, made.kind, order="C"), np.full(3, 7.0, made.kind)
+    state = np.array(state, made.kind, order="C")
+    wrench = np.full(3, 7.0, made.kind)
     step = made.functions.friction_step_moments
     params = (real * 7).in_dll(made.functions, "friction_default")
-    twist, moments = np.array(twist, made.kind), np.array(moments, made.kind)
-    pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (state, twist, moments, wrench)]
-    code = step(ctypes.byref(params), *pointers[:2], real(load), pointers[2], real(dt), pointers[3])
+    twist = np.array(twist, made.kind)
+    moments = np.array(moments, made.kind)
+    pointers = [
+        each.ctypes.data_as(ctypes.c_void_p) for each in (state, twist, moments, wrench)
+    ]
+    code = step(
+        ctypes.byref(params),
+        *pointers[:2],
+        real(load),
+        pointers[2],
+        real(dt),
+        pointers[3],
+    )
     return state, wrench, code
 
 
 @pytest.mark.parametrize(
     ("name", "precision"),
     [(name, "double") for name in NAMES]
-    + [pytest.param(name, "float", marks=[] if name in QUICK else pytest.mark.slow) for name in (*NAMES, *TURNED)],
+    + [
+        pytest.param(name, "float", marks=[] if name in QUICK else pytest.mark.slow)
+        for name in (*NAMES, *TURNED)
+    ],
 )
 def test_steps(name, precision):
     made = library(name, precision)
     given = inputs(made)
     wanted, wrench = made.model.step(*given[:4], moments=given[4])
-    assert np.abs(wrench - made.model.step(*given[:4])[1]).max() > 1e-2 * np.abs(wrench).max()
+    assert (
+        np.abs(wrench - made.model.step(*given[:4])[1]).max()
+        > 1e-2 * np.abs(wrench).max()
+    )
     found = [run(made, *each) for each in zip(*given, strict=True)]
     assert not any(code for *_, code in found)
-    lever, load = np.array([1.0, 1.0, 0.01]), np.maximum(given[2], 1e-9)[:, None]
-    off = [np.abs(np.array([each[0] for each in found]) - wanted) / np.abs(wanted).max()]
-    off += [np.abs(np.array([each[1] for each in found]) - wrench) / load / lever / np.abs(wrench / load).max()]
+    lever = np.array([1.0, 1.0, 0.01])
+    load = np.maximum(given[2], 1e-9)[:, None]
+    off = [
+        np.abs(np.array([each[0] for each in found]) - wanted) / np.abs(wanted).max()
+    ]
+    off += [
+        np.abs(np.array([each[1] for each in found]) - wrench)
+        / load
+        / lever
+        / np.abs(wrench / load).max()
+    ]
     worst = np.maximum(*(each.reshape(COUNT, -1).max(axis=1) for each in off))
     # rounding is multiplied where no three cells have the centre between them: by a compliance of 1e-9
     assert worst.max() < (1e-6 if precision == "double" else 1e-4)
@@ -64,6 +95,7 @@ def test_steps(name, precision):
 @pytest.mark.parametrize("moments", [(np.nan, 0.0), (0.0, np.inf)])
 def test_bad_moments(moments):
     made = library("few")
-    before, (_, twist, load, dt, _) = made.model.rest() + 1e-9, (each[1] for each in inputs(made))
+    before = made.model.rest() + 1e-9
+    (_, twist, load, dt, _) = (each[1] for each in inputs(made))
     state, wrench, code = run(made, before, twist, load, dt, moments)
     assert code == 2 and np.array_equal(state, before) and np.all(wrench == 7.0)

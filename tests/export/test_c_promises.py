@@ -10,11 +10,31 @@ import subprocess
 import numpy as np
 import pytest
 
-from tests.support.c_libraries import MODELS, REDUCED, STRICT, VECTOR, library, run, samples
+from tests.support.c_libraries import (
+    MODELS,
+    REDUCED,
+    STRICT,
+    VECTOR,
+    library,
+    run,
+    samples,
+)
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
-MATH = {"atan2", "cos", "exp", "expm1", "fabs", "floor", "log", "pow", "sin", "sincos", "sqrt"}
+MATH = {
+    "atan2",
+    "cos",
+    "exp",
+    "expm1",
+    "fabs",
+    "floor",
+    "log",
+    "pow",
+    "sin",
+    "sincos",
+    "sqrt",
+}
 """Functions of math.h that steps call; sincos is gcc's for a sine and a cosine."""
 
 PLAIN = "-fno-tree-loop-distribute-patterns"
@@ -30,7 +50,10 @@ VECTOR_STACK = 6144
 """Stack of its step in vectors [bytes]: gcc 12 takes 4.0 kB with AVX2 and 4.7 kB with AVX-512."""
 
 QUICK = "few", "table"
-EACH = [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in MODELS]
+EACH = [
+    pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
+    for name in MODELS
+]
 REMOTE = "aarch64-linux-gnu-gcc", "qemu-aarch64"
 BARE = "arm-none-eabi-gcc"
 HEAP = "malloc", "calloc", "realloc"
@@ -42,7 +65,12 @@ COMPILERS = {
     "clang -O3": ["clang", "-O3"],
     "no heap": ["gcc", "-O2", *(f"-Wl,--wrap={each}" for each in HEAP)],
     "vectors": ["gcc", *VECTOR],
-    "sanitizers": ["gcc", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
+    "sanitizers": [
+        "gcc",
+        "-O1",
+        "-fsanitize=address,undefined",
+        "-fno-sanitize-recover=all",
+    ],
     "AArch64": [REMOTE[0], "-O2", "-static"],
 }
 SHORT = "gcc -O0", "no heap", "vectors"
@@ -82,13 +110,19 @@ int main(void)
 def objects(name, compiler, *options):
     """Compile a library alone, without a warning; return its folder."""
     folder = library(name).folder
-    subprocess.run([compiler, *STRICT, "-Wvla", *options, "-c", "friction.c", "-o", "alone.o"], cwd=folder, check=True)
+    subprocess.run(
+        [compiler, *STRICT, "-Wvla", *options, "-c", "friction.c", "-o", "alone.o"],
+        cwd=folder,
+        check=True,
+    )
     return folder
 
 
 def symbols(folder):
     """Return the symbols of a compiled library with their kinds."""
-    lines = subprocess.run(["nm", "alone.o"], cwd=folder, check=True, capture_output=True, text=True).stdout
+    lines = subprocess.run(
+        ["nm", "alone.o"], cwd=folder, check=True, capture_output=True, text=True
+    ).stdout
     return {line.split()[-1]: line.split()[-2] for line in lines.splitlines()}
 
 
@@ -104,13 +138,25 @@ def test_calls_and_memory(name):
     kinds = symbols(folder)
     called = {each for each, kind in kinds.items() if kind == "U"}
     assert called <= MATH
-    assert {kind.lower() for kind in kinds.values()} <= {"u", "t", "r"}  # no data that can be written
-    frames = [line.split("\t") for line in (folder / "alone.su").read_text().splitlines()]
-    assert all(kind in ("static", "dynamic,bounded") for *_, kind in frames)  # bounded: aligned for vectors
+    assert {kind.lower() for kind in kinds.values()} <= {
+        "u",
+        "t",
+        "r",
+    }  # no data that can be written
+    frames = [
+        line.split("\t") for line in (folder / "alone.su").read_text().splitlines()
+    ]
+    assert all(
+        kind in ("static", "dynamic,bounded") for *_, kind in frames
+    )  # bounded: aligned for vectors
     if name in REDUCED:
-        slopes, asked = stack_of(frames, "slopes"), stack_of(frames, "twist|holding|search|try_|find_|tilt|moments")
+        slopes = stack_of(frames, "slopes")
+        asked = stack_of(frames, "twist|holding|search|try_|find_|tilt|moments")
         body = stack_of(frames, "body|coupling|patch|small_matrices")
-        assert stack_of(frames, "") - slopes - asked - body < STEP_STACK and body < STEP_STACK
+        assert (
+            stack_of(frames, "") - slopes - asked - body < STEP_STACK
+            and body < STEP_STACK
+        )
         assert slopes < SLOPES_STACK and asked < STEP_STACK
 
 
@@ -130,38 +176,67 @@ def test_stack_of_vector_code(name, target):
         pytest.skip(f"needs {compiler} for x86-64")
     vector = [each for each in VECTOR if each != "-march=native"]
     folder = objects(name, compiler, *vector, *options, "-fstack-usage")
-    frames = [line.split("\t") for line in next(folder.glob("*.su")).read_text().splitlines()]
-    assert 0 < stack_of(frames, r"(?<!body_)step(_of|_with|_default)?(\.|$)") < VECTOR_STACK
+    frames = [
+        line.split("\t") for line in next(folder.glob("*.su")).read_text().splitlines()
+    ]
+    assert (
+        0
+        < stack_of(frames, r"(?<!body_)step(_of|_with|_default)?(\.|$)")
+        < VECTOR_STACK
+    )
 
 
 @pytest.mark.parametrize("name", EACH)
 def test_loops_and_calls_end(name):
     """Loops count to constants, and functions call only what stands above them."""
     source = (library(name).folder / "friction.c").read_text()
-    code = re.sub(r"/\*.*?\*/", "", source[source.index("static int in_range") :], flags=re.DOTALL)
+    code = re.sub(
+        r"/\*.*?\*/", "", source[source.index("static int in_range") :], flags=re.DOTALL
+    )
     assert not re.search(r"\b(while|do|goto)\b", code)
     loops = re.findall(r"\bfor \((.*)\) \{", code)
     counts = r"(\w+) = [^;<>]+; (?:\1 < [^;]+; \+\+\1|\1 > [^;]+; --\1)"
     assert len(loops) > 5 and all(re.fullmatch(counts, each) for each in loops)
-    ends = {end for each in loops for end in re.findall(r"\b[a-zA-Z]\w*", each.split(";")[1])[1:]}
+    ends = {
+        end
+        for each in loops
+        for end in re.findall(r"\b[a-zA-Z]\w*", each.split(";")[1])[1:]
+    }
     # counters of outer loops, n, and the iterations of the step of a body, which its callers count by numbers
     assert all(re.fullmatch(r"FRICTION_\w+|[cknr]|count|most", each) for each in ends)
-    assert all(re.fullmatch(r"\(\w+ \? \d+ : \d+\)", each) for each in re.findall(r"int most = ([^;]+);", code))
-    searches = re.findall(r"(?:find|search)_of_coupling\(p, (?:tolerance, )?([^,]+), [^;{]*\);", code)
-    assert searches and all(re.fullmatch(r"\d+|most|\(\d+ \* most\)", each) for each in searches)
+    assert all(
+        re.fullmatch(r"\(\w+ \? \d+ : \d+\)", each)
+        for each in re.findall(r"int most = ([^;]+);", code)
+    )
+    searches = re.findall(
+        r"(?:find|search)_of_coupling\(p, (?:tolerance, )?([^,]+), [^;{]*\);", code
+    )
+    assert searches and all(
+        re.fullmatch(r"\d+|most|\(\d+ \* most\)", each) for each in searches
+    )
     counted = "|".join(re.findall(r"(\w+)\([^()]*, int count\)", code)) or "none"
     for call in re.findall(rf"^ +(?:{counted})\((.*)\);", code, re.MULTILINE):
         assert re.fullmatch(r"\d+|n", call.rpartition(", ")[2]), call
     assert set(re.findall(r"\bn = ([^;=]+);", code)) == {"3"}
-    heads = list(re.finditer(r"^(?:static )?(?:inline )?(?:int|void|real|double) (\w+)\(", code, re.MULTILINE))
+    heads = list(
+        re.finditer(
+            r"^(?:static )?(?:inline )?(?:int|void|real|double) (\w+)\(",
+            code,
+            re.MULTILINE,
+        )
+    )
     ends = [*(each.start() for each in heads[1:]), len(code)]
     assert len(heads) >= 9
     for i, (head, end) in enumerate(zip(heads, ends, strict=True)):
         later = {each[1] for each in heads[i:]}
-        assert not later & set(re.findall(r"\b(\w+)\(", code[head.end() : end])), head[1]
+        assert not later & set(re.findall(r"\b(\w+)\(", code[head.end() : end])), head[
+            1
+        ]
 
 
-@pytest.mark.parametrize("options", ["", pytest.param("-fno-math-errno", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "options", ["", pytest.param("-fno-math-errno", marks=pytest.mark.slow)]
+)
 def test_cortex_m7(options):
     if shutil.which(BARE) is None:
         pytest.skip(f"needs {BARE}")
@@ -171,7 +246,9 @@ def test_cortex_m7(options):
 
 
 CASES = [
-    pytest.param(name, each, marks=() if name in QUICK and each in SHORT else pytest.mark.slow)
+    pytest.param(
+        name, each, marks=() if name in QUICK and each in SHORT else pytest.mark.slow
+    )
     for name in MODELS
     for each in COMPILERS
 ]
@@ -186,18 +263,35 @@ def test_compilers_agree(name, compiler):
         pytest.skip(f"needs {' and '.join(missing)}")
     made = library(name)
     (made.folder / "main.c").write_text(MAIN)
-    command = [*COMPILERS[compiler], *STRICT, "-Wvla", "friction.c", "main.c", "-o", "program", "-lm"]
+    command = [
+        *COMPILERS[compiler],
+        *STRICT,
+        "-Wvla",
+        "friction.c",
+        "main.c",
+        "-o",
+        "program",
+        "-lm",
+    ]
     subprocess.run(command, cwd=made.folder, check=True)
     inputs = [each[1::2] for each in samples(made.model, made.kind, 1000)]
     state, wrench, slopes = run(made, inputs, slopes=True)
     rows = [each.reshape(len(wrench), -1) for each in inputs]
-    program = [*(REMOTE[1:] if compiler == "AArch64" else ()), str(made.folder / "program")]
-    done = subprocess.run(program, input=np.hstack(rows).tobytes(), capture_output=True, check=True)
+    program = [
+        *(REMOTE[1:] if compiler == "AArch64" else ()),
+        str(made.folder / "program"),
+    ]
+    done = subprocess.run(
+        program, input=np.hstack(rows).tobytes(), capture_output=True, check=True
+    )
     found = np.frombuffer(done.stdout).reshape(len(wrench), -1)
     n = state[0].size
     for own, other in (
         (found[:, :n], state.reshape(-1, n)),
         (found[:, n : n + 3] / inputs[2][:, None], wrench / inputs[2][:, None]),
-        (found[:, n + 3 :] / inputs[2][:, None], slopes["wrench_twist"].reshape(-1, 9) / inputs[2][:, None]),
+        (
+            found[:, n + 3 :] / inputs[2][:, None],
+            slopes["wrench_twist"].reshape(-1, 9) / inputs[2][:, None],
+        ),
     ):
         assert np.abs(own - other).max() < 1e-10 * np.abs(other).max()

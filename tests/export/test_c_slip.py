@@ -23,8 +23,13 @@ def call(function, kind, *given, count):
     found = np.full(count, 7.0, kind)
     arguments = [np.array(each, kind) if np.ndim(each) else each for each in given]
     scalar = ctypes.c_double if kind is np.float64 else ctypes.c_float
-    pointers = [each.ctypes if np.ndim(each) else scalar(each) for each in (*arguments, found)]
-    pointers = [each.data_as(ctypes.c_void_p) if hasattr(each, "data_as") else each for each in pointers]
+    pointers = [
+        each.ctypes if np.ndim(each) else scalar(each) for each in (*arguments, found)
+    ]
+    pointers = [
+        each.data_as(ctypes.c_void_p) if hasattr(each, "data_as") else each
+        for each in pointers
+    ]
     return function(*pointers), found
 
 
@@ -33,34 +38,60 @@ def call(function, kind, *given, count):
 def test_twists(name, precision):
     """Twists have the wrenches of the stored surface, and holding loads are those of the exact one."""
     made = library(name, precision)
-    surface, exact = LimitSurfaceTable(made.model.patch), precision == "double"
-    wrenches = np.random.default_rng(0).normal(size=(60, 3)) * [1.0, 1.0, surface.contact_radius]
-    wrenches = np.vstack([wrenches, np.diag([1.0, -2.0, 1e-3])]).astype(made.kind).astype(float)
+    surface = LimitSurfaceTable(made.model.patch)
+    exact = precision == "double"
+    wrenches = np.random.default_rng(0).normal(size=(60, 3)) * [
+        1.0,
+        1.0,
+        surface.contact_radius,
+    ]
+    wrenches = (
+        np.vstack([wrenches, np.diag([1.0, -2.0, 1e-3])])
+        .astype(made.kind)
+        .astype(float)
+    )
     for wrench in wrenches:
         code, twist = call(made.functions.friction_twist, made.kind, wrench, count=3)
         assert code == 0
         turned = surface.wrench(twist) / [1.0, 1.0, surface.contact_radius]
         wanted = wrench / [1.0, 1.0, surface.contact_radius]
-        apart = np.cross(turned, wanted) / np.linalg.norm(turned) / np.linalg.norm(wanted)
-        assert np.linalg.norm(apart) < (1e-9 if exact else 1e-3) and turned @ wanted > 0.0
+        apart = (
+            np.cross(turned, wanted) / np.linalg.norm(turned) / np.linalg.norm(wanted)
+        )
+        assert (
+            np.linalg.norm(apart) < (1e-9 if exact else 1e-3) and turned @ wanted > 0.0
+        )
         assert abs(surface.dissipation(twist) - 1.0) < (1e-12 if exact else 1e-5)
-        code, force = call(made.functions.friction_holding_load, made.kind, -wrench, MU, count=1)
+        code, force = call(
+            made.functions.friction_holding_load, made.kind, -wrench, MU, count=1
+        )
         assert code == 0
-        np.testing.assert_allclose(force, -wrench @ surface.twist(wrench) / MU, rtol=1e-12 if exact else 1e-5)
-        np.testing.assert_allclose(force, holding_load(-wrench, made.model.patch, MU), rtol=1e-4)
+        np.testing.assert_allclose(
+            force, -wrench @ surface.twist(wrench) / MU, rtol=1e-12 if exact else 1e-5
+        )
+        np.testing.assert_allclose(
+            force, holding_load(-wrench, made.model.patch, MU), rtol=1e-4
+        )
 
 
 def test_bad_wrenches():
     made = library("few")
-    twist, hold = made.functions.friction_twist, made.functions.friction_holding_load
+    twist = made.functions.friction_twist
+    hold = made.functions.friction_holding_load
     for wrench in ([0.0] * 3, [np.nan, 0.0, 0.0], [0.0, np.inf, 0.0]):
         code, found = call(twist, made.kind, wrench, count=3)
         assert code == 2 and np.all(found == 7.0)
-    for load, mu in (([1.0, 0.0, 0.0], 0.0), ([1.0, 0.0, 0.0], np.nan), ([0.0, np.nan, 0.0], 0.5)):
+    for load, mu in (
+        ([1.0, 0.0, 0.0], 0.0),
+        ([1.0, 0.0, 0.0], np.nan),
+        ([0.0, np.nan, 0.0], 0.5),
+    ):
         code, found = call(hold, made.kind, load, mu, count=1)
         assert code == 2 and found == 7.0
     assert call(hold, made.kind, [0.0] * 3, 0.5, count=1) == (0, 0.0)
-    code, found = call(hold, made.kind, [1.0, 0.0, 0.0], 5e-324, count=1)  # beyond the largest number
+    code, found = call(
+        hold, made.kind, [1.0, 0.0, 0.0], 5e-324, count=1
+    )  # beyond the largest number
     assert code == 2 and found == 7.0
 
 
@@ -71,21 +102,46 @@ def test_subnormal_wrenches(precision):
     least = np.finfo(made.kind).smallest_subnormal
     surface = LimitSurfaceTable(made.model.patch)
     for wrench in (np.array([1.0, 0.0, 0.0]), np.array([3.0, -4.0, 0.0])):
-        code, twist = call(made.functions.friction_twist, made.kind, (wrench * least).astype(made.kind), count=3)
+        code, twist = call(
+            made.functions.friction_twist,
+            made.kind,
+            (wrench * least).astype(made.kind),
+            count=3,
+        )
         assert code == 0
         wanted = surface.twist(wrench)
-        np.testing.assert_allclose(twist, wanted, atol=(1e-9 if precision == "double" else 1e-3) * np.abs(wanted).max())
-        np.testing.assert_allclose(surface.twist(wrench * 5e-324), wanted, atol=1e-9 * np.abs(wanted).max())
+        np.testing.assert_allclose(
+            twist,
+            wanted,
+            atol=(1e-9 if precision == "double" else 1e-3) * np.abs(wanted).max(),
+        )
+        np.testing.assert_allclose(
+            surface.twist(wrench * 5e-324), wanted, atol=1e-9 * np.abs(wanted).max()
+        )
 
 
 def test_a_point_has_no_limit_surface(tmp_path):
     point = pf.ContactPatch(np.zeros((1, 2)), np.ones(1))
-    texts = [each.read_text() for each in pf.export_c(pf.DistributedModel(point, pf.LuGre()), tmp_path)]
-    assert "friction_steady" in texts[0] and not any("friction_twist" in each for each in texts)
+    texts = [
+        each.read_text()
+        for each in pf.export_c(pf.DistributedModel(point, pf.LuGre()), tmp_path)
+    ]
+    assert "friction_steady" in texts[0] and not any(
+        "friction_twist" in each for each in texts
+    )
 
 
 def programs(folder, library, *options):
-    command = ["gcc", *STRICT, *options, "friction.c", "friction_test.c", "-o", "tested", "-lm"]
+    command = [
+        "gcc",
+        *STRICT,
+        *options,
+        "friction.c",
+        "friction_test.c",
+        "-o",
+        "tested",
+        "-lm",
+    ]
     subprocess.run(command, cwd=folder, check=True)
     return subprocess.run(["./tested"], cwd=folder, capture_output=True, text=True)
 
@@ -107,8 +163,15 @@ def test_cmake(tmp_path):
     if shutil.which("cmake") is None:
         pytest.skip("needs cmake")
     made = library("few")
-    lines = "cmake_minimum_required(VERSION 3.16)", "project(some C)", f"include({made.folder}/friction.cmake)"
+    lines = (
+        "cmake_minimum_required(VERSION 3.16)",
+        "project(some C)",
+        f"include({made.folder}/friction.cmake)",
+    )
     (tmp_path / "CMakeLists.txt").write_text("\n".join(lines))
-    for command in (["cmake", "-B", "build"], ["cmake", "--build", "build", "--target", "friction_test"]):
+    for command in (
+        ["cmake", "-B", "build"],
+        ["cmake", "--build", "build", "--target", "friction_test"],
+    ):
         subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     subprocess.run(["./friction_test"], cwd=tmp_path / "build", check=True)

@@ -35,7 +35,9 @@ MODELS = {
     "table": lambda law: pf.ReducedModelPublished(FEW, law),
     "ellipsoid": lambda law: pf.ReducedModelPublished(FEW, law, surface=ELLIPSOID),
 }
-UNKNOWN = {(model, law) for model in ("table", "ellipsoid") for law in ("creep", "fixed")} | {("soft", "fixed")}
+UNKNOWN = {
+    (model, law) for model in ("table", "ellipsoid") for law in ("creep", "fixed")
+} | {("soft", "fixed")}
 """Models that do not take a law."""
 QUICK, SLOW = ("points", "ellipsoid"), pytest.mark.slow
 WARNINGS = *STRICT, "-Wconversion", "-Wshadow"
@@ -47,25 +49,44 @@ def checked(folder, *files):
 
 
 @pytest.mark.parametrize("precision", ["double", "float"])
-@pytest.mark.parametrize("model", [each if each in QUICK else pytest.param(each, marks=SLOW) for each in MODELS])
+@pytest.mark.parametrize(
+    "model",
+    [each if each in QUICK else pytest.param(each, marks=SLOW) for each in MODELS],
+)
 def test_every_export_compiles_without_a_warning(model, precision, tmp_path):
     names = [law for law in LAWS if (model, law) not in UNKNOWN]
     files = [
-        pf.export_c(MODELS[model](LAWS[law]), tmp_path, name=f"law_{i}", precision=precision, patches=1 + i % 3)
+        pf.export_c(
+            MODELS[model](LAWS[law]),
+            tmp_path,
+            name=f"law_{i}",
+            precision=precision,
+            patches=1 + i % 3,
+        )
         for i, law in enumerate(names)
     ]
     assert len(names) >= 4
-    checked(tmp_path, *(file.name for each in files for file in each if file.suffix == ".c"))
+    checked(
+        tmp_path, *(file.name for each in files for file in each if file.suffix == ".c")
+    )
 
 
 def test_controllers_and_casadi_compile_without_a_warning(tmp_path):
     for surface in (ELLIPSOID, pf.LimitSurfaceTable(FEW)):
         model = pf.ReducedModelPublished(FEW, LAWS["elasto-plastic"], surface=surface)
-        files = pf.export_c(model, tmp_path, casadi=True, controller=Hold(FrictionObserver(model)), patches=3)
+        files = pf.export_c(
+            model,
+            tmp_path,
+            casadi=True,
+            controller=Hold(FrictionObserver(model)),
+            patches=3,
+        )
         checked(tmp_path, *(file.name for file in files if file.suffix == ".c"))
 
 
-@pytest.mark.parametrize("name", ["tilt", "math", "stddef", "_", "real", "int", "share", "x" * 40])
+@pytest.mark.parametrize(
+    "name", ["tilt", "math", "stddef", "_", "real", "int", "share", "x" * 40]
+)
 def test_every_name_compiles_or_is_refused(name, tmp_path):
     try:
         files = pf.export_c(MODELS["points"](LAWS["lugre"]), tmp_path, name=name)

@@ -35,22 +35,35 @@ class Tags(HTMLParser):
 def hostile_case():
     """Return a case of the package in which everything has a hostile name."""
     case = next(each for each in all_cases().values() if sdf(each, 1e-3))
-    names = {name: f"{name}{HOSTILE}" for name in (*case.shapes, *(body.name for body in case.bodies))}
+    names = {
+        name: f"{name}{HOSTILE}"
+        for name in (*case.shapes, *(body.name for body in case.bodies))
+    }
     bodies = tuple(
         dataclasses.replace(
             body,
             name=names[body.name],
-            shapes=[dataclasses.replace(shape, name=names[shape.name]) for shape in body.shapes],
+            shapes=[
+                dataclasses.replace(shape, name=names[shape.name])
+                for shape in body.shapes
+            ],
         )
         for body in case.bodies
     )
-    contacts = [dataclasses.replace(each, pair=tuple(names[name] for name in each.pair)) for each in case.contacts]
-    return dataclasses.replace(case, name=HOSTILE, title=HOSTILE, bodies=bodies, contacts=contacts)
+    contacts = [
+        dataclasses.replace(each, pair=tuple(names[name] for name in each.pair))
+        for each in case.contacts
+    ]
+    return dataclasses.replace(
+        case, name=HOSTILE, title=HOSTILE, bodies=bodies, contacts=contacts
+    )
 
 
 def test_c(tmp_path):
     """Comments of C end where they should, in each file."""
-    model = pf.ReducedModelPublished(PATCH, LAW, surface=pf.LimitSurfaceEllipsoid(PATCH))
+    model = pf.ReducedModelPublished(
+        PATCH, LAW, surface=pf.LimitSurfaceEllipsoid(PATCH)
+    )
     for file in pf.export_c(model, tmp_path, casadi=True):
         code = re.sub(r"/\*.*?\*/|#[^\n]*", "", file.read_text(), flags=re.DOTALL)
         assert "pad" not in code and "alert" not in code and "*/" not in code
@@ -58,9 +71,14 @@ def test_c(tmp_path):
 
 def test_warp():
     """No name stands in the source at all."""
-    source = pytest.importorskip("planarfriction.warp.source", reason="needs the extra [warp]")
+    source = pytest.importorskip(
+        "planarfriction.warp.source", reason="needs the extra [warp]"
+    )
     pieces = pieces_of(pf.ReducedModel(PATCH, LAW), "float")
-    texts = [source.source_of(pieces, "float"), source.coupled_source_of([pieces], [0], [True], [0.01], "float")]
+    texts = [
+        source.source_of(pieces, "float"),
+        source.coupled_source_of([pieces], [0], [True], [0.01], "float"),
+    ]
     assert not any("alert" in each.text for each in texts)
 
 
@@ -69,17 +87,29 @@ def test_mjcf_and_sdf(write):
     case = hostile_case()
     root = ElementTree.fromstring(write(case, 1e-3))
     names = {value for element in root.iter() for value in element.attrib.values()}
-    assert {case.name, *case.shapes, *(body.name for body in case.bodies)} <= names | {case.name}
+    assert {case.name, *case.shapes, *(body.name for body in case.bodies)} <= names | {
+        case.name
+    }
     assert not {element.tag for element in root.iter()} & {"script"}
 
 
 def test_pages():
     """Pages of patches, laws and models in notebooks, and that of the referee."""
     model = pf.ReducedModel(PATCH, LAW)
-    texts = [each._repr_html_() for each in (PATCH, LAW, model, pf.LimitSurfaceEllipsoid(PATCH))]
+    texts = [
+        each._repr_html_()
+        for each in (PATCH, LAW, model, pf.LimitSurfaceEllipsoid(PATCH))
+    ]
     case = hostile_case()
-    run = {"date": HOSTILE, "machine": HOSTILE, "versions": {HOSTILE: HOSTILE}, "settings": {HOSTILE: HOSTILE}}
+    run = {
+        "date": HOSTILE,
+        "machine": HOSTILE,
+        "versions": {HOSTILE: HOSTILE},
+        "settings": {HOSTILE: HOSTILE},
+    }
     texts.append(page([], {HOSTILE: case}, run))
     assert any("alert" in each for each in texts)
     for text in texts:
-        assert not Tags(text).names & {"script", "onmouseover"} and "<script" not in text
+        assert (
+            not Tags(text).names & {"script", "onmouseover"} and "<script" not in text
+        )

@@ -22,8 +22,14 @@ class Attack(NamedTuple):
 
     def test(self, **options: Any) -> Callable[[], None]:
         """The test that Hypothesis makes of it; seeds have no smaller ones, so that it looks for none."""
-        drawn, checks = given(*self.strategies)(self.function), list(HealthCheck)
-        return settings(deadline=None, suppress_health_check=checks, phases=[Phase.generate], **options)(drawn)
+        drawn = given(*self.strategies)(self.function)
+        checks = list(HealthCheck)
+        return settings(
+            deadline=None,
+            suppress_health_check=checks,
+            phases=[Phase.generate],
+            **options,
+        )(drawn)
 
     def again(self, examples: int) -> None:
         """Attack with examples of which none was seen before."""
@@ -38,7 +44,9 @@ def attack(kind: str, examples: int, *strategies: st.SearchStrategy) -> Callable
     """Make a test of a function of what the strategies draw; without one it draws from a `random.Random`."""
 
     def made(function: Callable[..., None]) -> Callable[[], None]:
-        whole = Attack(function, strategies or (st.randoms(use_true_random=True),), examples)
+        whole = Attack(
+            function, strategies or (st.randoms(use_true_random=True),), examples
+        )
         ATTACKS[f"{kind}: {function.__name__.removeprefix('test_')}"] = whole
         return whole.test(max_examples=examples)
 

@@ -72,7 +72,8 @@ def watched(seconds: float = SECONDS, memory: int = MEMORY) -> Iterator[None]:
         raise _TooSlow
 
     limits = resource.getrlimit(resource.RLIMIT_AS)
-    before, alarm = time.process_time(), threading.current_thread() is threading.main_thread()
+    before = time.process_time()
+    alarm = threading.current_thread() is threading.main_thread()
     with contextlib.suppress(OSError):
         resource.setrlimit(resource.RLIMIT_AS, (_virtual_memory() + memory, limits[1]))
     if alarm:
@@ -93,7 +94,13 @@ def watched(seconds: float = SECONDS, memory: int = MEMORY) -> Iterator[None]:
         raise Broken(f"takes {took:.1f} s")
 
 
-def judge(kind: str, call: Callable[[], Any], *, names: tuple[str, ...] = (), compiles: bool = False) -> Any:
+def judge(
+    kind: str,
+    call: Callable[[], Any],
+    *,
+    names: tuple[str, ...] = (),
+    compiles: bool = False,
+) -> Any:
     """The result of the call, or None where it was refused as promised; raises `Broken` where neither is so.
 
     `names` are those of which the message has to contain one. Code that was never used before may be compiled where
@@ -103,24 +110,38 @@ def judge(kind: str, call: Callable[[], Any], *, names: tuple[str, ...] = (), co
     _COMPILES.names.clear()
     refusal = None
     try:
-        with watched(SECONDS if not compiles else 120.0), warnings.catch_warnings(record=True) as caught:
+        with (
+            watched(SECONDS if not compiles else 120.0),
+            warnings.catch_warnings(record=True) as caught,
+        ):
             warnings.simplefilter("always")
             result = call()
     except FrictionError as error:
-        refusal, result = str(error), None
+        refusal = str(error)
+        result = None
     except Broken:
         raise
     except Exception as error:
         where = error.__traceback__
         while where is not None and where.tb_next is not None:
             where = where.tb_next
-        place = f"{where.tb_frame.f_code.co_filename.split('planarfriction/')[-1]}:{where.tb_lineno}" if where else "?"
-        raise Broken(f"foreign {type(error).__name__} from {place}: {str(error)[:200]}") from error
+        place = (
+            f"{where.tb_frame.f_code.co_filename.split('planarfriction/')[-1]}:{where.tb_lineno}"
+            if where
+            else "?"
+        )
+        raise Broken(
+            f"foreign {type(error).__name__} from {place}: {str(error)[:200]}"
+        ) from error
     if refusal is not None:
         CASES[f"{kind}, refused"] += 1
         _judge_message(refusal, names)
-    if foreign := [each for each in caught if not issubclass(each.category, UserWarning)]:
-        raise Broken(f"warns {foreign[0].category.__name__}: {str(foreign[0].message)[:100]} ({foreign[0].filename})")
+    if foreign := [
+        each for each in caught if not issubclass(each.category, UserWarning)
+    ]:
+        raise Broken(
+            f"warns {foreign[0].category.__name__}: {str(foreign[0].message)[:100]} ({foreign[0].filename})"
+        )
     if _COMPILES.names and not compiles:
         raise Broken(f"compiles {', '.join(_COMPILES.names)} inside the call")
     return result
@@ -129,11 +150,15 @@ def judge(kind: str, call: Callable[[], Any], *, names: tuple[str, ...] = (), co
 def _judge_message(message: str, names: tuple[str, ...]) -> None:
     length = len(re.sub(r"(one of|valid:|has) [\w., -]+", "", message))
     if not message.strip() or length > LONGEST or not message.isprintable():
-        raise Broken(f"the message is no line of at most {LONGEST} characters: {message[:200]!r} ({len(message)})")
+        raise Broken(
+            f"the message is no line of at most {LONGEST} characters: {message[:200]!r} ({len(message)})"
+        )
     if message.startswith("at t = "):  # of a run that ended there
         return
     plain = message.replace("-", "_").replace(" ", "_").lower()
-    if names and not any(re.search(rf"(?<![a-z]){name.strip('_').lower()}", plain) for name in names):
+    if names and not any(
+        re.search(rf"(?<![a-z]){name.strip('_').lower()}", plain) for name in names
+    ):
         raise Broken(f"the message names none of {', '.join(names)}: {message!r}")
 
 

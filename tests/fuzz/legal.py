@@ -83,14 +83,24 @@ class Target(NamedTuple):
 def _log_file(path: str) -> str:
     """Write a log, and return its path."""
     rows = np.column_stack([TIMES, TWISTS, -TWISTS, np.full(len(TIMES), 2.0)])
-    np.savetxt(path, rows, delimiter=",", header="t,vx,vy,omega,fx,fy,tau,normal_force", comments="")
+    np.savetxt(
+        path,
+        rows,
+        delimiter=",",
+        header="t,vx,vy,omega,fx,fy,tau,normal_force",
+        comments="",
+    )
     return path
 
 
 def _joint_file(path: str) -> str:
     """Write a log of a joint, and return its path."""
     np.savetxt(
-        path, np.column_stack([TIMES, np.sin(20.0 * TIMES), TIMES]), delimiter=",", header="t,q,torque", comments=""
+        path,
+        np.column_stack([TIMES, np.sin(20.0 * TIMES), TIMES]),
+        delimiter=",",
+        header="t,q,torque",
+        comments="",
     )
     return path
 
@@ -98,7 +108,8 @@ def _joint_file(path: str) -> str:
 @functools.cache
 def objects() -> dict[str, Any]:
     """Legal values by the name of the parameter, and one instance of each class by the name of the class."""
-    model, soft = pf.ReducedModelPublished(PATCH, LAW), pf.ReducedModelPublished(SOFT, LAW)
+    model = pf.ReducedModelPublished(PATCH, LAW)
+    soft = pf.ReducedModelPublished(SOFT, LAW)
     scene = pf.scenes.driven(model, t_end=0.02)
     solution = pf.simulate(scene)
     time = np.linspace(0.0, 0.2, 21)
@@ -106,8 +117,12 @@ def objects() -> dict[str, Any]:
     log = pf.identify.Log(TIMES, TWISTS, -TWISTS, 2.0)
     surface = pf.LimitSurfaceCells(PATCH)
     signal = pf.Signal.sampled([0.0, 0.1], [1.0, 2.0])
-    turned = pf.joints.JointLog(TIMES, np.sin(20.0 * TIMES), torque=np.cos(20.0 * TIMES))
-    watcher = pf.online.FrictionObserver(pf.ReducedModel(PATCH, LAW, cells=9), surface=pf.LimitSurfaceEllipsoid(PATCH))
+    turned = pf.joints.JointLog(
+        TIMES, np.sin(20.0 * TIMES), torque=np.cos(20.0 * TIMES)
+    )
+    watcher = pf.online.FrictionObserver(
+        pf.ReducedModel(PATCH, LAW, cells=9), surface=pf.LimitSurfaceEllipsoid(PATCH)
+    )
     return {
         # parts
         "patch": PATCH, "law": LAW, "model": model, "scene": scene, "solution": solution, "solutions": solution,
@@ -187,7 +202,9 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "planning.push": {
         "slider": Fresh(lambda: objects()["Slider"]),
         "pusher": Fresh(lambda: pf.planning.Pusher(0.3)),
-        "path": pf.Signal.sampled([0.0, 1.0], [[-0.015, 0.0], [-0.005, 0.002]], "linear"),
+        "path": pf.Signal.sampled(
+            [0.0, 1.0], [[-0.015, 0.0], [-0.005, 0.002]], "linear"
+        ),
         "start": (0.0, 0.0, 0.0),
         "samples": 5,
     },
@@ -199,33 +216,74 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "bias": (0.03, 0.03, 3e-4),
     },
     **{
-        f"online.{name}": {"measurement": pf.online.Measurement(0.1, (0.0, 1.0, 0.0), 4.0, (0.0, 0.01, 0.0))}
+        f"online.{name}": {
+            "measurement": pf.online.Measurement(
+                0.1, (0.0, 1.0, 0.0), 4.0, (0.0, 0.01, 0.0)
+            )
+        }
         for name in (f"{each}.update" for each in MEASURING)
     },
     **{
-        f"online.{name}": {"observer": Fresh(lambda: objects()["FrictionObserver"]), "goal": 0.02, "start": 20.0}
+        f"online.{name}": {
+            "observer": Fresh(lambda: objects()["FrictionObserver"]),
+            "goal": 0.02,
+            "start": 20.0,
+        }
         for name in ("Hold", "Hinge", "SlideBy", "TurnBy")
     },
     "PressureMaps": {"values": np.ones((2, 3))},
     "patch.PerCell": {"values": [1.0, 2.0, 3.0]},
     "ContactPatch.from_pressure": {
         "pressure": np.ones((3, 3)),
-        **dict.fromkeys(("loads", "header", "index", "frame", "frame_shape", "threshold", "invert", "width")),
+        **dict.fromkeys(
+            (
+                "loads",
+                "header",
+                "index",
+                "frame",
+                "frame_shape",
+                "threshold",
+                "invert",
+                "width",
+            )
+        ),
     },
-    "Log.from_axis": {"time": TIMES, "force": -TWISTS[:, 0], "velocity": TWISTS[:, 0], "position": None, "axis": "x"},
+    "Log.from_axis": {
+        "time": TIMES,
+        "force": -TWISTS[:, 0],
+        "velocity": TWISTS[:, 0],
+        "position": None,
+        "axis": "x",
+    },
     "Spring.pull": {"time": TIMES, "pose": TWISTS},
     "ContactPatch.discs": {"n": None},
-    "ContactPatch": dict.fromkeys(("pressure", "metric", "asymmetry", "cell_size", "point_shares", "radii")),
+    "ContactPatch": dict.fromkeys(
+        ("pressure", "metric", "asymmetry", "cell_size", "point_shares", "radii")
+    ),
     "ContactPatch.moments": {"about": None},
     "Scene.from_dict": {"data": Fresh(lambda: objects()["scene"].to_dict())},
-    "Signal.from_dict": {"data": Fresh(lambda: {"times": [0.0, 1.0], "values": [1.0, 2.0]})},
+    "Signal.from_dict": {
+        "data": Fresh(lambda: {"times": [0.0, 1.0], "values": [1.0, 2.0]})
+    },
     **{
-        f"{name}.from_dict": {"data": Fresh(lambda: {"law": "soft_finger", "c": 0.006, "k": 2.0})}
-        for name in ("patch.Pressure", "patch.PerCell", "SoftFinger", "Uniform", "LinearGradient", "PressureMaps")
+        f"{name}.from_dict": {
+            "data": Fresh(lambda: {"law": "soft_finger", "c": 0.006, "k": 2.0})
+        }
+        for name in (
+            "patch.Pressure",
+            "patch.PerCell",
+            "SoftFinger",
+            "Uniform",
+            "LinearGradient",
+            "PressureMaps",
+        )
     },
     **{
         f"{model}.{name}": {"state": Fresh(lambda shape=shape: np.zeros(shape))}
-        for model, shape in (("DistributedModel", (2, PATCH.cells)), ("ReducedModel", DISCS.state_shape))
+        for model, shape in (
+            ("DistributedModel", (2, PATCH.cells)),
+            ("ReducedModel", DISCS.state_shape),
+        )
         for name in ("rate", "wrench", "step", "jacobians", "step_jacobians")
     },
     **{
@@ -234,7 +292,10 @@ SPECIAL: dict[str, dict[str, Any]] = {
         for name in ("rate", "force")
     },
     "LimitSurfaceQuartic": {"surface": None},
-    "LimitSurfaceQuartic.fit": {"wrench": Fresh(lambda: pf.LimitSurfaceCells(PATCH).wrench(TWISTS)), "twist": TWISTS},
+    "LimitSurfaceQuartic.fit": {
+        "wrench": Fresh(lambda: pf.LimitSurfaceCells(PATCH).wrench(TWISTS)),
+        "twist": TWISTS,
+    },
     "limit_surface.LimitSurfaceQuartic": {"surface": None},
     "joints.Drive": {"kp": 100.0, "supply": 7.0, "gain": 0.003, "sag": 0.2},
     "joints.Drive.duty": {"error": 0.1 * TIMES},
@@ -253,12 +314,18 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "tau_external": 0.1 * TIMES,
     },
     "joints.JointLog": {
-        **{name: np.sin(20.0 * TIMES) for name in ("q", "torque", "dq", "goal", "voltage", "external")},
+        **{
+            name: np.sin(20.0 * TIMES)
+            for name in ("q", "torque", "dq", "goal", "voltage", "external")
+        },
         "enabled": np.ones(len(TIMES)),
         "drive": pf.joints.Drive(100.0, 7.0),
         "turns": 0,
     },
-    "joints.JointLog.from_csv": {"path": Fresh(lambda: _joint_file("joint.csv")), "drive": None},
+    "joints.JointLog.from_csv": {
+        "path": Fresh(lambda: _joint_file("joint.csv")),
+        "drive": None,
+    },
     "joints.Plant": {"inertia": 0.05, "length": 0.1, "arm_mass": 0.02, "offset": 0.1},
     "joints.identify_joint": {
         "logs": Fresh(lambda: objects()["JointLog"]),
@@ -277,13 +344,21 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "ReducedModelPublished": {"surface": None},
     "Signal.sine": {"t_end": 0.5},
     "Solution.load": {"path": Fresh(lambda: objects()["solution"].save("solution.nc"))},
-    "Signal.from_csv": {"path": EXAMPLES / "load.csv", "value": "normal_force", "time": "time"},
+    "Signal.from_csv": {
+        "path": EXAMPLES / "load.csv",
+        "value": "normal_force",
+        "time": "time",
+    },
     "Scene.from_file": {"path": EXAMPLES / "drift.toml"},
     "Scene.to_file": {"path": "scene.toml"},
     "Solution.save": {"path": "solution.nc"},
     "Log.from_csv": {"path": Fresh(lambda: _log_file("log.csv"))},
     "Log.from_solution": {
-        "solution": Fresh(lambda: pf.simulate(dataclasses.replace(objects()["scene"], save_every=1e-3)))
+        "solution": Fresh(
+            lambda: pf.simulate(
+                dataclasses.replace(objects()["scene"], save_every=1e-3)
+            )
+        )
     },
     "patch.read_pressure_map": {"path": EXAMPLES / "pad_pressure.csv"},
     "Log": {"twist": TWISTS, "wrench": TWISTS},
@@ -298,16 +373,35 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "nuisance": (),
         "noise": (1e-3, 1e-3, 1e-5),
     },
-    "identify.FitOptions": {"noise": (1e-3, 1e-3, 1e-5), "surface": pf.LimitSurfaceCells, "samples": 5000},
+    "identify.FitOptions": {
+        "noise": (1e-3, 1e-3, 1e-5),
+        "surface": pf.LimitSurfaceCells,
+        "samples": 5000,
+    },
     "identify.candidate_motions": {"duration": 0.5, "rate": 500.0},
-    "identify.fit_start": {"body": Fresh(lambda: pf.identify.MassProperties(0.2, 1e-4)), "noise": (1e-3, 1e-3, 0.02)},
-    "identify.predict_slide": {"body": Fresh(lambda: pf.identify.MassProperties(0.2, 1e-4))},
+    "identify.fit_start": {
+        "body": Fresh(lambda: pf.identify.MassProperties(0.2, 1e-4)),
+        "noise": (1e-3, 1e-3, 0.02),
+    },
+    "identify.predict_slide": {
+        "body": Fresh(lambda: pf.identify.MassProperties(0.2, 1e-4))
+    },
     "scenes.in_hand": {"normal_force": None},
-    "scenes.free_slide": {"normal_force": None, "twist": (1.0, 0.0, 10.0), "inertia": None},
+    "scenes.free_slide": {
+        "normal_force": None,
+        "twist": (1.0, 0.0, 10.0),
+        "inertia": None,
+    },
     "scenes.drift": {"load": "normal"},
     "randomise": {"ranges": {"mu_c": (0.2, 0.4)}, "seed": 1},
     "sweep": {
-        "make_scene": Fresh(lambda: lambda mass: pf.scenes.driven(objects()["model"], t_end=0.01, normal_force=mass)),
+        "make_scene": Fresh(
+            lambda: (
+                lambda mass: pf.scenes.driven(
+                    objects()["model"], t_end=0.01, normal_force=mass
+                )
+            )
+        ),
         "values": {"mass": [1.0, 2.0]},
         "out": None,
         "executor": None,
@@ -323,7 +417,11 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "derivatives.rollout_states": {"twist": TWISTS},
     "derivatives.rollout_vjp": {"twist": TWISTS},
     "derivatives.rollout_jacobian": {"twist": TWISTS, "names": ("mu_c",)},
-    "derivatives.scene_sensitivities": {"parameters": ("mu",), "signals": {}, "initial": ("x",)},
+    "derivatives.scene_sensitivities": {
+        "parameters": ("mu",),
+        "signals": {},
+        "initial": ("x",),
+    },
     "derivatives.scene_gradient": {
         "parameters": ("mu",),
         "signals": {},
@@ -347,12 +445,18 @@ def _public(prefix: str, value: Any) -> Iterator[tuple[str, Callable[..., Any]]]
     for name in dir(value):
         method = inspect.getattr_static(value, name)
         own = getattr(method, "__func__", method)
-        if name in PROTOCOL.split() or (name.startswith("_") and name != "__call__") or not callable(own):
+        if (
+            name in PROTOCOL.split()
+            or (name.startswith("_") and name != "__call__")
+            or not callable(own)
+        ):
             continue
         if isinstance(method, (classmethod, staticmethod)):
             if value.__name__ not in RECORDS.split() or name in vars(value):
                 yield f"{prefix}.{name}", getattr(value, name)
-        elif value.__name__ not in RECORDS.split() and getattr(own, "__module__", "").startswith("planarfriction"):
+        elif value.__name__ not in RECORDS.split() and getattr(
+            own, "__module__", ""
+        ).startswith("planarfriction"):
             yield f"{prefix}.{name}", own
 
 
@@ -360,10 +464,16 @@ def _names() -> Iterator[tuple[str, Callable[..., Any]]]:
     seen = set()
     for name in pf.__all__:
         value = getattr(pf, name)
-        inner = getattr(value, "__all__", []) if isinstance(value, types.ModuleType) else [None]
+        inner = (
+            getattr(value, "__all__", [])
+            if isinstance(value, types.ModuleType)
+            else [None]
+        )
         for part in inner:
             found = value if part is None else getattr(value, part)
-            if not any(found is each for each in seen if each is not None) and callable(found):
+            if not any(found is each for each in seen if each is not None) and callable(
+                found
+            ):
                 seen.add(found)
                 yield from _public(name if part is None else f"{name}.{part}", found)
 
@@ -382,14 +492,18 @@ def targets() -> list[Target]:
                 continue
             if parameter.name == "self":
                 if owner[0] not in objects():
-                    raise LookupError(f"tests/fuzz/legal.py has no instance of {owner[0]}")
+                    raise LookupError(
+                        f"tests/fuzz/legal.py has no instance of {owner[0]}"
+                    )
                 arguments["self"] = objects()[owner[0]]
             elif parameter.name in special:
                 arguments[parameter.name] = special[parameter.name]
             elif parameter.name in objects():
                 arguments[parameter.name] = objects()[parameter.name]
             elif parameter.default is parameter.empty:
-                raise LookupError(f"tests/fuzz/legal.py has no legal {parameter.name!r} for {name}")
+                raise LookupError(
+                    f"tests/fuzz/legal.py has no legal {parameter.name!r} for {name}"
+                )
         if set(arguments) - {"self"}:
             result.append(Target(name, call, arguments))
     return result

@@ -17,10 +17,15 @@ from hypothesis import strategies as st
 class Tensor:
     """Refuses to become an array, as a torch tensor that records its derivatives does."""
 
-    shape, ndim, dtype, requires_grad = (3,), 1, "torch.float64", True
+    shape = (3,)
+    ndim = 1
+    dtype = "torch.float64"
+    requires_grad = True
 
     def __array__(self, *arguments, **options):
-        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
+        raise RuntimeError(
+            "Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead."
+        )
 
     def __float__(self):
         raise ValueError("only one element tensors can be converted to Python scalars")
@@ -32,7 +37,9 @@ class Tensor:
         return 3
 
     def __eq__(self, other):
-        raise RuntimeError("Boolean value of Tensor with more than one value is ambiguous")
+        raise RuntimeError(
+            "Boolean value of Tensor with more than one value is ambiguous"
+        )
 
     __hash__ = object.__hash__
 
@@ -40,7 +47,9 @@ class Tensor:
 class Quantity:
     """A number with a unit, as of Pint: millimetres are no metres."""
 
-    magnitude, units, dimensionality = 3.0, "millimeter", "[length]"
+    magnitude = 3.0
+    units = "millimeter"
+    dimensionality = "[length]"
 
     def __array__(self, *arguments, **options):
         return np.asarray(self.magnitude)
@@ -96,7 +105,9 @@ WRONG: dict[str, Callable[[], Any]] = {
     "timedelta64": lambda: np.timedelta64(1, "s"),
     "timedelta64 array": lambda: np.array([0, 1, 2], dtype="timedelta64[ms]"),
     "datetime64": lambda: np.datetime64("2024-01-01"),
-    "datetime64 array": lambda: np.array(["2024-01-01", "2024-01-02", "2024-01-03"], dtype="datetime64[D]"),
+    "datetime64 array": lambda: np.array(
+        ["2024-01-01", "2024-01-02", "2024-01-03"], dtype="datetime64[D]"
+    ),
     "masked": lambda: np.ma.masked_array([1.0, 2.0, 3.0], mask=[False, True, False]),
     "masked scalar": lambda: np.ma.masked,
     "ragged": lambda: [[1.0], [2.0, 3.0]],
@@ -216,11 +227,21 @@ ODD: dict[str, Callable[[], Any]] = {
 
 NASTY = {**WRONG, **ODD}
 
-_NUMBERS = st.floats() | st.integers() | st.floats(1e-12, 1e12) | st.sampled_from([0.0, -0.0, 5e-324, 1e308, math.nan])
-_SIMPLE = _NUMBERS | st.text(max_size=20) | st.none() | st.booleans() | st.complex_numbers()
+_NUMBERS = (
+    st.floats()
+    | st.integers()
+    | st.floats(1e-12, 1e12)
+    | st.sampled_from([0.0, -0.0, 5e-324, 1e308, math.nan])
+)
+_SIMPLE = (
+    _NUMBERS | st.text(max_size=20) | st.none() | st.booleans() | st.complex_numbers()
+)
 _NESTED = st.recursive(
     _SIMPLE,
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(st.text(max_size=5), inner, max_size=3)
+    ),
     max_leaves=8,
 )
 _ARRAYS = st.builds(
@@ -234,5 +255,7 @@ _ARRAYS = st.builds(
 def nasty() -> st.SearchStrategy[tuple[str, Callable[[], Any]]]:
     """Its name, and how to make it again (a generator can be used once)."""
     listed = st.sampled_from(sorted(NASTY.items()))
-    drawn = (_NUMBERS | _NESTED | _ARRAYS).map(lambda value: (f"{type(value).__name__} {value!r:.60}", lambda: value))
+    drawn = (_NUMBERS | _NESTED | _ARRAYS).map(
+        lambda value: (f"{type(value).__name__} {value!r:.60}", lambda: value)
+    )
     return st.one_of(listed, listed, drawn)

@@ -31,8 +31,12 @@ def law(draw: random.Random) -> pf.laws.FrictionLaw:
     if kind == 0:
         return pf.Dahl(mu_c, spread(draw, 0, 9))
     if kind == 1:
-        mu_s, v_s, gamma = mu_c * (1.0 + spread(draw, -4, 1)), spread(draw, -7, 1), draw.uniform(0.3, 4.0)
-        return pf.CoulombStribeck(mu_c, mu_s, v_s, gamma, creep_speed=spread(draw, -8, -3))
+        mu_s = mu_c * (1.0 + spread(draw, -4, 1))
+        v_s = spread(draw, -7, 1)
+        gamma = draw.uniform(0.3, 4.0)
+        return pf.CoulombStribeck(
+            mu_c, mu_s, v_s, gamma, creep_speed=spread(draw, -8, -3)
+        )
     return pf.LuGre(
         mu_c,
         mu_c * draw.choice([1.0, 1.0 + spread(draw, -4, 1)]),
@@ -49,7 +53,9 @@ def patch(draw: random.Random, *, follows_load: bool = False) -> pf.ContactPatch
     """Any patch of a few cells; with `follows_load` one whose pressure changes with the load."""
     size = spread(draw, -4, -1)
     if follows_load:
-        finger = pf.SoftFinger(c=0.3 * size, n=draw.uniform(0.0, 0.5), k=draw.uniform(1.5, 4.0))
+        finger = pf.SoftFinger(
+            c=0.3 * size, n=draw.uniform(0.0, 0.5), k=draw.uniform(1.5, 4.0)
+        )
         return pf.ContactPatch.disc(size, draw.randint(4, 9), pressure=finger)
     kind = draw.randrange(6)
     if kind == 0:
@@ -58,15 +64,26 @@ def patch(draw: random.Random, *, follows_load: bool = False) -> pf.ContactPatch
         cells = draw.randint(1, 5), draw.randint(2, 5)
         return pf.ContactPatch.rectangle(size, size * spread(draw, -2, 2), cells=cells)
     if kind == 2:
-        return pf.ContactPatch.line(size, draw.randint(2, 9), direction=draw.choice("xy"))
+        return pf.ContactPatch.line(
+            size, draw.randint(2, 9), direction=draw.choice("xy")
+        )
     if kind == 3:
         count = draw.randint(2, 6)
-        positions = [(size * draw.uniform(-1, 1), size * draw.uniform(-1, 1)) for _ in range(count)]
-        return pf.ContactPatch.points(positions, [spread(draw, -2, 0) for _ in range(count)])
+        positions = [
+            (size * draw.uniform(-1, 1), size * draw.uniform(-1, 1))
+            for _ in range(count)
+        ]
+        return pf.ContactPatch.points(
+            positions, [spread(draw, -2, 0) for _ in range(count)]
+        )
     if kind == 4:
         gradient = (draw.uniform(-0.9, 0.9) / size, 0.0)
-        return pf.ContactPatch.rectangle(size, cells=5, pressure=pf.LinearGradient(gradient))
-    values = np.array([[draw.choice([0.0, spread(draw, -2, 2)]) for _ in range(4)] for _ in range(4)])
+        return pf.ContactPatch.rectangle(
+            size, cells=5, pressure=pf.LinearGradient(gradient)
+        )
+    values = np.array(
+        [[draw.choice([0.0, spread(draw, -2, 2)]) for _ in range(4)] for _ in range(4)]
+    )
     values[0, 0] = values[-1, -1] = 1.0
     return pf.ContactPatch.from_pressure(values, size / 4)
 
@@ -79,44 +96,73 @@ def twist(draw: random.Random, size: float) -> np.ndarray:
     return speed * direction
 
 
-def signal(draw: random.Random, t_end: float, sample: Callable[[], object]) -> pf.Signal:
+def signal(
+    draw: random.Random, t_end: float, sample: Callable[[], object]
+) -> pf.Signal:
     """A constant, or samples that are held or joined."""
     if draw.random() < 0.4:
         return pf.Signal.constant(sample())
     count = draw.randint(1, 6)
     times = np.sort([draw.uniform(0.0, 1.2 * t_end) for _ in range(count)])
-    return pf.Signal.sampled(times, [sample() for _ in range(count)], draw.choice(["previous", "linear"]))
+    return pf.Signal.sampled(
+        times, [sample() for _ in range(count)], draw.choice(["previous", "linear"])
+    )
 
 
 def model(draw: random.Random) -> pf.models.FrictionModel:
     """Any model; of a patch that follows the load only the ones that need no maps for it."""
     follows = draw.random() < 0.2
-    make = MODELS[draw.choice(["distributed", "published"] if follows else list(MODELS))]
+    make = MODELS[
+        draw.choice(["distributed", "published"] if follows else list(MODELS))
+    ]
     return make(patch(draw, follows_load=follows), law(draw))
 
 
 def scene(draw: random.Random) -> pf.Scene:
     """Any scene of one to three contacts, for a short time."""
-    t_end, mass = spread(draw, -3, -1), spread(draw, -2, 2)
+    t_end = spread(draw, -3, -1)
+    mass = spread(draw, -2, 2)
 
     def load() -> float:
         return draw.choice([0.0, mass * spread(draw, 0, 2), mass * spread(draw, 0, 2)])
 
     def contact(number: int) -> pf.Contact:
-        options = {"mounted_on": draw.choice(["world", "body"]), "angle": draw.uniform(-math.pi, math.pi)}
-        options |= {"position": (draw.uniform(-0.1, 0.1), draw.uniform(-0.1, 0.1)), "count": draw.randint(1, 3)}
+        options = {
+            "mounted_on": draw.choice(["world", "body"]),
+            "angle": draw.uniform(-math.pi, math.pi),
+        }
+        options |= {
+            "position": (draw.uniform(-0.1, 0.1), draw.uniform(-0.1, 0.1)),
+            "count": draw.randint(1, 3),
+        }
         if velocity is None and draw.random() < 0.2:
-            options["support_velocity"] = signal(draw, t_end, lambda: [draw.uniform(-1, 1), 0.0, draw.uniform(-10, 10)])
-        made, name = model(draw), f"{draw.choice('aφ')} {number}"
+            options["support_velocity"] = signal(
+                draw, t_end, lambda: [draw.uniform(-1, 1), 0.0, draw.uniform(-10, 10)]
+            )
+        made = model(draw)
+        name = f"{draw.choice('aφ')} {number}"
         if count == 1 and isinstance(made.reduction, pf.DistributedModel):
-            options |= {"mounted_on": "body", "pressure": "follows", "height": draw.choice([0.0, spread(draw, -3, 0)])}
+            options |= {
+                "mounted_on": "body",
+                "pressure": "follows",
+                "height": draw.choice([0.0, spread(draw, -3, 0)]),
+            }
         return pf.Contact(made, signal(draw, t_end, load), name=name, **options)
 
-    velocity, force = None, None
+    velocity = None
+    force = None
     if draw.random() < 0.3:
-        velocity = signal(draw, t_end, lambda: [draw.uniform(-1, 1), draw.uniform(-1, 1), draw.uniform(-10, 10)])
+        velocity = signal(
+            draw,
+            t_end,
+            lambda: [draw.uniform(-1, 1), draw.uniform(-1, 1), draw.uniform(-10, 10)],
+        )
     elif draw.random() < 0.5:
-        force = signal(draw, t_end, lambda: [mass * draw.uniform(-20, 20), 0.0, mass * draw.uniform(-0.1, 0.1)])
+        force = signal(
+            draw,
+            t_end,
+            lambda: [mass * draw.uniform(-20, 20), 0.0, mass * draw.uniform(-0.1, 0.1)],
+        )
     body = pf.Body(
         mass,
         mass * spread(draw, -5, -1),

@@ -22,7 +22,15 @@ from planarfriction.cli.identify import plan
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 PLAN = "identify plan"
 LEGAL = {
-    "run": ["in-hand", "--model", "reduced-published", "--patch", "Line", "--t-end", "0.02"],
+    "run": [
+        "in-hand",
+        "--model",
+        "reduced-published",
+        "--patch",
+        "Line",
+        "--t-end",
+        "0.02",
+    ],
     "sweep": [
         "driven",
         "--model",
@@ -58,14 +66,21 @@ def text(draw: random.Random) -> str:
 
 def options(command: click.Command) -> list[str]:
     """All options and flags of a command."""
-    return [name for parameter in command.params if isinstance(parameter, click.Option) for name in parameter.opts]
+    return [
+        name
+        for parameter in command.params
+        if isinstance(parameter, click.Option)
+        for name in parameter.opts
+    ]
 
 
 def arguments(name: str, draw: random.Random) -> list[str]:
     """The legal ones with up to three changes."""
-    result, known = list(LEGAL.get(name, ["--help"])), options(plan if name == PLAN else app.commands[name])
+    result = list(LEGAL.get(name, ["--help"]))
+    known = options(plan if name == PLAN else app.commands[name])
     for _ in range(draw.randint(0, 3)):
-        change, at = draw.randrange(4), draw.randrange(len(result) + 1)
+        change = draw.randrange(4)
+        at = draw.randrange(len(result) + 1)
         if change == 0 and result:
             result[min(at, len(result) - 1)] = text(draw)
         elif change == 1:
@@ -79,7 +94,14 @@ def arguments(name: str, draw: random.Random) -> list[str]:
 def test_commands(draw: random.Random) -> None:
     name = draw.choice([*app.commands, "run", "limit-surface", "identify", PLAN])
     given = [*name.split(), *arguments(name, draw)]
-    if name in ("bench", "explore", "referee", "reproduce", "simulators", "warm") and not {
+    if name in (
+        "bench",
+        "explore",
+        "referee",
+        "reproduce",
+        "simulators",
+        "warm",
+    ) and not {
         "--list",
         "--help",
         "nothing",
@@ -87,14 +109,24 @@ def test_commands(draw: random.Random) -> None:
         return  # minutes of work, or a server that goes on
 
     def run() -> None:
-        output, errors = io.StringIO(), io.StringIO()
+        output = io.StringIO()
+        errors = io.StringIO()
         with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
             code = main(given)
         plt.close("all")
         if code in (0, OUT_OF_TOLERANCE, INTERRUPTED):
             return
-        lines = [line for line in errors.getvalue().splitlines(keepends=True) if not line.startswith("warning: ")]
-        if code != 2 or not lines or not lines[0].startswith("error: ") or not lines[-1].endswith("\n"):
+        lines = [
+            line
+            for line in errors.getvalue().splitlines(keepends=True)
+            if not line.startswith("warning: ")
+        ]
+        if (
+            code != 2
+            or not lines
+            or not lines[0].startswith("error: ")
+            or not lines[-1].endswith("\n")
+        ):
             raise Broken(f"exit code {code} and {errors.getvalue()[:200]!r}")
         raise FrictionError("".join(lines)[len("error: ") : -1])
 
@@ -110,4 +142,6 @@ def test_commands(draw: random.Random) -> None:
         try:
             judge("commands", run, compiles=True)
         except Broken as broken:
-            raise Broken(f"planarfriction {' '.join(given)[:300]!r}: {broken}") from broken
+            raise Broken(
+                f"planarfriction {' '.join(given)[:300]!r}: {broken}"
+            ) from broken

@@ -16,7 +16,13 @@ from working import use
 
 from planarfriction import families
 
-FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
+FAMILIES = (
+    families.LAWS,
+    families.MODELS,
+    families.SURFACES,
+    families.SHAPES,
+    families.SCENES,
+)
 
 
 @functools.cache
@@ -26,12 +32,21 @@ def targets() -> dict[str, legal.Target]:
 
 def places() -> st.SearchStrategy[tuple[str, str]]:
     """A target and one of its arguments."""
-    return st.sampled_from([(name, each) for name in targets() for each in targets()[name].arguments if each != "self"])
+    return st.sampled_from(
+        [
+            (name, each)
+            for name in targets()
+            for each in targets()[name].arguments
+            if each != "self"
+        ]
+    )
 
 
 def called(target: legal.Target, **changed: Any) -> Any:
     """Call the target with legal arguments but for the changed ones, and use what it gives."""
-    arguments = {name: legal.made(value) for name, value in target.arguments.items()} | changed
+    arguments = {
+        name: legal.made(value) for name, value in target.arguments.items()
+    } | changed
     own = [arguments.pop("self")] if "self" in arguments else []
     before = [dict(family._members) for family in FAMILIES]
     try:
@@ -39,7 +54,9 @@ def called(target: legal.Target, **changed: Any) -> Any:
         use(result)
     finally:
         plt.close("all")
-        for family, members in zip(FAMILIES, before, strict=True):  # what was registered is forgotten
+        for family, members in zip(
+            FAMILIES, before, strict=True
+        ):  # what was registered is forgotten
             family._members = members
     return (result,)
 
@@ -51,7 +68,9 @@ def compiled(name: str) -> None:
     with folder():
         judge("constructors: legal", lambda: called(targets()[name]), compiles=True)
     if CASES["constructors: legal, refused"] > before:
-        raise Broken("legal arguments are refused, so that wrong ones are refused for another reason")
+        raise Broken(
+            "legal arguments are refused, so that wrong ones are refused for another reason"
+        )
 
 
 def numeric(value: Any) -> bool:
@@ -73,16 +92,30 @@ def test_legal_arguments_are_legal():
 
 @attack("constructors", 2000, st.deferred(places), nasty.nasty())
 def test_one_wrong_argument(place, drawn) -> None:
-    (name, argument), (what, make) = place, drawn
+    (name, argument) = place
+    (what, make) = drawn
     target = targets()[name]
     compiled(name)
     names = tuple(each for each in target.arguments if each != "self")
-    if argument in ("path", "folder", "data", "make_scene"):  # messages name the file or the key instead
+    if argument in (
+        "path",
+        "folder",
+        "data",
+        "make_scene",
+    ):  # messages name the file or the key instead
         names = ()
     try:
         with folder():
-            result = judge("constructors", lambda: called(target, **{argument: make()}), names=names)
-        if result is not None and what in nasty.WRONG and numeric(legal.made(target.arguments[argument])):
+            result = judge(
+                "constructors",
+                lambda: called(target, **{argument: make()}),
+                names=names,
+            )
+        if (
+            result is not None
+            and what in nasty.WRONG
+            and numeric(legal.made(target.arguments[argument]))
+        ):
             raise Broken("is taken for numbers")
     except Broken as broken:
         raise Broken(f"{name}({argument}=<{what}>): {broken}") from broken

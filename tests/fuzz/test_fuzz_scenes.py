@@ -34,10 +34,15 @@ def test_scenes_run_and_come_back(draw: random.Random) -> None:
         return
     use(solution)
     with folder() as here:
-        loaded = judge("scenes: saved and loaded", lambda: pf.Solution.load(solution.save(here / "solution.nc")))
+        loaded = judge(
+            "scenes: saved and loaded",
+            lambda: pf.Solution.load(solution.save(here / "solution.nc")),
+        )
         name = draw.choice(["scene.toml", "scene.json"])
         scene.to_file(here / name)
-        read = judge("scenes: written and read", lambda: pf.Scene.from_file(here / name))
+        read = judge(
+            "scenes: written and read", lambda: pf.Scene.from_file(here / name)
+        )
     if loaded is None or not same(loaded, solution):
         raise Broken("the solution is not what was saved")
     for again in (read, pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
@@ -45,17 +50,33 @@ def test_scenes_run_and_come_back(draw: random.Random) -> None:
             raise Broken("the scene is not what was written")
     again = pf.simulate(read, bristles="all")
     if not same(again, solution):
-        raise Broken(f"the scene that was read runs otherwise: {told(scene, solution, again)}")
+        raise Broken(
+            f"the scene that was read runs otherwise: {told(scene, solution, again)}"
+        )
 
 
 def told(scene: pf.Scene, first: pf.Solution, second: pf.Solution) -> str:
     """What differs and by how much, and which of the two a third run is like."""
     third = pf.simulate(scene, bristles="all")
-    like = " and ".join(word for word, each in (("first", first), ("second", second)) if same(third, each)) or "neither"
+    like = (
+        " and ".join(
+            word
+            for word, each in (("first", first), ("second", second))
+            if same(third, each)
+        )
+        or "neither"
+    )
     if len(first.data.time) != len(second.data.time):
         return f"{len(first.data.time)} samples, then {len(second.data.time)}; a third run is like {like}"
-    pairs = ((name, first.data[name].values, second.data[name].values) for name in sorted(first.data.variables))
-    apart = [f"{name} {np.abs(a - b).max():.1e}" for name, a, b in pairs if a.dtype.kind == "f" and (a != b).any()]
+    pairs = (
+        (name, first.data[name].values, second.data[name].values)
+        for name in sorted(first.data.variables)
+    )
+    apart = [
+        f"{name} {np.abs(a - b).max():.1e}"
+        for name, a, b in pairs
+        if a.dtype.kind == "f" and (a != b).any()
+    ]
     return f"{first.status}, {second.status}, {', '.join(apart)}; a third run is like {like}"
 
 
@@ -64,16 +85,31 @@ def test_parts_come_back(draw: random.Random) -> None:
     model = judge("round trips: built", lambda: some.model(draw), compiles=True)
     if model is None:
         return
-    state, load = model.rest(), some.spread(draw, -1, 1)
-    twist, dt = some.twist(draw, 0.01), some.spread(draw, -6, -1)
-    stepped = judge("round trips: stepped", lambda: model.step(state, twist, load, dt), compiles=True)
+    state = model.rest()
+    load = some.spread(draw, -1, 1)
+    twist = some.twist(draw, 0.01)
+    dt = some.spread(draw, -6, -1)
+    stepped = judge(
+        "round trips: stepped",
+        lambda: model.step(state, twist, load, dt),
+        compiles=True,
+    )
     if stepped is None:
         return
     steps = [stepped[1].tobytes()]
     contact = pf.Contact(model, load)
     scene = pf.Scene(pf.Body(1.0, 0.1), [contact], 1.0)
-    read = judge("round trips: read", lambda: pf.Scene.from_dict(scene.to_dict())).contacts[0].model
-    for again in (read, pickle.loads(pickle.dumps(model)), copy.copy(model), copy.deepcopy(model)):
+    read = (
+        judge("round trips: read", lambda: pf.Scene.from_dict(scene.to_dict()))
+        .contacts[0]
+        .model
+    )
+    for again in (
+        read,
+        pickle.loads(pickle.dumps(model)),
+        copy.copy(model),
+        copy.deepcopy(model),
+    ):
         steps.append(again.step(again.rest(), twist, load, dt)[1].tobytes())
         if (again.law, again.patch, again) != (model.law, model.patch, model):
             raise Broken(f"a {type(model).__name__} differs from its copy")

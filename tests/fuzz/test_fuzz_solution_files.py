@@ -28,10 +28,20 @@ def saved() -> bytes:
 
 def same(first: pf.Solution, second: pf.Solution) -> bool:
     """To the last bit, with its scene; notes in the attributes apart."""
-    if set(first.data.variables) != set(second.data.variables) or first.scene.digest() != second.scene.digest():
+    if (
+        set(first.data.variables) != set(second.data.variables)
+        or first.scene.digest() != second.scene.digest()
+    ):
         return False
-    alike = all(np.array_equal(first.data[name].values, second.data[name].values) for name in first.data.variables)
-    return alike and first.data.attrs["scene"] == second.data.attrs["scene"] and first.status == second.status
+    alike = all(
+        np.array_equal(first.data[name].values, second.data[name].values)
+        for name in first.data.variables
+    )
+    return (
+        alike
+        and first.data.attrs["scene"] == second.data.attrs["scene"]
+        and first.status == second.status
+    )
 
 
 def test_the_untouched_file_is_the_solution():
@@ -48,7 +58,9 @@ def test_a_file_with_other_bytes(draw: random.Random) -> None:
     with folder() as here:
         path = here / "solution.nc"
         path.write_bytes(changed)
-        loaded = judge("solution files", lambda: pf.Solution.load(path), names=("solution.nc",))
+        loaded = judge(
+            "solution files", lambda: pf.Solution.load(path), names=("solution.nc",)
+        )
     if loaded is not None and not same(loaded, solution()):
         raise Broken("the file was damaged, and loads as something else")
 

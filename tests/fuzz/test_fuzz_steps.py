@@ -27,24 +27,34 @@ FAR = 1e12
 def check_bounds(name: str, model, state: np.ndarray) -> None:
     """No bristle is deflected by more than the law holds; a mean over bristles neither."""
     law = model.law.numbers
-    largest, lengths = max(law.mu_s, law.mu_c) / law.sigma_0, np.hypot(state[0], state[1])
+    largest = max(law.mu_s, law.mu_c) / law.sigma_0
+    lengths = np.hypot(state[0], state[1])
     if (lengths > largest * (1.0 + BEYOND[name])).any():
-        raise Broken(f"a bristle is deflected by {lengths.max()} m, the law holds {largest} m")
+        raise Broken(
+            f"a bristle is deflected by {lengths.max()} m, the law holds {largest} m"
+        )
 
 
 def walk(draw: random.Random, name: str) -> None:
     kind = f"steps: {name}"
-    model = judge(kind, lambda: some.MODELS[name](some.patch(draw), some.law(draw)), compiles=True)
+    model = judge(
+        kind, lambda: some.MODELS[name](some.patch(draw), some.law(draw)), compiles=True
+    )
     if model is None:
         return
-    size, state = float(np.abs(model.patch.positions).max()) or 1.0, model.rest()
-    twist, load, dt = some.twist(draw, size), some.spread(draw, -6, 4), some.spread(draw, -9, 1)
+    size = float(np.abs(model.patch.positions).max()) or 1.0
+    state = model.rest()
+    twist = some.twist(draw, size)
+    load = some.spread(draw, -6, 4)
+    dt = some.spread(draw, -9, 1)
     for _ in range(40):
         if draw.random() < 0.4:
             twist = some.twist(draw, size)
         load = draw.choice([load, load, some.spread(draw, -6, 4), 0.0])
         dt = draw.choice([dt, some.spread(draw, -9, 2), 0.0])
-        state, wrench = judge(kind, functools.partial(model.step, state, twist, load, dt), compiles=True)
+        state, wrench = judge(
+            kind, functools.partial(model.step, state, twist, load, dt), compiles=True
+        )
         finite((state, wrench), "a step")
         check_bounds(name, model, state)
         if load == 0.0 and (state.any() or wrench.any()):
@@ -54,7 +64,10 @@ def walk(draw: random.Random, name: str) -> None:
     steady = judge(kind, lambda: model.step(state, slip, load or 1.0, FAR / 1e-12))[1]
     if steady @ slip > ROUNDING * np.abs(steady * slip).sum():
         raise Broken(f"steady sliding with {slip} gives power: {steady}")
-    for slopes in (model.jacobians(state, twist, load), model.step_jacobians(state, twist, load, dt)):
+    for slopes in (
+        model.jacobians(state, twist, load),
+        model.step_jacobians(state, twist, load, dt),
+    ):
         finite(tuple(slopes), "a Jacobian")
 
 

@@ -30,7 +30,13 @@ pf.sweep(scene, {values!r}, out=sys.argv[1])
 def swept(out: str) -> object:
     """Return the sweep, finished in this process."""
     model = pf.ReducedModelPublished(pf.ContactPatch.disc(0.01, 5), pf.LuGre())
-    return pf.sweep(lambda mass, fall: pf.scenes.driven(model, t_end=0.02, normal_force=mass * fall), VALUES, out=out)
+    return pf.sweep(
+        lambda mass, fall: pf.scenes.driven(
+            model, t_end=0.02, normal_force=mass * fall
+        ),
+        VALUES,
+        out=out,
+    )
 
 
 def same(found, expected) -> None:
@@ -42,16 +48,21 @@ def same(found, expected) -> None:
 @attack("sweeps", 2)
 def test_killed_sweeps(draw: random.Random) -> None:
     with folder():
-        out, expected = "runs", swept("whole")
+        out = "runs"
+        expected = swept("whole")
         script = SCRIPT.format(values=VALUES)
         for _ in range(2):
-            process = subprocess.Popen([sys.executable, "-c", script, out], stderr=subprocess.DEVNULL)
+            process = subprocess.Popen(
+                [sys.executable, "-c", script, out], stderr=subprocess.DEVNULL
+            )
             deadline = time.monotonic() + draw.uniform(1.0, 6.0)
             while process.poll() is None and time.monotonic() < deadline:
                 time.sleep(0.002)
             process.send_signal(signal.SIGKILL)
             process.wait()
-        found = judge("sweeps that were killed and go on", lambda: swept(out), compiles=True)
+        found = judge(
+            "sweeps that were killed and go on", lambda: swept(out), compiles=True
+        )
         if found is None:
             raise Broken("cannot go on after a kill")
         same(found, expected)
@@ -60,7 +71,8 @@ def test_killed_sweeps(draw: random.Random) -> None:
 @attack("sweeps", 6)
 def test_damaged_stores(draw: random.Random) -> None:
     with folder() as here:
-        out, expected = "runs", swept("whole")
+        out = "runs"
+        expected = swept("whole")
         swept(out)
         files = sorted(path for path in (here / out).rglob("*") if path.is_file())
         path = draw.choice(files)

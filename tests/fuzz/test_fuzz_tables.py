@@ -16,7 +16,9 @@ import planarfriction as pf
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 TIME = np.arange(30) * 0.01
-MOTION = np.stack([0.01 * np.sin(9.0 * TIME), 0.01 * TIME, 0.2 * np.sin(5.0 * TIME)], axis=1)
+MOTION = np.stack(
+    [0.01 * np.sin(9.0 * TIME), 0.01 * TIME, 0.2 * np.sin(5.0 * TIME)], axis=1
+)
 
 
 def log(names: str, columns: np.ndarray) -> bytes:
@@ -27,15 +29,23 @@ def log(names: str, columns: np.ndarray) -> bytes:
 
 
 LOGS = [
-    log("t,vx,vy,omega,fx,fy,tau,normal_force", np.column_stack([TIME, MOTION, -MOTION, 2.0 + TIME])),
-    log("t,x,y,theta,fx,fy,tau,normal_force", np.column_stack([TIME, MOTION, -MOTION, 2.0 + TIME])),
+    log(
+        "t,vx,vy,omega,fx,fy,tau,normal_force",
+        np.column_stack([TIME, MOTION, -MOTION, 2.0 + TIME]),
+    ),
+    log(
+        "t,x,y,theta,fx,fy,tau,normal_force",
+        np.column_stack([TIME, MOTION, -MOTION, 2.0 + TIME]),
+    ),
 ]
 MAP = np.outer(np.arange(1, 6), np.arange(1, 8))
 
 
 def picture(kind: str, mode: str) -> bytes:
     file = io.BytesIO()
-    Image.fromarray((255 * MAP / MAP.max()).astype(np.uint8)).convert(mode).save(file, format=kind)
+    Image.fromarray((255 * MAP / MAP.max()).astype(np.uint8)).convert(mode).save(
+        file, format=kind
+    )
     return file.getvalue()
 
 
@@ -61,7 +71,11 @@ def test_signals(draw: random.Random) -> None:
     with folder() as here:
         path = here / "load.csv"
         path.write_bytes(mutated_bytes((EXAMPLES / "load.csv").read_bytes(), draw))
-        read = judge("tables: signals", lambda: pf.Signal.from_csv(path, value="normal_force"), names=("load.csv",))
+        read = judge(
+            "tables: signals",
+            lambda: pf.Signal.from_csv(path, value="normal_force"),
+            names=("load.csv",),
+        )
         if read is not None:
             finite((read.times, read.values), "the signal")
 
@@ -71,7 +85,9 @@ def test_logs(draw: random.Random) -> None:
     with folder() as here:
         path = here / "log.csv"
         path.write_bytes(mutated_bytes(draw.choice(LOGS), draw))
-        read = judge("tables: logs", lambda: pf.identify.Log.from_csv(path), names=("log.csv",))
+        read = judge(
+            "tables: logs", lambda: pf.identify.Log.from_csv(path), names=("log.csv",)
+        )
         if read is not None:
             finite((read.time, read.twist, read.wrench, read.normal_force), "the log")
 
@@ -82,8 +98,14 @@ def test_pressure_maps(draw: random.Random) -> None:
     with folder() as here:
         path = here / name
         path.write_bytes(mutated_bytes(draw.choice(MAPS[name]), draw))
-        made = judge("tables: pressure maps", lambda: pf.ContactPatch.from_pressure(path, 0.001), names=("map",))
+        made = judge(
+            "tables: pressure maps",
+            lambda: pf.ContactPatch.from_pressure(path, 0.001),
+            names=("map",),
+        )
         if made is not None:
             finite((made.weights(), made.contact_radius()), "the patch")
-            if abs(made.weights().sum() - 1.0) > 1e-9:  # rounding of a sum over at most 1e5 cells
+            if (
+                abs(made.weights().sum() - 1.0) > 1e-9
+            ):  # rounding of a sum over at most 1e5 cells
                 raise Broken("the weights of the map do not add up to one")

@@ -21,13 +21,20 @@ def use(value: Any) -> None:
 @use.register
 def _(data: xr.Dataset) -> None:
     """Check that each failed run of a sweep, and no other, gives a reason."""
-    for status, each in zip(data.status.values.ravel(), data.failure.values.ravel(), strict=True):
+    for status, each in zip(
+        data.status.values.ravel(), data.failure.values.ravel(), strict=True
+    ):
         assert (status == "failed") == bool(each)
 
 
 @use.register
 def _(patch: pf.ContactPatch) -> None:
-    for results in (patch.weights(1.0), patch.centre_of_pressure(1.0), patch.contact_radius(1.0), patch.area(1.0)):
+    for results in (
+        patch.weights(1.0),
+        patch.centre_of_pressure(1.0),
+        patch.contact_radius(1.0),
+        patch.area(1.0),
+    ):
         finite(results, "a property of the patch")
     finite(patch.moments(2, 1.0), "moments")
     pf.ContactPatch.from_dict(patch.to_dict())
@@ -56,20 +63,43 @@ def _(law: pf.laws.FrictionLaw) -> None:
 
 @use.register
 def _(law: pf.Coulomb) -> None:
-    finite(law.wrench(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01, 5)), (1.0, 0.0, 1.0), 1.0), "wrench")
+    finite(
+        law.wrench(
+            pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01, 5)),
+            (1.0, 0.0, 1.0),
+            1.0,
+        ),
+        "wrench",
+    )
 
 
 @use.register
 def _(surface: pf.limit_surface.LimitSurface) -> None:
-    surface = surface.at(1.0) if surface.normal_force is None and surface.patch.depends_on_load else surface
+    surface = (
+        surface.at(1.0)
+        if surface.normal_force is None and surface.patch.depends_on_load
+        else surface
+    )
     for twist in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.01, -0.005, 1.0)):
-        finite((surface.wrench(twist), surface.dissipation(twist), surface.jacobian(twist)), "the surface")
+        finite(
+            (
+                surface.wrench(twist),
+                surface.dissipation(twist),
+                surface.jacobian(twist),
+            ),
+            "the surface",
+        )
 
 
 @use.register
 def _(model: pf.models.FrictionModel) -> None:
     state = model.rest()
-    for twist in ((1e-9, 0.0, 0.0), (1e-3, 1e-4, 0.1), (1.0, 0.0, 10.0), (0.0, 0.0, 0.0)):
+    for twist in (
+        (1e-9, 0.0, 0.0),
+        (1e-3, 1e-4, 0.1),
+        (1.0, 0.0, 10.0),
+        (0.0, 0.0, 0.0),
+    ):
         state, wrench = model.step(state, twist, 1.0, 1e-3)
         finite((state, wrench), "a step")
     finite(tuple(model.jacobians(state, (1e-3, 0.0, 0.1), 1.0)), "a Jacobian")
@@ -86,7 +116,9 @@ def _(scene: pf.Scene) -> None:
     again = pf.Scene.from_dict(scene.to_dict())
     assert again.digest() == scene.digest()
     try:
-        solution = pf.simulate(scene, t_end=min(scene.t_end, 0.01), save_every=min(scene.t_end, 0.01))
+        solution = pf.simulate(
+            scene, t_end=min(scene.t_end, 0.01), save_every=min(scene.t_end, 0.01)
+        )
     except pf.errors.SolverError:
         return
     use(solution)
@@ -99,7 +131,18 @@ def _(contact: pf.Contact) -> None:
 
 @use.register
 def _(body: pf.Body) -> None:
-    use(pf.Scene(body, [pf.Contact(pf.ReducedModelPublished(pf.ContactPatch.disc(0.01, 5), pf.LuGre()), 1.0)], 0.01))
+    use(
+        pf.Scene(
+            body,
+            [
+                pf.Contact(
+                    pf.ReducedModelPublished(pf.ContactPatch.disc(0.01, 5), pf.LuGre()),
+                    1.0,
+                )
+            ],
+            0.01,
+        )
+    )
 
 
 @use.register

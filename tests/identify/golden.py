@@ -23,7 +23,12 @@ from planarfriction.identify import (
     fit_start,
     predict_slide,
 )
-from planarfriction.identify.checks import check_logs, check_sampling, size_of, with_findings
+from planarfriction.identify.checks import (
+    check_logs,
+    check_sampling,
+    size_of,
+    with_findings,
+)
 from planarfriction.identify.decimation import decimated, redrawn, samples_of
 from planarfriction.identify.motion import SlideProblem
 from planarfriction.identify.motion import _identification as result_of_slides
@@ -41,15 +46,29 @@ from tests.identify.test_motion import LAW as SLIDING
 from tests.identify.test_motion import PATCH as STANDING
 from tests.support.identification_logs import LAW, PATCH, clean_log, excitation, noisy
 
-FINGER = pf.ContactPatch.disc(0.012, cells=9, pressure=pf.SoftFinger(c=0.006, n=0.3, k=2.5))
-WIDE = pf.LuGre(mu_c=0.52, mu_s=0.66, v_s=2.2e-3, gamma=1.5, sigma_0=1.9e4, sigma_1=25.0, sigma_2=0.7)
+FINGER = pf.ContactPatch.disc(
+    0.012, cells=9, pressure=pf.SoftFinger(c=0.006, n=0.3, k=2.5)
+)
+WIDE = pf.LuGre(
+    mu_c=0.52,
+    mu_s=0.66,
+    v_s=2.2e-3,
+    gamma=1.5,
+    sigma_0=1.9e4,
+    sigma_1=25.0,
+    sigma_2=0.7,
+)
 
 
-def log(seed: int, load: float = 2.0, duration: float = 0.5, drift: float = 0.02) -> Log:
+def log(
+    seed: int, load: float = 2.0, duration: float = 0.5, drift: float = 0.02
+) -> Log:
     """Return a log with 1 % of noise whose zeros drift."""
     time, twist = excitation(duration=duration)
     clean = clean_log(time, twist, load=load, name=f"log {seed}")
-    drifts = drift * clean.wrench.std(axis=0) * np.linspace(-1.0, 1.0, len(time))[:, None]
+    drifts = (
+        drift * clean.wrench.std(axis=0) * np.linspace(-1.0, 1.0, len(time))[:, None]
+    )
     return noisy(dataclasses.replace(clean, wrench=clean.wrench + drifts), seed)
 
 
@@ -69,7 +88,9 @@ def axis(given: Log) -> Log:
 
 TWO, STILL = (log(1), log(2, 3.0)), (log(1, drift=0.0), log(2, 3.0, drift=0.0))
 ELASTO = dataclasses.replace(WIDE, elasto_plastic=pf.ElastoPlastic(0.88))
-ASIDE = pf.ContactPatch.disc(0.01, cells=11, pressure=lambda x, y: 1.0 + 40.0 * x - 20.0 * y)
+ASIDE = pf.ContactPatch.disc(
+    0.01, cells=11, pressure=lambda x, y: 1.0 + 40.0 * x - 20.0 * y
+)
 """A patch whose centre of pressure is no zero, which would be rounding."""
 NEAR = dataclasses.replace(LAW, mu_c=0.5003, sigma_0=20030.0)
 PROBLEMS: dict[str, tuple] = {
@@ -106,7 +127,8 @@ def fit_at(problem: LogProblem) -> Fit:
     values = np.concatenate([start, rig])
     coordinates = problem.coordinates(start)
     noise, sigma = problem.estimate_noise(values, wrench_noise(problem.logs))
-    x, free = coordinates.of(values), np.zeros(len(values), dtype=bool)
+    x = coordinates.of(values)
+    free = np.zeros(len(values), dtype=bool)
     cost = 0.5 * float((problem.residual(values, sigma) ** 2).sum())
     return Fit(problem, coordinates, x, values, free, noise, sigma, (1, 2), cost)
 
@@ -127,15 +149,29 @@ def numbers_of_problem(given: tuple) -> dict[str, Any]:
         "more steps": problem.refine_steps(fit.values, fit.sigma), "steps": problem.steps,
     }  # fmt: skip
     u = uncertainty(fit)
-    names = "covariance", "pull", "reduced_chi2", "limit", "neighbours", "held_out", "unseen"
-    found |= {name: getattr(u, name) for name in names} | {"strains": [list(each) for each in u.strains]}
+    names = (
+        "covariance",
+        "pull",
+        "reduced_chi2",
+        "limit",
+        "neighbours",
+        "held_out",
+        "unseen",
+    )
+    found |= {name: getattr(u, name) for name in names} | {
+        "strains": [list(each) for each in u.strains]
+    }
     best = Candidate(fit, u)
     return found | result(_identification(best, [best], ["distributed"], (2, 3)))
 
 
 def result(found: Any) -> dict[str, Any]:
     """Return all that a result says."""
-    histories = {name: [each[name] for each in found.histories] for name in found.histories[0] if name != "time"}
+    histories = {
+        name: [each[name] for each in found.histories]
+        for name in found.histories[0]
+        if name != "time"
+    }
     return {
         "table": found.table(), "data": found.to_dict(), "draws": found.sample(5, seed=3), "histories": histories,
         "law": vars(found.law) | {"elasto_plastic": str(found.law.elasto_plastic)},
@@ -146,17 +182,30 @@ def result(found: Any) -> dict[str, Any]:
 
 def numbers_of_plan() -> dict[str, Any]:
     """Compute motions to choose from, their ranks, and what a result says to plan with."""
-    motions = candidate_motions(PATCH, LAW, normal_force=[1.0, 2.0], duration=0.3, speed=0.04)
+    motions = candidate_motions(
+        PATCH, LAW, normal_force=[1.0, 2.0], duration=0.3, speed=0.04
+    )
     fit = fit_at(LogProblem(*PROBLEMS["breakaway"]))
     best = Candidate(fit, uncertainty(fit))
-    patch, law = current_estimate(_identification(best, [best], [], (1, 1)), PATCH, dataclasses.replace(LAW, v_s=1.0))
+    patch, law = current_estimate(
+        _identification(best, [best], [], (1, 1)),
+        PATCH,
+        dataclasses.replace(LAW, v_s=1.0),
+    )
     plans = {
         "first": design_experiment(ASIDE, LAW, motions=motions[:6]),
         "next": design_experiment(ASIDE, LAW, logs=TWO[0], motions=motions[6:], wanted=("sigma_0", "v_s"),
                                   parameters=(*USUAL, "centre_x"), nuisance=("delay", "load")),
     }  # fmt: skip
     told = {
-        name: [each.table(), each.gains, list(each.errors), each.errors_so_far, each.values, each.best.wrench]
+        name: [
+            each.table(),
+            each.gains,
+            list(each.errors),
+            each.errors_so_far,
+            each.values,
+            each.best.wrench,
+        ]
         for name, each in plans.items()
     }
     return told | {
@@ -189,16 +238,24 @@ def findings(given: Log) -> list[str]:
 
 def numbers_of_logs() -> dict[str, Any]:
     """Compute logs from other measurements, what is odd about logs that were misread, and laws to start from."""
-    given, size = STILL[0], float(PATCH.contact_radius())
-    time, twist, wrench, load = given.time, given.twist, given.wrench, given.normal_force
+    given = STILL[0]
+    size = float(PATCH.contact_radius())
+    time = given.time
+    twist = given.twist
+    wrench = given.wrench
+    load = given.normal_force
     pose = np.cumsum(twist, axis=0) * given.interval * [1.0, 1.0, 3.0]
     turned = np.column_stack([pose[:, :2], np.mod(pose[:, 2], 2.0 * np.pi)])
     scene = driven(pf.ReducedModelPublished(PATCH, LAW), normal_force=2.0, t_end=0.7)
     solution = pf.simulate(scene, save_every=0.05)
     made = {
         "motion": Log.from_motion(time, turned, wrench, load, name="turned"),
-        "axis": Log.from_axis(time, wrench[:, 1], load, position=pose[:, 1], axis="y", window=5),
-        "joint": Log.from_axis(time, wrench[:, 2], load, velocity=twist[:, 2], axis="theta"),
+        "axis": Log.from_axis(
+            time, wrench[:, 1], load, position=pose[:, 1], axis="y", window=5
+        ),
+        "joint": Log.from_axis(
+            time, wrench[:, 2], load, velocity=twist[:, 2], axis="theta"
+        ),
         "solution": Log.from_solution(solution),
     }
     misread = {
@@ -213,7 +270,10 @@ def numbers_of_logs() -> dict[str, Any]:
         "N mm": (twist, wrench * [1e-3, 1e-3, 1e3], load),
         "offset": (twist, wrench, np.where(np.arange(len(time)) % 2 < 1, 0.0, load)),
     }
-    logs = {name: each if isinstance(each, Log) else Log(time, *each, name) for name, each in misread.items()}
+    logs = {
+        name: each if isinstance(each, Log) else Log(time, *each, name)
+        for name, each in misread.items()
+    }
     fit = fit_at(LogProblem(*PROBLEMS["near"]))
     best = Candidate(fit, uncertainty(fit))
     base = _identification(best, [best], [], (1, 1))
@@ -238,7 +298,9 @@ def numbers_of_slides() -> dict[str, Any]:
     """Compute the result of slides near the values that made them, and the prediction of one."""
     some = slides(4)
     law = dataclasses.replace(SLIDING, mu_c=0.31, mu_s=0.31)
-    problem = SlideProblem(some, STANDING, BODY, ("mu_c", "contact_radius"), law, ellipsoid, None, True)
+    problem = SlideProblem(
+        some, STANDING, BODY, ("mu_c", "contact_radius"), law, ellipsoid, None, True
+    )
     values = problem.start_values()
     coordinates = problem.coordinates(values)
     first = np.array([1e-3, 1e-3, 2e-2])
@@ -246,12 +308,32 @@ def numbers_of_slides() -> dict[str, Any]:
     noise, sigma = problem.estimate_noise(values, first)
     residual, jacobian = problem.linearised(values, sigma)
     at = coordinates.of(values), values, np.zeros(2, dtype=bool)
-    found = _told(result_of_slides(Fit(problem, coordinates, *at, noise, sigma, (1, 1), 1.0), problem, []))
-    poses, slopes = start_slopes(ellipsoid(STANDING, law), MassProperties(0.4, 8e-4), some[0], start_of(some[0]))
-    more = {"poses": poses, "slopes": slopes, "noise of each": noise, "residual": residual, "jacobian": jacobian}
+    found = _told(
+        result_of_slides(
+            Fit(problem, coordinates, *at, noise, sigma, (1, 1), 1.0), problem, []
+        )
+    )
+    poses, slopes = start_slopes(
+        ellipsoid(STANDING, law), MassProperties(0.4, 8e-4), some[0], start_of(some[0])
+    )
+    more = {
+        "poses": poses,
+        "slopes": slopes,
+        "noise of each": noise,
+        "residual": residual,
+        "jacobian": jacobian,
+    }
     model = ellipsoid(STANDING, SLIDING)
     more["predicted"] = predict_slide(model, BODY, some[1], samples=12)
-    return found | more | {"start": fit_start(model, BODY, some[2], samples=20, noise=(1e-3, 1e-3, 0.1))}
+    return (
+        found
+        | more
+        | {
+            "start": fit_start(
+                model, BODY, some[2], samples=20, noise=(1e-3, 1e-3, 0.1)
+            )
+        }
+    )
 
 
 def _told(found: Any) -> dict[str, Any]:
@@ -260,7 +342,10 @@ def _told(found: Any) -> dict[str, Any]:
 
 
 SOURCES: dict[str, Any] = {
-    **{f"problem, {name}": (lambda given=given: numbers_of_problem(given)) for name, given in PROBLEMS.items()},
+    **{
+        f"problem, {name}": (lambda given=given: numbers_of_problem(given))
+        for name, given in PROBLEMS.items()
+    },
     "plan": numbers_of_plan,
     "windows": numbers_of_windows,
     "logs": numbers_of_logs,

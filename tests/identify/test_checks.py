@@ -12,9 +12,22 @@ from planarfriction.cli import main
 from planarfriction.cli.output import history_columns, write_csv
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.identify import Log
-from planarfriction.identify.checks import check_log, check_logs, check_sampling, with_findings
+from planarfriction.identify.checks import (
+    check_log,
+    check_logs,
+    check_sampling,
+    with_findings,
+)
 from planarfriction.identify.logs import columns_of
-from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy
+from tests.support.identification_logs import (
+    LAW,
+    LOAD,
+    PATCH,
+    clean_log,
+    excitation,
+    fitted,
+    noisy,
+)
 
 
 @pytest.fixture(scope="module")
@@ -32,17 +45,25 @@ def turning():
 
 def changed(log, twist=(1, 1, 1), wrench=(1, 1, 1), time=1.0, load=1.0):
     """The log with its columns times factors."""
-    return Log(time * log.time, log.twist * twist, log.wrench * wrench, load * log.normal_force)
+    return Log(
+        time * log.time, log.twist * twist, log.wrench * wrench, load * log.normal_force
+    )
 
 
 def rotated(vectors, angle):
-    cos, sin = np.cos(angle), np.sin(angle)
+    cos = np.cos(angle)
+    sin = np.sin(angle)
     x, y, z = vectors.T
     return np.stack([cos * x - sin * y, sin * x + cos * y, z + 0 * x], -1)
 
 
 def angle_of(log):
-    return np.concatenate([[0.0], np.cumsum(0.5 * (log.twist[1:, 2] + log.twist[:-1, 2]) * np.diff(log.time))])
+    return np.concatenate(
+        [
+            [0.0],
+            np.cumsum(0.5 * (log.twist[1:, 2] + log.twist[:-1, 2]) * np.diff(log.time)),
+        ]
+    )
 
 
 # ------------------------------------------------------------------------------------------------ what is planted
@@ -50,9 +71,14 @@ def angle_of(log):
 
 @pytest.mark.parametrize("signs", [(-1, -1, -1), (-1, -1, 1)])
 def test_friction_that_drives_the_motion_is_refused(log, signs):
-    words = "fx, fy and tau of opposite sign" if signs[2] < 0 else "fx and fy of opposite sign"
+    words = (
+        "fx, fy and tau of opposite sign"
+        if signs[2] < 0
+        else "fx and fy of opposite sign"
+    )
     with pytest.raises(
-        InvalidValueError, match=rf"against its motion \(it does with {words}\), got power > 0 in \d+ %"
+        InvalidValueError,
+        match=rf"against its motion \(it does with {words}\), got power > 0 in \d+ %",
     ):
         fitted(changed(log, wrench=signs), PATCH)
 
@@ -72,23 +98,32 @@ def test_friction_that_drives_the_motion_is_refused(log, signs):
 )
 def test_directions_tell_signs_and_units(log, change, words):
     (finding, *_) = check_log(changed(log, **change), PATCH)
-    assert str(finding).startswith("wrench of log should point in the direction of friction on the patch"), finding
+    assert str(finding).startswith(
+        "wrench of log should point in the direction of friction on the patch"
+    ), finding
     assert words in str(finding) and not finding.refuses
 
 
 @pytest.mark.parametrize("angle", [np.pi / 2, -np.pi / 4, 2.5])
 def test_axes_of_a_sensor_that_is_turned(log, angle):
     found = check_log(Log(log.time, log.twist, rotated(log.wrench, angle), LOAD), PATCH)
-    assert [f"turned by {-np.degrees(angle):.0f} deg" in str(finding) for finding in found] == [True]
+    assert [
+        f"turned by {-np.degrees(angle):.0f} deg" in str(finding) for finding in found
+    ] == [True]
 
 
 def test_axes_of_the_world(turning):
     angle = angle_of(turning)
     for name, log in {
         "twist": Log(turning.time, rotated(turning.twist, angle), turning.wrench, LOAD),
-        "wrench": Log(turning.time, turning.twist, rotated(turning.wrench, angle), LOAD),
+        "wrench": Log(
+            turning.time, turning.twist, rotated(turning.wrench, angle), LOAD
+        ),
     }.items():
-        assert [f"if the {name} is in world axes" in str(finding) for finding in check_log(log, PATCH)] == [True]
+        assert [
+            f"if the {name} is in world axes" in str(finding)
+            for finding in check_log(log, PATCH)
+        ] == [True]
 
 
 def test_a_patch_in_millimetres(log):
@@ -101,9 +136,13 @@ def test_millimetres_and_milliseconds_without_spin(log):
     """Only the way between two samples tells them where nothing turns."""
     straight = changed(log, twist=(1, 1, 0), wrench=(1, 1, 0))
     (speed,) = check_log(changed(straight, twist=(1e3, 1e3, 1)), PATCH)
-    assert str(speed).startswith("twist of log should be in m/s") and "vx and vy in mm/s" in str(speed)
+    assert str(speed).startswith(
+        "twist of log should be in m/s"
+    ) and "vx and vy in mm/s" in str(speed)
     (time,) = check_log(changed(straight, time=1e3), PATCH)
-    assert str(time).startswith("t of log should be in s") and "is it in ms?" in str(time)
+    assert str(time).startswith("t of log should be in s") and "is it in ms?" in str(
+        time
+    )
 
 
 def test_friction_against_load(log):
@@ -131,14 +170,24 @@ def test_sampling_against_the_corner_of_the_bristles(log):
 
 def test_findings_stand_beside_the_estimates(log):
     """A torque of opposite sign: said, and not refused."""
-    found = fitted(changed(log, wrench=(1, 1, -1)), PATCH, parameters=("mu_c",), start=LAW, starts=1)
+    found = fitted(
+        changed(log, wrench=(1, 1, -1)),
+        PATCH,
+        parameters=("mu_c",),
+        start=LAW,
+        starts=1,
+    )
     assert any(
-        "fit: wrench of log should point in the direction of friction on the patch" in str(each)
+        "fit: wrench of log should point in the direction of friction on the patch"
+        in str(each)
         for each in found.verdicts
     )
     slow = noisy(clean_log(*excitation(duration=1.0, rate=200.0)), 1)
     found = fitted(slow, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1)
-    assert any("samples of log should be taken at" in str(verdict) for verdict in found.verdicts)
+    assert any(
+        "samples of log should be taken at" in str(verdict)
+        for verdict in found.verdicts
+    )
     assert not found.identifiable("sigma_1") and found.identifiable("sigma_0")
     two = with_findings(dataclasses.replace(found, verdicts=()), [slow, log], ())
     assert two.identifiable("sigma_1")  # one log is fast enough
@@ -148,7 +197,14 @@ def test_sampling_is_no_matter_where_sigma_1_may_be_zero():
     """Its corner may then lie anywhere: no rate of 1e+11 Hz is asked for."""
     law = dataclasses.replace(LAW, sigma_1=0.0)
     log = noisy(clean_log(*excitation(duration=1.0, rate=200.0), law=law), 1)
-    found = fitted(log, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1, model="reduced-published")
+    found = fitted(
+        log,
+        PATCH,
+        parameters=("sigma_0", "sigma_1"),
+        start=LAW,
+        starts=1,
+        model="reduced-published",
+    )
     assert found.intervals()["sigma_1"][0] == 0.0 and not found.identifiable("sigma_1")
     assert not any("samples of log" in str(verdict) for verdict in found.verdicts)
 
@@ -158,8 +214,11 @@ def test_sampling_is_no_matter_where_sigma_1_may_be_zero():
 
 def test_nothing_is_found_in_good_logs(log, turning):
     time, twist = excitation(duration=0.6)
-    spin, still = twist * [0, 0, 1], 5e-4 * twist
-    off = pf.ContactPatch.points([[0.03, 0.0], [0.022, 0.009], [0.024, -0.01]], [1.0, 2.0, 1.5])
+    spin = twist * [0, 0, 1]
+    still = 5e-4 * twist
+    off = pf.ContactPatch.points(
+        [[0.03, 0.0], [0.022, 0.009], [0.024, -0.01]], [1.0, 2.0, 1.5]
+    )
     good = {
         "growing sines": (log, PATCH),
         "turning": (turning, PATCH),
@@ -172,8 +231,16 @@ def test_nothing_is_found_in_good_logs(log, turning):
         "no torque sensor": (changed(log, wrench=(1, 1, 0)), PATCH),
         "patch of twice the size": (log, pf.ContactPatch.disc(0.02, cells=11)),
         "patch of half the size": (log, pf.ContactPatch.disc(0.005, cells=11)),
-        "sensor 10 deg off": (Log(log.time, log.twist, rotated(log.wrench, 0.17), LOAD), PATCH),
-        "stiff": (clean_log(time, twist, law=dataclasses.replace(LAW, sigma_0=1e6, sigma_1=800.0)), PATCH),
+        "sensor 10 deg off": (
+            Log(log.time, log.twist, rotated(log.wrench, 0.17), LOAD),
+            PATCH,
+        ),
+        "stiff": (
+            clean_log(
+                time, twist, law=dataclasses.replace(LAW, sigma_0=1e6, sigma_1=800.0)
+            ),
+            PATCH,
+        ),
     }
     for name, (each, patch) in good.items():
         assert check_logs([each], patch) == (), name
@@ -183,7 +250,9 @@ def test_nothing_is_found_in_good_logs(log, turning):
 def test_nothing_is_found_in_simulations(kind):
     patch = pf.ContactPatch.disc(0.01, cells=11)
     model = pf.ReducedModelPublished(
-        patch, dataclasses.replace(LAW, sigma_0=1e5), surface=pf.LimitSurfaceEllipsoid(patch)
+        patch,
+        dataclasses.replace(LAW, sigma_0=1e5),
+        surface=pf.LimitSurfaceEllipsoid(patch),
     )
     solution = pf.simulate(getattr(pf.scenes, kind)(model), save_every=2e-3)
     assert check_logs([Log.from_solution(solution)], patch) == ()
@@ -204,9 +273,18 @@ def pushed(seconds: float = 0.6) -> pf.Scene:
         ],
         -1,
     )
-    pad = pf.Contact(model, LOAD, mounted_on="body", position=(0.004, 0.002), angle=0.4, name="pad")
+    pad = pf.Contact(
+        model, LOAD, mounted_on="body", position=(0.004, 0.002), angle=0.4, name="pad"
+    )
     body = pf.Body(0.3, 3e-5, gravity=(0.0, 0.0))
-    return pf.Scene(body, [pad], seconds, force=pf.Signal.sampled(t, force), save_every=1e-3, name="pushed")
+    return pf.Scene(
+        body,
+        [pad],
+        seconds,
+        force=pf.Signal.sampled(t, force),
+        save_every=1e-3,
+        name="pushed",
+    )
 
 
 @pytest.fixture(scope="module")
@@ -218,8 +296,12 @@ def test_a_simulation_gives_its_law_back(solution):
     """Twists between samples are taken as smooth, and forces jump: 1e-3 of the wrench, which moves gamma by 5 %."""
     begin = dataclasses.replace(LAW, mu_c=0.4)
     log = Log.from_solution(solution)
-    found = fitted(log, PATCH, start=begin, starts=1, model="reduced-published", nuisance=())
-    expected = {name: getattr(LAW, name) for name in found.names if name != "contact_radius"}
+    found = fitted(
+        log, PATCH, start=begin, starts=1, model="reduced-published", nuisance=()
+    )
+    expected = {
+        name: getattr(LAW, name) for name in found.names if name != "contact_radius"
+    }
     for name, value in expected.items():
         assert found.estimates[name] == pytest.approx(value, rel=0.08), name
     assert found.estimates["mu_c"] == pytest.approx(LAW.mu_c, rel=2e-3)
@@ -231,34 +313,54 @@ def test_a_simulation_gives_its_law_back(solution):
 def test_twists_of_contacts_are_what_a_point_of_the_body_does(solution, mounted_on):
     """Against the motion of the point itself: differences of its place in the world, over 2 ms."""
     scene = dataclasses.replace(
-        solution.scene, contacts=[dataclasses.replace(solution.scene.contacts[0], mounted_on=mounted_on)]
+        solution.scene,
+        contacts=[
+            dataclasses.replace(solution.scene.contacts[0], mounted_on=mounted_on)
+        ],
     )
     moved = dataclasses.replace(solution, scene=scene)
     x, y, theta = (solution.data[name].values for name in ("x", "y", "theta"))
     at = np.array([0.004, 0.002])
     twist = moved.contact_twist("pad")
     for i in range(100, 600, 97):
-        cos, sin = np.cos(theta[[i - 1, i, i + 1]]), np.sin(theta[[i - 1, i, i + 1]])
+        cos = np.cos(theta[[i - 1, i, i + 1]])
+        sin = np.sin(theta[[i - 1, i, i + 1]])
         if mounted_on == "world":  # the point of the body that is at `at` now
-            dx, dy = at[0] - x[i], at[1] - y[i]
-            inside, angle = np.array([cos[1] * dx + sin[1] * dy, cos[1] * dy - sin[1] * dx]), 0.4
+            dx = at[0] - x[i]
+            dy = at[1] - y[i]
+            inside = np.array([cos[1] * dx + sin[1] * dy, cos[1] * dy - sin[1] * dx])
+            angle = 0.4
         else:
-            inside, angle = at, 0.4 + theta[i]
+            inside = at
+            angle = 0.4 + theta[i]
         places = np.stack(
-            [x[i - 1 : i + 2] + cos * inside[0] - sin * inside[1], y[i - 1 : i + 2] + sin * inside[0] + cos * inside[1]]
+            [
+                x[i - 1 : i + 2] + cos * inside[0] - sin * inside[1],
+                y[i - 1 : i + 2] + sin * inside[0] + cos * inside[1],
+            ]
         )
         velocity = (places[:, 2] - places[:, 0]) / 2e-3
-        axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        assert twist[i, :2] == pytest.approx(axes @ velocity, abs=2e-3 * np.abs(twist[:, :2]).max())
+        axes = np.array(
+            [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+        )
+        assert twist[i, :2] == pytest.approx(
+            axes @ velocity, abs=2e-3 * np.abs(twist[:, :2]).max()
+        )
 
 
 def test_twist_under_a_prescribed_velocity_is_in_body_axes():
     model = pf.ReducedModelPublished(PATCH, LAW)
-    pad = pf.Contact(model, LOAD, mounted_on="body", position=(0.1, 0.0), angle=np.pi / 2)
+    pad = pf.Contact(
+        model, LOAD, mounted_on="body", position=(0.1, 0.0), angle=np.pi / 2
+    )
     velocity = pf.Signal.constant([0.03, 0.01, 2.0])
-    scene = pf.Scene(pf.Body(1.0, 1.0, angle=0.7), [pad], 0.02, velocity=velocity, save_every=1e-3)
+    scene = pf.Scene(
+        pf.Body(1.0, 1.0, angle=0.7), [pad], 0.02, velocity=velocity, save_every=1e-3
+    )
     twist = pf.simulate(scene).contact_twist()
-    assert twist == pytest.approx(np.tile([0.21, -0.03, 2.0], (len(twist), 1)), abs=1e-12)
+    assert twist == pytest.approx(
+        np.tile([0.21, -0.03, 2.0], (len(twist), 1)), abs=1e-12
+    )
 
 
 def test_contacts_are_chosen_by_name(solution):
@@ -267,9 +369,16 @@ def test_contacts_are_chosen_by_name(solution):
     with pytest.raises(InvalidValueError, match="solution must be a Solution"):
         Log.from_solution(solution.scene)
     pad = solution.scene.contacts[0]
-    scene = dataclasses.replace(solution.scene, contacts=[pad, dataclasses.replace(pad, name="other")], t_end=0.02)
+    scene = dataclasses.replace(
+        solution.scene,
+        contacts=[pad, dataclasses.replace(pad, name="other")],
+        t_end=0.02,
+    )
     both = pf.simulate(scene)
-    with pytest.raises(InvalidValueError, match=r"contact must be given if there are several \(pad, other\)"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"contact must be given if there are several \(pad, other\)",
+    ):
         Log.from_solution(both)
     assert Log.from_solution(both, "other").name == "pushed, other"
 
@@ -278,39 +387,72 @@ def test_contacts_are_chosen_by_name(solution):
 
 
 def written(path, columns, separator=",", point="."):
-    rows = [list(columns), *([repr(float(v)) for v in row] for row in zip(*columns.values(), strict=True))]
+    rows = [
+        list(columns),
+        *([repr(float(v)) for v in row] for row in zip(*columns.values(), strict=True)),
+    ]
     path.write_text(
-        "\n".join([separator.join(rows[0]), *(separator.join(row).replace(".", point) for row in rows[1:])])
+        "\n".join(
+            [
+                separator.join(rows[0]),
+                *(separator.join(row).replace(".", point) for row in rows[1:]),
+            ]
+        )
     )
     return path
 
 
-@pytest.mark.parametrize(("separator", "point"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")])
+@pytest.mark.parametrize(
+    ("separator", "point"),
+    [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ",")],
+)
 def test_separators_and_other_names(log, tmp_path, separator, point):
     columns = columns_of(log)
     columns = dict(
         zip(
-            ("Time", "VX", "Vy [m/s]", "OMEGA (rad/s)", "Fx [N]", "Fy", "tau [N m]", "FN"),
+            (
+                "Time",
+                "VX",
+                "Vy [m/s]",
+                "OMEGA (rad/s)",
+                "Fx [N]",
+                "Fy",
+                "tau [N m]",
+                "FN",
+            ),
             columns.values(),
             strict=True,
         )
     )
     read = Log.from_csv(written(tmp_path / "log.csv", columns, separator, point))
     assert all(
-        np.array_equal(getattr(read, name), getattr(log, name)) for name in ("time", "twist", "wrench", "normal_force")
+        np.array_equal(getattr(read, name), getattr(log, name))
+        for name in ("time", "twist", "wrench", "normal_force")
     )
 
 
 @pytest.mark.parametrize(
     ("headings", "words"),
     [
-        ("t,vx,vy,omega,fx,fy,moment,normal_force", "has no column tau; found t, vx, vy, omega, fx, fy, moment, "),
+        (
+            "t,vx,vy,omega,fx,fy,moment,normal_force",
+            "has no column tau; found t, vx, vy, omega, fx, fy, moment, ",
+        ),
         ("t,x,y,theta,fx,fy,tau", "has no column normal_force; found"),
-        ("stamp,x,y,theta,a.vx,a.vy,a.omega,a.fx,a.fy,a.tau,a.fn", "has no column t; found"),
+        (
+            "stamp,x,y,theta,a.vx,a.vy,a.omega,a.fx,a.fy,a.tau,a.fn",
+            "has no column t; found",
+        ),
         ("stamp,vx,vy,fx,fy,tau,fn", "has no column t, omega; found"),
-        ("t,vx [mm/s],vy,omega,fx,fy,tau,fn", "column vx [mm/s] must be in SI units, got mm/s"),
+        (
+            "t,vx [mm/s],vy,omega,fx,fy,tau,fn",
+            "column vx [mm/s] must be in SI units, got mm/s",
+        ),
         ("t,vx,Vx,vy,omega,fx,fy,tau,fn", "columns vx and Vx are the same"),
-        ("t,a.vx,a.vy,a.omega,a.fx,a.fy,a.tau,a.fn,b.vx,b.vy,b.omega,b.fx,b.fy,b.tau,b.fn", "has the contacts a, b"),
+        (
+            "t,a.vx,a.vy,a.omega,a.fx,a.fy,a.tau,a.fn,b.vx,b.vy,b.omega,b.fx,b.fy,b.tau,b.fn",
+            "has the contacts a, b",
+        ),
     ],
 )
 def test_columns_found_against_columns_needed(tmp_path, headings, words):
@@ -324,7 +466,10 @@ def test_columns_found_against_columns_needed(tmp_path, headings, words):
 def test_a_contact_is_not_chosen_where_columns_name_none(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0,1\n")
-    with pytest.raises(FileError, match=r"contact must be left out: no column is named as pad\.vx, got 'pad'"):
+    with pytest.raises(
+        FileError,
+        match=r"contact must be left out: no column is named as pad\.vx, got 'pad'",
+    ):
         Log.from_csv(path, contact="pad")
 
 
@@ -333,15 +478,25 @@ def test_run_writes_logs_that_identify_reads(solution, tmp_path, capsys):
     assert list(columns)[:7] == ["time", "x", "y", "theta", "vx", "vy", "omega"]
     path = tmp_path / "pushed.csv"
     write_csv(path, columns)
-    read, direct = Log.from_csv(path), Log.from_solution(solution)
-    assert np.array_equal(read.twist, direct.twist) and np.array_equal(read.wrench, direct.wrench)
+    read = Log.from_csv(path)
+    direct = Log.from_solution(solution)
+    assert np.array_equal(read.twist, direct.twist) and np.array_equal(
+        read.wrench, direct.wrench
+    )
     two = tmp_path / "two.csv"
-    other = {name.replace("pad", "other"): 2 * values for name, values in columns.items() if "." in name}
+    other = {
+        name.replace("pad", "other"): 2 * values
+        for name, values in columns.items()
+        if "." in name
+    }
     write_csv(two, columns | other | {"other.t": columns["time"] + 1.0})
     double = Log.from_csv(two, contact="other")
-    assert np.array_equal(double.twist, 2 * direct.twist) and double.time[0] == 1.0  # a contact may have its own clock
+    assert (
+        np.array_equal(double.twist, 2 * direct.twist) and double.time[0] == 1.0
+    )  # a contact may have its own clock
     start = [
-        f"--start={name}={getattr(LAW, name)}" for name in ("mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")
+        f"--start={name}={getattr(LAW, name)}"
+        for name in ("mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")
     ]
     options = ["--parameters", "mu_c", "--starts", "1", "--patch", "disc", *start]
     assert main(["identify", str(two), "--contact", "pad", *options]) == 0
@@ -353,24 +508,51 @@ def test_run_writes_logs_that_identify_reads(solution, tmp_path, capsys):
 @pytest.mark.parametrize(
     "names",
     [
-        ("t", "twist.linear.x", "twist.linear.y", "twist.angular.z", "force.x", "force.y", "torque.z", "force.z"),
-        ("t", "vx", "vy", "wz", "wrench.force.x", "wrench.force.y", "wrench.torque.z", "wrench.force.z"),
+        (
+            "t",
+            "twist.linear.x",
+            "twist.linear.y",
+            "twist.angular.z",
+            "force.x",
+            "force.y",
+            "torque.z",
+            "force.z",
+        ),
+        (
+            "t",
+            "vx",
+            "vy",
+            "wz",
+            "wrench.force.x",
+            "wrench.force.y",
+            "wrench.torque.z",
+            "wrench.force.z",
+        ),
         ("Time", "vx", "vy", "omega", "Fx", "Fy", "Mz", "Fz"),
         ("t", "vx", "vy", "omega", "/ft/force/x", "/ft/force/y", "Tz", "FZ"),
     ],
 )
-@pytest.mark.parametrize("units", ["", "s,m/s,m/s,rad/s,N,N,N m,N\n", "[s],(m/s),[m/s],[rad/s],,N,[Nm],\n"])
+@pytest.mark.parametrize(
+    "units", ["", "s,m/s,m/s,rad/s,N,N,N m,N\n", "[s],(m/s),[m/s],[rad/s],,N,[Nm],\n"]
+)
 def test_names_of_sensors_and_ros_and_units_below_them(log, tmp_path, names, units):
-    path = written(tmp_path / "log.csv", dict(zip(names, columns_of(log).values(), strict=True)))
+    path = written(
+        tmp_path / "log.csv", dict(zip(names, columns_of(log).values(), strict=True))
+    )
     head, _, rest = path.read_text().partition("\n")
     path.write_text(f"{head}\n{units}{rest}")
     read = Log.from_csv(path)
-    assert all(np.array_equal(getattr(read, name), getattr(log, name)) for name in ("twist", "wrench", "normal_force"))
+    assert all(
+        np.array_equal(getattr(read, name), getattr(log, name))
+        for name in ("twist", "wrench", "normal_force")
+    )
 
 
 def test_units_below_the_names_are_checked(log, tmp_path):
     path = written(tmp_path / "log.csv", columns_of(log))
     head, _, rest = path.read_text().partition("\n")
     path.write_text(f"{head}\ns,mm/s,m/s,rad/s,N,N,Nm,N\n{rest}")
-    with pytest.raises(FileError, match=r"column .vx \[mm/s\]. must be in SI units, got mm/s"):
+    with pytest.raises(
+        FileError, match=r"column .vx \[mm/s\]. must be in SI units, got mm/s"
+    ):
         Log.from_csv(path)

@@ -12,7 +12,16 @@ from planarfriction.identify import Log
 from planarfriction.identify.decimation import WINDOW, decimated, farthest, samples_of
 from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
 from planarfriction.models import ReducedModelPublished
-from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
+from tests.support.identification_logs import (
+    LAW,
+    LOAD,
+    PATCH,
+    clean_log,
+    excitation,
+    fitted,
+    noisy,
+    truth,
+)
 
 SIZE = 0.0066
 """Contact radius of the patch [m]."""
@@ -21,7 +30,12 @@ SIZE = 0.0066
 def long_motion(rows):
     """Times and twists at 1 kHz: bursts of the usual excitation, with holds in between."""
     time, twist = excitation(duration=2.0)
-    pulse = np.clip(0.5 + 8.0 * (0.3 - np.cos(2 * np.pi * time / time[-1])), 0.0, 1.0)[:, None] ** 2
+    pulse = (
+        np.clip(0.5 + 8.0 * (0.3 - np.cos(2 * np.pi * time / time[-1])), 0.0, 1.0)[
+            :, None
+        ]
+        ** 2
+    )
     size = np.exp(np.random.default_rng(0).uniform(-3.0, 0.0, -(-rows // len(time))))
     whole = np.concatenate([each * pulse * twist for each in size])[:rows]
     return np.arange(rows) / 1000.0, whole
@@ -43,7 +57,9 @@ def test_a_point_far_from_all_others_is_chosen():
 
 def test_no_point_is_farther_than_chosen_ones_are_from_each_other():
     points = np.random.default_rng(0).normal(size=(500, 2))
-    apart = np.linalg.norm(points[:, None] - points[(chosen := farthest(points, 30))], axis=2)
+    apart = np.linalg.norm(
+        points[:, None] - points[(chosen := farthest(points, 30))], axis=2
+    )
     between = apart[chosen] + np.where(np.eye(len(chosen)) > 0.0, np.inf, 0.0)
     assert apart.min(axis=1).max() <= between.min()
 
@@ -54,7 +70,11 @@ def test_a_slip_of_one_sample_in_a_long_hold_is_never_lost(at):
     random = np.random.default_rng(at)
     twist = 1e-6 * random.standard_normal((100_000, 3))
     twist[at, 0] = 1e-3
-    (cut,) = decimated([Log(np.arange(100_000) / 1000.0, twist, np.ones((100_000, 3)), LOAD)], SIZE, 2000)
+    (cut,) = decimated(
+        [Log(np.arange(100_000) / 1000.0, twist, np.ones((100_000, 3)), LOAD)],
+        SIZE,
+        2000,
+    )
     assert at / 1000.0 in cut.time[cut.inner]
 
 
@@ -63,7 +83,16 @@ def test_a_short_change_of_the_load_is_never_lost(at):
     load = np.full(100_000, LOAD)
     load[at : at + 3] = 0.9 * LOAD
     (cut,) = decimated(
-        [Log(np.arange(100_000) / 1000.0, np.zeros((100_000, 3)), np.ones((100_000, 3)), load)], SIZE, 2000
+        [
+            Log(
+                np.arange(100_000) / 1000.0,
+                np.zeros((100_000, 3)),
+                np.ones((100_000, 3)),
+                load,
+            )
+        ],
+        SIZE,
+        2000,
     )
     assert at / 1000.0 in cut.time[cut.inner]
 
@@ -92,7 +121,8 @@ def test_the_whole_motion_is_stepped_through(log):
     assert len(cut.gaps) > 5
     assert dt[1:].sum() == pytest.approx(cut.time[-1] - log.time[0], rel=1e-12)
     rows = np.searchsorted(log.time, cut.time[-1]) + 1
-    mean, each = 0.5 * (log.twist[1:rows] + log.twist[: rows - 1]), np.diff(log.time[:rows])
+    mean = 0.5 * (log.twist[1:rows] + log.twist[: rows - 1])
+    each = np.diff(log.time[:rows])
     assert twists[1:].T @ dt[1:] == pytest.approx(mean.T @ each, abs=1e-12)
 
 
@@ -101,7 +131,8 @@ def test_wrenches_are_those_of_the_whole_log(log, name):
     """To 0.2 % of the largest wrench, a fifth of a usual noise, also right after holds."""
     vector = parameters_of(ReducedModelPublished(PATCH, LAW))
     vector[PARAMETERS.index("contact_radius")] = PATCH.contact_radius()
-    simulator, (cut,) = SIMULATORS[name](PATCH, LAW), decimated([log], SIZE, 6000)
+    simulator = SIMULATORS[name](PATCH, LAW)
+    (cut,) = decimated([log], SIZE, 6000)
     whole = Prediction(simulator, log, log.twist).wrenches(vector)
     found = PartsPrediction(simulator, cut, cut.twist).wrenches(vector)
     off = found[cut.inner] - whole[np.searchsorted(log.time, cut.time[cut.inner])]
@@ -113,16 +144,22 @@ def test_wrenches_are_those_of_the_whole_log(log, name):
 
 def test_estimates_of_a_long_log_are_those_of_the_whole(log):
     """Within three standard errors of the truth and of the whole; errors grow as the root of fewer samples says."""
-    seen, options = noisy(log, 0), {"model": "reduced-published", "start": LAW, "starts": 1}
-    whole, cut = fitted(seen, samples=24_000, **options), fitted(seen, samples=8_000, **options)
+    seen = noisy(log, 0)
+    options = {"model": "reduced-published", "start": LAW, "starts": 1}
+    whole = fitted(seen, samples=24_000, **options)
+    cut = fitted(seen, samples=8_000, **options)
     assert (whole.samples, cut.samples) == ((24_000, 24_000), (8_000, 24_000))
     assert "8,000 were used" in cut.table() and "were used" not in whole.table()
     assert cut.to_dict()["samples"] == {"used": 8_000, "total": 24_000}
     for name, value in truth().items():
         assert cut.identifiable(name)
         assert abs(cut.estimates[name] - value) < 3.0 * cut.errors[name], name
-        assert abs(cut.estimates[name] - whole.estimates[name]) < 3.0 * cut.errors[name], name
-        assert 0.9 * whole.errors[name] < cut.errors[name] < 3.0 * whole.errors[name], name
+        assert (
+            abs(cut.estimates[name] - whole.estimates[name]) < 3.0 * cut.errors[name]
+        ), name
+        assert 0.9 * whole.errors[name] < cut.errors[name] < 3.0 * whole.errors[name], (
+            name
+        )
 
 
 @pytest.mark.slow
@@ -130,8 +167,17 @@ def test_errors_of_long_logs_are_honest(log):
     """Ten seeds: 80 z-scores have a spread below 1.25, as errors have an allowance, and none is beyond 4."""
     z = []
     for seed in range(10):
-        found = fitted(noisy(log, seed), model="reduced-published", start=LAW, starts=1, samples=6_000)
-        z += [(found.estimates[name] - value) / found.errors[name] for name, value in truth().items()]
+        found = fitted(
+            noisy(log, seed),
+            model="reduced-published",
+            start=LAW,
+            starts=1,
+            samples=6_000,
+        )
+        z += [
+            (found.estimates[name] - value) / found.errors[name]
+            for name, value in truth().items()
+        ]
     assert np.sqrt(np.mean(np.square(z))) < 1.25
     assert np.abs(z).max() < 4.0
 

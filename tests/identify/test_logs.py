@@ -17,10 +17,22 @@ from planarfriction.identify.logs import is_mean, unwrapped
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.rig import wrench_noise
-from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
+from tests.support.identification_logs import (
+    LAW,
+    LOAD,
+    PATCH,
+    clean_log,
+    excitation,
+    fitted,
+    noisy,
+    truth,
+)
 
 TIME = np.arange(400) * 1e-2
-KNOWN = {name: getattr(LAW, name) for name in ("mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")}
+KNOWN = {
+    name: getattr(LAW, name)
+    for name in ("mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")
+}
 RADIUS = truth()["contact_radius"]
 EXACT = 1e-9  # the wrapping itself rounds at 1e-15 rad, its slope over 1e-2 s at 1e-13 rad/s
 
@@ -42,7 +54,12 @@ def wrapped(angle, low=-np.pi):
 def test_whole_turns_are_put_back(speed, swing, low, noise):
     """Steps up to 1 rad from the speed, 0.35 rad from the swing: below a quarter of a turn."""
     random = np.random.default_rng(0)
-    angle = 1.0 + speed * TIME + swing * np.sin(0.5 * np.pi * TIME) + noise * random.uniform(-1.0, 1.0, TIME.shape)
+    angle = (
+        1.0
+        + speed * TIME
+        + swing * np.sin(0.5 * np.pi * TIME)
+        + noise * random.uniform(-1.0, 1.0, TIME.shape)
+    )
     seen = wrapped(angle, low)
     mended, turns = unwrapped(TIME, seen)
     assert np.abs(np.diff(mended) - np.diff(angle)).max() < EXACT
@@ -99,8 +116,15 @@ def poses(log):
         return np.vstack([np.zeros(rates.shape[1]), np.cumsum(steps, axis=0)])
 
     angle = summed(log.twist[:, 2:])
-    cos, sin = np.cos(angle[:, 0]), np.sin(angle[:, 0])
-    world = np.stack([cos * log.twist[:, 0] - sin * log.twist[:, 1], sin * log.twist[:, 0] + cos * log.twist[:, 1]], -1)
+    cos = np.cos(angle[:, 0])
+    sin = np.sin(angle[:, 0])
+    world = np.stack(
+        [
+            cos * log.twist[:, 0] - sin * log.twist[:, 1],
+            sin * log.twist[:, 0] + cos * log.twist[:, 1],
+        ],
+        -1,
+    )
     return np.hstack([summed(world), angle])
 
 
@@ -108,13 +132,19 @@ def test_a_wrapped_angle_gives_the_same_estimates_and_says_so(spun):
     pose = poses(spun)
     seen = pose.copy()
     seen[:, 2] = wrapped(seen[:, 2])
-    logs = [Log.from_motion(spun.time, motion, spun.wrench, LOAD) for motion in (pose, seen)]
+    logs = [
+        Log.from_motion(spun.time, motion, spun.wrench, LOAD) for motion in (pose, seen)
+    ]
     assert [log.turns for log in logs] == [0, 4]
-    assert np.abs(logs[1].twist - logs[0].twist).max() < 1e-8 * 25.0  # slopes of what is 1e-15 rad apart, over 1 ms
+    assert (
+        np.abs(logs[1].twist - logs[0].twist).max() < 1e-8 * 25.0
+    )  # slopes of what is 1e-15 rad apart, over 1 ms
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1}
     smooth, jumping = (identify(log, PATCH, **options) for log in logs)
     for name in ("mu_c", "contact_radius"):
-        assert jumping.estimates[name] == pytest.approx(smooth.estimates[name], rel=1e-6)
+        assert jumping.estimates[name] == pytest.approx(
+            smooth.estimates[name], rel=1e-6
+        )
     assert jumping.estimates["mu_c"] == pytest.approx(LAW.mu_c, rel=0.02)
     assert [str(each) for each in jumping.verdicts if "turn" in str(each)] == [
         "fit: 4 jumps of theta by a whole turn were taken out, in log"
@@ -123,25 +153,40 @@ def test_a_wrapped_angle_gives_the_same_estimates_and_says_so(spun):
 
 
 def without_torque(log):
-    return Log(log.time, log.twist, log.wrench * [1.0, 1.0, 0.0], log.normal_force, log.name)
+    return Log(
+        log.time, log.twist, log.wrench * [1.0, 1.0, 0.0], log.normal_force, log.name
+    )
 
 
 def test_without_torques_the_force_tells_what_it_can():
     """The force of a contact that spins while it slides tells the friction and, through its loss, the radius."""
     log = noisy(clean_log(*excitation(duration=1.0)), 3)
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1}
-    found, full = identify(without_torque(log), PATCH, **options), identify(log, PATCH, **options)
+    found = identify(without_torque(log), PATCH, **options)
+    full = identify(log, PATCH, **options)
     for name, true in (("mu_c", LAW.mu_c), ("contact_radius", RADIUS)):
-        assert found.estimates[name] == pytest.approx(true, abs=5.0 * found.errors[name])
+        assert found.estimates[name] == pytest.approx(
+            true, abs=5.0 * found.errors[name]
+        )
         assert full.errors[name] < found.errors[name] < 0.01 * true
         assert found.identifiable(name)
     assert any("tau is 0 throughout" in str(each) for each in found.verdicts)
-    assert np.isnan(found.residuals[0][:, 2]).all() and np.isfinite(found.residuals[0][:, :2]).all()
+    assert (
+        np.isnan(found.residuals[0][:, 2]).all()
+        and np.isfinite(found.residuals[0][:, :2]).all()
+    )
     assert found.to_dict()["noise"]["tau"] is None
     found.plot().draw_without_rendering()
     rounding = 1e-19 * np.random.default_rng(0).standard_normal(len(log.time))
-    faint = Log(log.time, log.twist, without_torque(log).wrench + np.outer(rounding, [0, 0, 1]), log.normal_force)
-    assert identify(faint, PATCH, **options).estimates == pytest.approx(found.estimates, rel=1e-9)
+    faint = Log(
+        log.time,
+        log.twist,
+        without_torque(log).wrench + np.outer(rounding, [0, 0, 1]),
+        log.normal_force,
+    )
+    assert identify(faint, PATCH, **options).estimates == pytest.approx(
+        found.estimates, rel=1e-9
+    )
 
 
 def test_what_would_need_the_torque_is_no_estimate(spun):
@@ -158,12 +203,18 @@ def test_what_only_the_torque_tells_is_named():
     """A contact that turns to and fro on the spot, and hardly moves: its force tells no radius."""
     time, twist = excitation(duration=1.0)
     log = noisy(clean_log(time, twist * [1e-4, 1e-4, 5.0]), 3)
-    options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1, "noise": (0.02, 0.02, 1e-4)}
+    options = {
+        "parameters": ("mu_c", "contact_radius"),
+        "start": KNOWN,
+        "starts": 1,
+        "noise": (0.02, 0.02, 1e-4),
+    }
     found = identify(without_torque(log), PATCH, **options)
     assert not found.identifiable("contact_radius")
-    assert "contact_radius: not identifiable, only the torque depends on it, and tau is 0 throughout" in [
-        str(each) for each in found.verdicts
-    ]
+    assert (
+        "contact_radius: not identifiable, only the torque depends on it, and tau is 0 throughout"
+        in [str(each) for each in found.verdicts]
+    )
     assert identify(log, PATCH, **options).identifiable("contact_radius")
 
 
@@ -180,7 +231,11 @@ def test_one_log_of_several_may_lack_torques(spun):
 def stepped(tmp_path, hold):
     """A patch that starts, turns, slides and stops, every 10 ms, with a twist that is held or joined: its file."""
     time = np.arange(301) * 1e-2
-    speeds = np.interp(time, [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, 1.0, 0.0])[:, None] * [0.01, 0.003, 1.0]
+    speeds = np.interp(time, [0.0, 0.5, 1.5, 2.0], [0.0, 1.0, 1.0, 0.0])[:, None] * [
+        0.01,
+        0.003,
+        1.0,
+    ]
     model = pf.DistributedModel(PATCH, LAW)
     scene = pf.scenes.driven(model, twist=pf.Signal(time, speeds, hold), t_end=3.0)
     return write_solution(pf.simulate(scene, save_every=1e-2), tmp_path, "log")[1]
@@ -191,26 +246,48 @@ def test_a_log_knows_if_its_twists_are_means(tmp_path, hold, held):
     """The angle beside them shows it: read otherwise, the law that made the log leaves ten times the squares."""
     log = Log.from_csv(stepped(tmp_path, hold))
     assert log.held == held
-    known, left = np.array([LAW.mu_c, LAW.mu_s]), []
+    known = np.array([LAW.mu_c, LAW.mu_s])
+    left = []
     for each in (log, dataclasses.replace(log, held=not held)):
-        problem = LogProblem([each], PATCH, ("mu_c", "mu_s"), LAW, FitOptions(nuisance=(), refine=4), "distributed")
-        left.append(np.square(problem.residual(known, problem.even_sigma(wrench_noise([log])))).mean())
+        problem = LogProblem(
+            [each],
+            PATCH,
+            ("mu_c", "mu_s"),
+            LAW,
+            FitOptions(nuisance=(), refine=4),
+            "distributed",
+        )
+        left.append(
+            np.square(
+                problem.residual(known, problem.even_sigma(wrench_noise([log])))
+            ).mean()
+        )
     assert 10.0 * left[0] < left[1]
 
 
 def test_a_wrapped_angle_shows_means_too():
     """As a tracker gives it, from -pi to pi: of means, and of spins at the samples' own instants."""
     omega = 5.0 + np.sin(7.0 * TIME)
-    assert is_mean(TIME, omega, wrapped(np.concatenate([[0.0], np.cumsum(omega[1:] * 1e-2)])))
-    assert not is_mean(TIME, omega, wrapped(5.0 * TIME + (1.0 - np.cos(7.0 * TIME)) / 7.0))
+    assert is_mean(
+        TIME, omega, wrapped(np.concatenate([[0.0], np.cumsum(omega[1:] * 1e-2)]))
+    )
+    assert not is_mean(
+        TIME, omega, wrapped(5.0 * TIME + (1.0 - np.cos(7.0 * TIME)) / 7.0)
+    )
 
 
 @pytest.mark.parametrize("cell", ["", "n/a", "inf"])
-@pytest.mark.parametrize(("cells", "held"), [(slice(5, 6), True), (slice(1, None), False)])
+@pytest.mark.parametrize(
+    ("cells", "held"), [(slice(5, 6), True), (slice(1, None), False)]
+)
 def test_an_angle_that_is_no_number_is_ignored(tmp_path, cell, cells, held):
     """Beside a twist it is a column like any other; what there is of it still shows means."""
     path = stepped(tmp_path, "previous")
-    lines = [line.split(",") for line in path.read_text().splitlines() if not line.startswith("#")]
+    lines = [
+        line.split(",")
+        for line in path.read_text().splitlines()
+        if not line.startswith("#")
+    ]
     at = next(i for i, name in enumerate(lines[0]) if name.split(" ")[0] == "theta")
     for line in lines[cells]:
         line[at] = cell
@@ -224,11 +301,16 @@ SPIN = np.linspace(1.0, 2.0, 50)
 
 def turning(**more):
     """A log that turns ever faster."""
-    twist, wrench = SPIN[:, None] * [0.0, 0.0, 1.0], np.full((50, 3), -0.1)
+    twist = SPIN[:, None] * [0.0, 0.0, 1.0]
+    wrench = np.full((50, 3), -0.1)
     return Log(TIME[:50], twist, wrench, 1.0, **more)
 
 
-@pytest.mark.parametrize(("held", "angle"), [(True, SPIN[1:].sum() * 1e-2), (False, 1.5 * 0.49)])
+@pytest.mark.parametrize(
+    ("held", "angle"), [(True, SPIN[1:].sum() * 1e-2), (False, 1.5 * 0.49)]
+)
 def test_checks_know_how_far_a_held_log_has_turned(held, angle):
     """The sum of means, or the trapezoid."""
-    assert Sliding.of(turning(held=held), PATCH).turned[-1] == pytest.approx(angle, rel=1e-12)
+    assert Sliding.of(turning(held=held), PATCH).turned[-1] == pytest.approx(
+        angle, rel=1e-12
+    )

@@ -26,18 +26,18 @@ def random_case(seed: int, varying: bool = False):
     A load that varies does so by 30 to 100 %, and the stiffness follows it or not.
     """
     draw = np.random.default_rng(seed)
-    kind, model = (
-        draw.choice(["line", "line", "pivot", "plane", "plane"]),
-        draw.choice(["reduced-published", "distributed"]),
-    )
-    speed, mu = 10.0 ** draw.uniform(-2.0, -0.5), draw.uniform(0.1, 1.0)
+    kind = draw.choice(["line", "line", "pivot", "plane", "plane"])
+    model = draw.choice(["reduced-published", "distributed"])
+    speed = 10.0 ** draw.uniform(-2.0, -0.5)
+    mu = draw.uniform(0.1, 1.0)
     bend = speed * 10.0 ** draw.uniform(-3.0, -1.0)
     law = pf.LuGre(
         mu_c=mu, mu_s=mu * draw.uniform(1.0, 3.0), v_s=speed * draw.uniform(0.03, 0.3), gamma=draw.uniform(0.8, 2.4),
         sigma_0=mu / bend, sigma_1=mu / bend * draw.uniform(0.0, 0.02), sigma_2=draw.uniform(0.0, 0.3) * mu / speed,
         elasto_plastic=None if draw.random() < 0.5 else 0.9,
     )  # fmt: skip
-    patch, load = pf.ContactPatch.disc(0.01, cells=9), float(10.0 ** draw.uniform(0.0, 1.5))
+    patch = pf.ContactPatch.disc(0.01, cells=9)
+    load = float(10.0 ** draw.uniform(0.0, 1.5))
     t = np.arange(round(DURATION * RATE)) / RATE
     columns = {"line": [0], "pivot": [2], "plane": [0, 1, 2]}[kind]
     twist = np.zeros((len(t), 3))
@@ -49,25 +49,55 @@ def random_case(seed: int, varying: bool = False):
         else:
             grown = np.exp(3.5 * (t / t[-1] - 1.0))
             rates = draw.uniform(0.3, 3.0, 2)
-            twist[:, k] = scale * grown * (np.sin(2 * np.pi * rates[0] * t) + 0.3 * np.sin(2 * np.pi * rates[1] * t))
+            twist[:, k] = (
+                scale
+                * grown
+                * (
+                    np.sin(2 * np.pi * rates[0] * t)
+                    + 0.3 * np.sin(2 * np.pi * rates[1] * t)
+                )
+            )
     if varying:
-        model, rate = "reduced", draw.uniform(0.2, 1.5)
-        load = load * (1.0 + draw.uniform(0.3, 1.0) * (0.5 - 0.5 * np.cos(2.0 * np.pi * rate * t)))
-        law = dataclasses.replace(law, reference_load=None if draw.random() < 0.5 else float(load.mean()))
-    prediction = Prediction(SIMULATORS[model](patch, law), Log(t, twist, np.ones_like(twist), load), twist, refine=16)
-    vector = parameters_of(pf.ReducedModelPublished(patch, dataclasses.replace(law, reference_load=None)))
+        model = "reduced"
+        rate = draw.uniform(0.2, 1.5)
+        load = load * (
+            1.0 + draw.uniform(0.3, 1.0) * (0.5 - 0.5 * np.cos(2.0 * np.pi * rate * t))
+        )
+        law = dataclasses.replace(
+            law, reference_load=None if draw.random() < 0.5 else float(load.mean())
+        )
+    prediction = Prediction(
+        SIMULATORS[model](patch, law),
+        Log(t, twist, np.ones_like(twist), load),
+        twist,
+        refine=16,
+    )
+    vector = parameters_of(
+        pf.ReducedModelPublished(patch, dataclasses.replace(law, reference_load=None))
+    )
     if model != "reduced-published":
         vector[8] = patch.contact_radius()
-    size, u = draw.choice([0.0, 0.0, 1.0, 6.0]), 2.0 * t / t[-1] - 1.0
+    size = draw.choice([0.0, 0.0, 1.0, 6.0])
+    u = 2.0 * t / t[-1] - 1.0
     sizes = size * draw.standard_normal(8)
-    wrench = (1.0 + 0.05 * 0.5 * sizes[0] * u)[:, None] * prediction.wrenches(vector, 0.004 * abs(sizes[1]))
+    wrench = (1.0 + 0.05 * 0.5 * sizes[0] * u)[:, None] * prediction.wrenches(
+        vector, 0.004 * abs(sizes[1])
+    )
     largest = np.abs(wrench).max(axis=0)
     wrench += largest * (0.05 * sizes[2:5] + 0.025 * sizes[5:8] * u[:, None])
-    wrench += draw.uniform(0.003, 0.03) * wrench.std(axis=0) * draw.standard_normal(wrench.shape)
+    wrench += (
+        draw.uniform(0.003, 0.03)
+        * wrench.std(axis=0)
+        * draw.standard_normal(wrench.shape)
+    )
     wrench = np.where(np.isin(np.arange(3), columns), wrench, 0.0)
     true = {
         **truth(dataclasses.replace(law, reference_load=None), patch),
-        **({"contact_radius": float(patch.contact_radius())} if model != "reduced-published" else {}),
+        **(
+            {"contact_radius": float(patch.contact_radius())}
+            if model != "reduced-published"
+            else {}
+        ),
     }
     return Log(t, twist, wrench, load, f"{kind} {seed}"), patch, law, model, true, size
 
@@ -76,11 +106,14 @@ def judged(seed: int, model: str | None = None, varying: bool = False):
     """Fit a random log; returns the result and the errors over standard errors of what is called identified."""
     log, patch, _, own, true, _ = random_case(seed, varying)
     found = identify_lugre(log, patch, model=model or own)
-    inside, off = {}, {}
+    inside = {}
+    off = {}
     for name, (low, high) in found.intervals().items():
         if found.identifiable(name):
             inside[name] = bool(low <= true[name] <= high)
-            off[name] = abs(found.estimates[name] - true[name]) / max(found.errors[name], 1e-300)
+            off[name] = abs(found.estimates[name] - true[name]) / max(
+                found.errors[name], 1e-300
+            )
     return found, inside, off
 
 
@@ -103,7 +136,8 @@ def test_a_rejected_kind_of_bristles_gives_way_to_one_that_explains_the_data():
 
 @pytest.mark.slow
 def test_loads_that_vary_within_a_log_tell_the_kind_of_stiffness():
-    inside, off = [], []
+    inside = []
+    off = []
     for seed in range(6):
         found, hits, away = judged(seed, varying=True)
         law = random_case(seed, varying=True)[2]
@@ -120,7 +154,10 @@ if __name__ == "__main__":
         case = random_case(number)
         result, hit, away = judged(number, *sys.argv[3:])
         worst = max(away, key=away.get, default="-")
-        rejected = any(each.parameter == "fit" and not each.identifiable for each in result.verdicts)
+        rejected = any(
+            each.parameter == "fit" and not each.identifiable
+            for each in result.verdicts
+        )
         print(
             number, case[0].name, case[3], "plain" if case[2].elasto_plastic is None else "ep", f"rig {case[5]:g}",
             "REJECTED" if rejected else f"chi2 {result.scores[0].reduced_chi2:.2f}",

@@ -19,9 +19,20 @@ def made(parameters, correlations=None, patch=PATCH) -> Identification:
     values, errors = np.array(list(parameters.values())).T
     known = np.eye(len(values)) if correlations is None else np.array(correlations)
     model = pf.DistributedModel(patch, LAW)
-    noise, none = np.ones(1), ()
+    noise = np.ones(1)
+    none = ()
     return Identification(
-        tuple(parameters), values, errors, known, none, noise, (("x", "m"),), none, LAW, model, (1, 1)
+        tuple(parameters),
+        values,
+        errors,
+        known,
+        none,
+        noise,
+        (("x", "m"),),
+        none,
+        LAW,
+        model,
+        (1, 1),
     )
 
 
@@ -37,13 +48,24 @@ def test_draws_have_the_errors_and_correlations_of_the_estimates():
     np.testing.assert_allclose(np.corrcoef(logs), found.correlations, atol=0.035)
     assert np.median(drawn["mu_c"]) == pytest.approx(0.5, rel=2e-3)
     low, high = found.intervals()["v_s"]
-    assert ((drawn["v_s"] > low) & (drawn["v_s"] < high)).mean() == pytest.approx(0.95, abs=0.01)
-    assert all(np.array_equal(drawn[name], found.sample(COUNT, seed=1)[name]) for name in drawn)
+    assert ((drawn["v_s"] > low) & (drawn["v_s"] < high)).mean() == pytest.approx(
+        0.95, abs=0.01
+    )
+    assert all(
+        np.array_equal(drawn[name], found.sample(COUNT, seed=1)[name]) for name in drawn
+    )
     assert not np.array_equal(drawn["mu_c"], found.sample(COUNT, seed=2)["mu_c"])
 
 
 def test_draws_stay_in_bounds_and_fit_each_other():
-    found = made({"mu_c": (0.5, 0.1), "breakaway_ratio": (0.95, 0.3), "sigma_2": (0.01, 0.1), "gamma": (2.0, 0.1)})
+    found = made(
+        {
+            "mu_c": (0.5, 0.1),
+            "breakaway_ratio": (0.95, 0.3),
+            "sigma_2": (0.01, 0.1),
+            "gamma": (2.0, 0.1),
+        }
+    )
     drawn = check(found.sample(2000))
     assert set(drawn) == {"mu_c", "mu_s", "breakaway_ratio", "sigma_2"}
     assert drawn["breakaway_ratio"].max() <= 0.99 and drawn["sigma_2"].min() == 0.0
@@ -62,9 +84,20 @@ def test_size_and_place_are_those_of_the_fitted_patch():
     centre = np.array([0.003, -0.001])
     patch = pf.ContactPatch(PATCH.positions + centre, PATCH.areas)
     radius = patch.contact_radius()
-    found = made({"contact_radius": (radius, 1e-3), "centre_x": (0.003, 1e-4), "mu_c": (0.5, 0.01)}, patch=patch)
+    found = made(
+        {
+            "contact_radius": (radius, 1e-3),
+            "centre_x": (0.003, 1e-4),
+            "mu_c": (0.5, 0.01),
+        },
+        patch=patch,
+    )
     drawn = found.sample(COUNT)
     assert (drawn["scale"] * radius).std() == pytest.approx(1e-3, rel=0.03)
     middle = drawn["scale"] * centre[0] + drawn["centre_x"]
-    assert middle.mean() == pytest.approx(0.003, abs=5e-6) and middle.std() == pytest.approx(1e-4, rel=0.03)
-    np.testing.assert_allclose(drawn["scale"] * centre[1] + drawn["centre_y"], centre[1], atol=1e-12)
+    assert middle.mean() == pytest.approx(
+        0.003, abs=5e-6
+    ) and middle.std() == pytest.approx(1e-4, rel=0.03)
+    np.testing.assert_allclose(
+        drawn["scale"] * centre[1] + drawn["centre_y"], centre[1], atol=1e-12
+    )

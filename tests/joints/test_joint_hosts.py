@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from planarfriction.errors import InvalidValueError
-from planarfriction.joints import JointFriction, JointLog, Plant, apply_to_spec, identify_joint, set_level, to_mjcf
+from planarfriction.joints import (
+    JointFriction,
+    JointLog,
+    Plant,
+    apply_to_spec,
+    identify_joint,
+    set_level,
+    to_mjcf,
+)
 
 mujoco = pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
 pytestmark = pytest.mark.mujoco
@@ -17,15 +25,20 @@ MODEL = """<mujoco><option timestep="1e-4" gravity="0 0 0" integrator="implicitf
 <inertial pos="0 0 0" mass="1" diaginertia=".05 .05 .05"/>{joint}</body></worldbody><actuator>{motor}
 <motor name="push" joint="j"/></actuator></mujoco>"""
 JOINT = '<joint name="j" axis="0 0 1"/>'
-PLAIN = MODEL.format(joint=JOINT, motor='<dcmotor joint="j" motorconst=".01" resistance=".01"/>')
+PLAIN = MODEL.format(
+    joint=JOINT, motor='<dcmotor joint="j" motorconst=".01" resistance=".01"/>'
+)
 
 
 def test_bristles_of_a_motor_come_back_from_its_torque():
     """Five numbers within 2 % and both terms, from 6 s of a slow wave with ripples, then fast."""
     motor = '<dcmotor joint="j" motorconst="1" resistance="1e9" lugre="400 2 0.8 1.2 0.05"/>'
     text = MODEL.format(joint=JOINT.replace("/>", ' damping=".3"/>'), motor=motor)
-    model = mujoco.MjModel.from_xml_string(text.replace('timestep="1e-4"', 'timestep="2e-5"'))
-    data, rows = mujoco.MjData(model), []
+    model = mujoco.MjModel.from_xml_string(
+        text.replace('timestep="1e-4"', 'timestep="2e-5"')
+    )
+    data = mujoco.MjData(model)
+    rows = []
     for i in range(300_000):
         t = data.time
         goal = 0.08 * math.sin(1.57 * t) + 0.006 * math.sin(14.5 * t)
@@ -39,7 +52,10 @@ def test_bristles_of_a_motor_come_back_from_its_torque():
     fit = identify_joint(log, Plant(inertia=0.05))
     assert fit.terms == ("stribeck", "bristles")
     wanted = {"sigma_0": 400.0, "mu_c": 0.8, "mu_s": 1.2, "v_s": 0.05, "sigma_2": 0.3}
-    found = {name: getattr(fit.friction, name) / value - 1.0 for name, value in wanted.items()}
+    found = {
+        name: getattr(fit.friction, name) / value - 1.0
+        for name, value in wanted.items()
+    }
     assert max(map(abs, found.values())) < 0.02, found
 
 
@@ -47,15 +63,26 @@ def test_bristles_of_a_motor_come_back_from_its_torque():
 def test_text_and_model_hold_the_same_numbers(friction):
     spec = mujoco.MjSpec.from_string(PLAIN)
     apply_to_spec(friction, spec, "j", armature=0.01)
-    joint, *motor = to_mjcf(friction, "j", armature=0.01, torque_gain=0.1, back_emf=0.03).splitlines()
-    text = MODEL.format(joint=joint.replace("/>", ' axis="0 0 1"/>'), motor="".join(motor))
-    one, other = spec.compile(), mujoco.MjModel.from_xml_string(text)
+    joint, *motor = to_mjcf(
+        friction, "j", armature=0.01, torque_gain=0.1, back_emf=0.03
+    ).splitlines()
+    text = MODEL.format(
+        joint=joint.replace("/>", ' axis="0 0 1"/>'), motor="".join(motor)
+    )
+    one = spec.compile()
+    other = mujoco.MjModel.from_xml_string(text)
     for name in ("dof_damping", "dof_frictionloss", "dof_armature"):
         np.testing.assert_allclose(getattr(one, name), getattr(other, name))
-    np.testing.assert_allclose(one.actuator_biasprm[0, 3:6], other.actuator_biasprm[0, 3:6])
-    np.testing.assert_allclose(one.actuator_dynprm[0, 5:7], other.actuator_dynprm[0, 5:7])
+    np.testing.assert_allclose(
+        one.actuator_biasprm[0, 3:6], other.actuator_biasprm[0, 3:6]
+    )
+    np.testing.assert_allclose(
+        one.actuator_dynprm[0, 5:7], other.actuator_dynprm[0, 5:7]
+    )
     resistance, kt = other.actuator_gainprm[0, :2]
-    assert kt / resistance == pytest.approx(0.1) and kt**2 / resistance == pytest.approx(0.03)
+    assert kt / resistance == pytest.approx(
+        0.1
+    ) and kt**2 / resistance == pytest.approx(0.03)
     assert one.dof_damping[0] == 0.3 and one.na == (1 if friction.sigma_0 else 0)
     assert one.dof_frictionloss[0] == (0.0 if friction.sigma_0 else 0.5)
 
@@ -78,13 +105,19 @@ def test_levels_follow_the_load(friction, motor):
 
 def test_gravity_counts_against_the_torque_of_the_motor():
     """1 kg at 0.1 m, held out: MuJoCo counts gravity as bias, with the other sign."""
-    text = MODEL.replace("0 0 0", "0 -9.81 0", 1).replace('pos="0 0 0"', 'pos="0.1 0 0"').format(joint=JOINT, motor="")
+    text = (
+        MODEL.replace("0 0 0", "0 -9.81 0", 1)
+        .replace('pos="0 0 0"', 'pos="0.1 0 0"')
+        .format(joint=JOINT, motor="")
+    )
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     data.ctrl[0] = 2.0
     mujoco.mj_forward(model, data)
     set_level(RIGID, model, data, 0)
-    assert model.dof_frictionloss[0] == pytest.approx(0.5 + 0.2 * 2.0 + 0.1 * 9.81 * 0.1)
+    assert model.dof_frictionloss[0] == pytest.approx(
+        0.5 + 0.2 * 2.0 + 0.1 * 9.81 * 0.1
+    )
 
 
 def test_bristles_beyond_a_level_that_fell_come_back():
@@ -104,7 +137,9 @@ def test_friction_that_mujoco_cannot_hold_is_refused():
         to_mjcf(falls, "j")
     with pytest.raises(InvalidValueError, match="mu_s must be mu_c for rigid friction"):
         apply_to_spec(falls, mujoco.MjSpec.from_string(PLAIN), "j")
-    with pytest.raises(InvalidValueError, match="asymmetry must be 0: friction in MuJoCo is the same"):
+    with pytest.raises(
+        InvalidValueError, match="asymmetry must be 0: friction in MuJoCo is the same"
+    ):
         to_mjcf(JointFriction(0.5, asymmetry=0.1), "j")
 
 

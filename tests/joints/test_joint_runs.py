@@ -20,11 +20,19 @@ def servo(terms):
     t = np.cumsum(np.r_[0.0, np.random.default_rng(0).uniform(0.004, 0.006, 400)])
     goal = 1.3 * np.sin(4.0 * t) + (t > 1.4)
     on = np.where((t > 0.8) & (t < 1.1), 0.0, 1.0)
-    log = JointLog(t, 0.9 * np.sin(4.0 * t - 0.3), goal=goal, enabled=on, drive=Drive(400.0, 7.3, 2.9e-3, 0.25))
+    log = JointLog(
+        t,
+        0.9 * np.sin(4.0 * t - 0.3),
+        goal=goal,
+        enabled=on,
+        drive=Drive(400.0, 7.3, 2.9e-3, 0.25),
+    )
     return Problem((log,), Plant(mass=0.49, length=0.1), None, terms)
 
 
-@pytest.mark.parametrize("terms", [("load",), ("load", "stribeck"), tuple(problems.TERMS)])
+@pytest.mark.parametrize(
+    "terms", [("load",), ("load", "stribeck"), tuple(problems.TERMS)]
+)
 @pytest.mark.parametrize("span", [0.2, np.inf])
 def test_a_run_is_smooth_in_its_numbers(terms, span):
     """Slopes by one-sided differences of 1e-5 are those by two-sided ones of 1e-6, but where a run begins to move."""
@@ -33,7 +41,10 @@ def test_a_run_is_smooth_in_its_numbers(terms, span):
     slopes = problem.slopes(values, span)[0]
     for i, name in enumerate(problem.names):
         step = 1e-6 * abs(values[name])
-        more, less = (problem.errors({**values, name: values[name] + way}, span)[0] for way in (step, -step))
+        more, less = (
+            problem.errors({**values, name: values[name] + way}, span)[0]
+            for way in (step, -step)
+        )
         off = np.abs((more - less) / (2.0 * step) - slopes[:, i])
         assert np.mean(off < 1e-3 * np.abs(slopes[:, i]).max()) > 0.97, name
 
@@ -44,7 +55,9 @@ def test_a_log_may_begin_at_any_time():
     later = dataclasses.replace(problem.logs[0], time=problem.logs[0].time + 100.0)
     values = {name: VALUES[name] for name in problem.names}
     moved = problem.simulated(values, (later,), 0.2)[0]
-    assert moved == pytest.approx(problem.simulated(values, problem.logs, 0.2)[0], abs=1e-6)
+    assert moved == pytest.approx(
+        problem.simulated(values, problem.logs, 0.2)[0], abs=1e-6
+    )
 
 
 def test_a_joint_turns_round_within_a_step(monkeypatch):
@@ -61,7 +74,9 @@ def test_a_joint_turns_round_within_a_step(monkeypatch):
     np.testing.assert_allclose(q, exact, atol=1e-12)
 
 
-@pytest.mark.parametrize("terms, most", [(("load", "stribeck"), 3e-4), (("load", "bristles"), 1e-3)])
+@pytest.mark.parametrize(
+    "terms, most", [(("load", "stribeck"), 3e-4), (("load", "bristles"), 1e-3)]
+)
 def test_finer_steps_change_little(monkeypatch, terms, most):
     problem = servo(terms)
     values = {name: VALUES[name] for name in problem.names}

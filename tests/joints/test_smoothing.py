@@ -33,16 +33,23 @@ def test_a_parabola_far_from_zero_keeps_its_derivatives(rate):
     # the angle gains 0.7 times the kernel's variance, which its grid changes by less than 1e-3
     np.testing.assert_allclose(angle[inner], (log.angle + 0.7e-4)[inner], atol=1e-7)
     np.testing.assert_allclose(speed[inner], (2.0 + 1.4 * t)[inner], rtol=1e-6)
-    np.testing.assert_allclose(acceleration[inner], 1.4, rtol=1e-3)  # 3000 rad over 1e-16, twice over 5e-4 s
+    np.testing.assert_allclose(
+        acceleration[inner], 1.4, rtol=1e-3
+    )  # 3000 rad over 1e-16, twice over 5e-4 s
 
 
 def test_variances_of_smoothed_noise_are_those_of_the_formulas():
     q = np.random.default_rng(0).normal(0.0, 1e-3, 200_000)
-    log, width = even(q), 5e-3
+    log = even(q)
+    width = 5e-3
     _, speed, acceleration = derivatives(log, width)
     power = 1e-6 * log.dt
-    assert speed.var() == pytest.approx(speed_noise(power, width), rel=0.03)  # 2 % by chance
-    assert acceleration.var() == pytest.approx(acceleration_noise(power, width), rel=0.03)
+    assert speed.var() == pytest.approx(
+        speed_noise(power, width), rel=0.03
+    )  # 2 % by chance
+    assert acceleration.var() == pytest.approx(
+        acceleration_noise(power, width), rel=0.03
+    )
 
 
 @pytest.mark.parametrize("bits", [10, 14, 17])
@@ -66,7 +73,10 @@ def test_white_noise_is_told_from_motion():
 def test_a_coarse_encoder_gets_a_wider_kernel():
     t = 1e-3 * np.arange(8000)
     q = 0.5 * np.sin(3.0 * t) + 0.1 * np.sin(11.0 * t)
-    widths = [kernel_width([even(np.round(q / step) * step)]) for step in 2.0 * np.pi / 2.0 ** np.array([10, 13, 16])]
+    widths = [
+        kernel_width([even(np.round(q / step) * step)])
+        for step in 2.0 * np.pi / 2.0 ** np.array([10, 13, 16])
+    ]
     assert widths[0] > widths[1] > widths[2]
 
 
@@ -74,8 +84,14 @@ def test_slow_motion_is_smoothed_longer_and_turns_round_at_the_same_time():
     """Behind 11 bits, the direction of a slow part is right far below the noise of the kernel for all motion."""
     t = 1e-3 * np.arange(16_000)
     fast = np.maximum(t - 12.0, 0.0)
-    step, speed = 2.0 * np.pi / 2**11, 0.05 * np.cos(0.7 * t) + 0.6 * np.sin(3.0 * fast)
-    log = even(np.round((0.05 / 0.7 * np.sin(0.7 * t) + 0.2 * (1.0 - np.cos(3.0 * fast))) / step) * step)
+    step = 2.0 * np.pi / 2**11
+    speed = 0.05 * np.cos(0.7 * t) + 0.6 * np.sin(3.0 * fast)
+    log = even(
+        np.round(
+            (0.05 / 0.7 * np.sin(0.7 * t) + 0.2 * (1.0 - np.cos(3.0 * fast))) / step
+        )
+        * step
+    )
     limits = scales([log], 0.012)
     assert 3.0 * limits.width < limits.slow_width <= 4.0 * limits.width
     assert limits.slow < 0.4 * limits.noisy
@@ -83,7 +99,9 @@ def test_slow_motion_is_smoothed_longer_and_turns_round_at_the_same_time():
     inner = rows.fitted
     true = np.interp(rows.time, t, speed)
     sure = inner[np.abs(true[inner]) > limits.slow]
-    assert np.mean(np.abs(true[sure]) < limits.noisy) > 0.6  # what the first kernel alone would not know
+    assert (
+        np.mean(np.abs(true[sure]) < limits.noisy) > 0.6
+    )  # what the first kernel alone would not know
     assert np.mean(np.sign(rows.speed[sure]) == np.sign(true[sure])) > 0.99
 
 

@@ -17,12 +17,18 @@ PENDULUM = Plant(inertia=0.05, mass=0.5, length=0.4, arm_mass=0.0)
 
 @functools.cache
 def measured(kind="sines", numbers=Numbers(), sensors=Sensors(), count=3):  # noqa: B008
-    return tuple(recorded(numbers, kind, sensors, np.random.default_rng(seed)) for seed in range(count))
+    return tuple(
+        recorded(numbers, kind, sensors, np.random.default_rng(seed))
+        for seed in range(count)
+    )
 
 
 def logs(change=lambda t, q, torque: (t, q, torque), **given):
     changed = [change(*each) for each in measured(**given)]
-    return [JointLog(t, q, torque=torque, name=f"log {i}") for i, (t, q, torque) in enumerate(changed)]
+    return [
+        JointLog(t, q, torque=torque, name=f"log {i}")
+        for i, (t, q, torque) in enumerate(changed)
+    ]
 
 
 def frozen(t, values):
@@ -88,14 +94,18 @@ def said(fit):
 
 def test_a_late_torque_is_estimated_and_said():
     fit = identify_joint(logs(sensors=Sensors(late=0.03)), Plant())
-    assert fit.values["delay"] == pytest.approx(0.03, abs=1e-3) and "late by 30" in said(fit)
+    assert fit.values["delay"] == pytest.approx(
+        0.03, abs=1e-3
+    ) and "late by 30" in said(fit)
     assert fit.values["mu_c"] == pytest.approx(0.6, rel=0.02)
 
 
 def test_gravity_that_was_not_told_is_found_and_said():
     fit = identify_joint(logs(numbers=HANGS), Plant())
     low, high = fit.intervals["gravity"]
-    assert "gravity" in fit.terms and low <= 1.962 <= high and "none was told" in said(fit)
+    assert (
+        "gravity" in fit.terms and low <= 1.962 <= high and "none was told" in said(fit)
+    )
 
 
 def test_gravity_that_is_not_there_is_said():
@@ -118,7 +128,9 @@ def test_an_angle_at_which_the_joint_hangs_has_no_bound():
 
 
 def test_wrapped_angles_are_unwrapped_and_said():
-    wrapped = logs(lambda t, q, torque: (t, (6.0 * q + np.pi) % (2.0 * np.pi) - np.pi, torque))
+    wrapped = logs(
+        lambda t, q, torque: (t, (6.0 * q + np.pi) % (2.0 * np.pi) - np.pi, torque)
+    )
     fit = identify_joint(wrapped, Plant())
     assert "jumps by a whole turn were removed" in said(fit)
     assert fit.values["mu_c"] == pytest.approx(0.6, rel=0.03)
@@ -129,7 +141,12 @@ def test_friction_that_differs_between_the_directions_is_a_term():
     uneven = Numbers(mu_c=0.55, sigma_2=0.5, uneven=-0.15, uneven_viscous=0.1)
     fit = identify_joint(logs(numbers=uneven), Plant())
     assert "asymmetry" in fit.terms
-    for name, truth in {"asymmetry": -0.15, "viscous_asymmetry": 0.1, "mu_c": 0.55, "sigma_2": 0.5}.items():
+    for name, truth in {
+        "asymmetry": -0.15,
+        "viscous_asymmetry": 0.1,
+        "mu_c": 0.55,
+        "sigma_2": 0.5,
+    }.items():
         low, high = fit.intervals[name]
         assert low <= truth <= high, (name, low, high)
     assert fit.friction.asymmetry == fit.values["asymmetry"]

@@ -18,12 +18,22 @@ GROOVED = DISC.with_friction_metric([[1.2, 0.1], [0.1, 0.9]])
 LOAD = 3.0
 DAHL = pf.Dahl(mu_c=0.4, sigma_0=2e4)
 CREEPING = pf.CoulombStribeck(
-    mu_c=0.5, mu_s=0.7, v_s=2e-3, gamma=1.5, sigma_2=0.3, creep_speed=1e-4, relaxation_time=5e-3
+    mu_c=0.5,
+    mu_s=0.7,
+    v_s=2e-3,
+    gamma=1.5,
+    sigma_2=0.3,
+    creep_speed=1e-4,
+    relaxation_time=5e-3,
 )
 SIMPLE = pf.CoulombStribeck(mu_c=0.5, creep_speed=1e-4, relaxation_time=5e-3)
 LAWS = {
-    "LuGre": pf.LuGre(mu_c=0.6, mu_s=0.9, v_s=2e-3, sigma_0=1e5, sigma_1=300.0, sigma_2=0.4),
-    "elasto-plastic": pf.LuGre(mu_c=0.6, sigma_0=1e5, sigma_1=300.0, elasto_plastic=0.8),
+    "LuGre": pf.LuGre(
+        mu_c=0.6, mu_s=0.9, v_s=2e-3, sigma_0=1e5, sigma_1=300.0, sigma_2=0.4
+    ),
+    "elasto-plastic": pf.LuGre(
+        mu_c=0.6, sigma_0=1e5, sigma_1=300.0, elasto_plastic=0.8
+    ),
     "Dahl": DAHL,
     "CoulombStribeck": CREEPING,
 }
@@ -48,7 +58,9 @@ def test_static_friction_is_that_of_sliding_unless_given():
 
 
 def test_a_number_is_a_breakaway_ratio():
-    assert pf.LuGre(elasto_plastic=0.9) == pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+    assert pf.LuGre(elasto_plastic=0.9) == pf.LuGre(
+        elasto_plastic=pf.ElastoPlastic(0.9)
+    )
     assert pf.LuGre(elasto_plastic=0).elasto_plastic == pf.ElastoPlastic(0.0)
 
 
@@ -60,7 +72,9 @@ def test_dahl_from_rest_is_an_exponential_of_the_way(steps):
     """`f = mu (1 - exp(-sigma_0 x / mu))`, however fast."""
     for speed in (1e-6, 1.0):
         for way in (1e-6, 2e-5, 1e-3):
-            _, wrench = held(pf.DistributedModel(POINT, DAHL), speed, way / speed, steps)
+            _, wrench = held(
+                pf.DistributedModel(POINT, DAHL), speed, way / speed, steps
+            )
             expected = 0.4 * LOAD * -math.expm1(-2e4 * way / 0.4)
             assert -wrench[0] == pytest.approx(expected, rel=1e-13)  # rounding
 
@@ -70,7 +84,9 @@ def test_dahl_moved_to_and_fro_closes_its_loop():
     model = pf.DistributedModel(POINT, DAHL)
     state, _ = held(model, 0.1, 1.0, 1)
     _, wrench = held(model, -0.1, 1e-4, 3, state)
-    assert -wrench[0] == pytest.approx(0.4 * LOAD * (2.0 * math.exp(-2e4 * 1e-5 / 0.4) - 1.0), rel=1e-12)  # rounding
+    assert -wrench[0] == pytest.approx(
+        0.4 * LOAD * (2.0 * math.exp(-2e4 * 1e-5 / 0.4) - 1.0), rel=1e-12
+    )  # rounding
 
 
 def test_regularised_coulomb_is_the_curve_over_speed():
@@ -79,7 +95,9 @@ def test_regularised_coulomb_is_the_curve_over_speed():
     expected = g * speed / (speed + 1e-4) + 0.3 * speed
     assert CREEPING.steady_friction(speed) == pytest.approx(expected, rel=1e-15)
     for v, friction in zip(speed, expected, strict=True):
-        _, wrench = held(pf.DistributedModel(POINT, CREEPING), v, 1.0, 1)  # 200 relaxation times
+        _, wrench = held(
+            pf.DistributedModel(POINT, CREEPING), v, 1.0, 1
+        )  # 200 relaxation times
         assert -wrench[0] == pytest.approx(friction * LOAD, rel=1e-12)  # rounding
 
 
@@ -88,27 +106,36 @@ def test_regularised_coulomb_relaxes_at_rest_within_its_time():
     state, before = held(model, 0.1, 1.0, 1)
     _, after = held(model, 0.0, 5e-3, 4, state)
     viscous = 0.3 * 0.1 * LOAD
-    assert after[0] / (before[0] + viscous) == pytest.approx(math.exp(-1.0), rel=1e-13)  # rounding
+    assert after[0] / (before[0] + viscous) == pytest.approx(
+        math.exp(-1.0), rel=1e-13
+    )  # rounding
 
 
 def creeping_block(share: float) -> pf.Scene:
     """A block on a disc, pushed with a share of what it can hold."""
-    model, force = pf.DistributedModel(DISC, SIMPLE), pf.Signal.constant([share * 0.5 * LOAD, 0.0, 0.0])
+    model = pf.DistributedModel(DISC, SIMPLE)
+    force = pf.Signal.constant([share * 0.5 * LOAD, 0.0, 0.0])
     body = pf.Body(0.1, 1e-5, gravity=(0.0, 0.0))
-    return pf.Scene(body, [pf.Contact(model, LOAD, mounted_on="body")], 0.2, force=force)
+    return pf.Scene(
+        body, [pf.Contact(model, LOAD, mounted_on="body")], 0.2, force=force
+    )
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.9])
 def test_regularised_coulomb_creeps_under_a_held_force(share):
     """`v = v_c F/(mu f_N - F)`"""
     data = pf.simulate(creeping_block(share), rtol=1e-8).data
-    assert float(data.vx[-1]) == pytest.approx(1e-4 * share / (1.0 - share), rel=1e-4)  # of the solver
+    assert float(data.vx[-1]) == pytest.approx(
+        1e-4 * share / (1.0 - share), rel=1e-4
+    )  # of the solver
 
 
 def test_the_creep_of_a_scene_has_the_slope_of_its_closed_form():
     """`dv/d(log mu) = -v_c F mu f_N/(mu f_N - F)^2`"""
     found = pf.derivatives.scene_sensitivities(creeping_block(0.6), ("mu", "load"))
-    assert found.d_motion[-1, 0] == pytest.approx(-1e-4 * 0.6 / 0.4**2, rel=1e-4)  # of the solver
+    assert found.d_motion[-1, 0] == pytest.approx(
+        -1e-4 * 0.6 / 0.4**2, rel=1e-4
+    )  # of the solver
 
 
 # ---------------------------------------------------------------------- one bristle without a patch
@@ -116,30 +143,49 @@ def test_the_creep_of_a_scene_has_the_slope_of_its_closed_form():
 
 @every_law
 def test_a_single_bristle_is_a_patch_of_one_cell(law):
-    model, rng = pf.DistributedModel(POINT, law), np.random.default_rng(0)
+    model = pf.DistributedModel(POINT, law)
+    rng = np.random.default_rng(0)
     z = law.largest_deflection * rng.normal(size=(20, 2))
     v = 1e-3 * rng.normal(size=(20, 2))
     twist = np.concatenate([v, np.zeros((20, 1))], axis=1)
     wide = z[..., None]
-    assert law.rate(z, v, axis=-1) == pytest.approx(model.rate(wide, twist, LOAD)[..., 0], rel=1e-12)  # rounding
-    assert law.force(z, v, LOAD, axis=-1) == pytest.approx(model.wrench(wide, twist, LOAD)[:, :2], rel=1e-12)
+    assert law.rate(z, v, axis=-1) == pytest.approx(
+        model.rate(wide, twist, LOAD)[..., 0], rel=1e-12
+    )  # rounding
+    assert law.force(z, v, LOAD, axis=-1) == pytest.approx(
+        model.wrench(wide, twist, LOAD)[:, :2], rel=1e-12
+    )
 
 
 @every_law
 def test_a_bristle_on_a_line_is_one_in_the_plane_that_keeps_to_it(law):
-    z, v = law.largest_deflection * np.array([-0.9, 0.0, 0.5, 0.95]), np.array([1e-3, 1e-4, -2e-3, 5e-2])
+    z = law.largest_deflection * np.array([-0.9, 0.0, 0.5, 0.95])
+    v = np.array([1e-3, 1e-4, -2e-3, 5e-2])
     flat = np.zeros(4)
-    plane = law.force(np.stack([z, flat]), np.stack([v, flat]), np.full(4, LOAD), axis=0)
-    assert law.force(z, v, LOAD) == pytest.approx(plane[0], rel=1e-13) and not plane[1].any()  # rounding
-    assert law.rate(z, v) == pytest.approx(law.rate(np.stack([z, flat]), np.stack([v, flat]), axis=0)[0], rel=1e-13)
+    plane = law.force(
+        np.stack([z, flat]), np.stack([v, flat]), np.full(4, LOAD), axis=0
+    )
+    assert (
+        law.force(z, v, LOAD) == pytest.approx(plane[0], rel=1e-13)
+        and not plane[1].any()
+    )  # rounding
+    assert law.rate(z, v) == pytest.approx(
+        law.rate(np.stack([z, flat]), np.stack([v, flat]), axis=0)[0], rel=1e-13
+    )
 
 
 @every_law
 def test_steady_friction_is_where_the_bristle_stays(law):
     speed = np.array([1e-5, 1e-3, 0.1])
-    deflection = (law.steady_friction(speed) - law.numbers.sigma_2 * speed) / law.numbers.sigma_0
-    assert np.abs(law.rate(deflection, speed)).max() < 1e-13  # rounding of speeds up to 0.1 m/s
-    assert law.force(deflection, speed, LOAD) == pytest.approx(-LOAD * law.steady_friction(speed), rel=1e-9)
+    deflection = (
+        law.steady_friction(speed) - law.numbers.sigma_2 * speed
+    ) / law.numbers.sigma_0
+    assert (
+        np.abs(law.rate(deflection, speed)).max() < 1e-13
+    )  # rounding of speeds up to 0.1 m/s
+    assert law.force(deflection, speed, LOAD) == pytest.approx(
+        -LOAD * law.steady_friction(speed), rel=1e-9
+    )
 
 
 # ---------------------------------------------------------------------- models
@@ -147,19 +193,27 @@ def test_steady_friction_is_where_the_bristle_stays(law):
 
 def model_of(kind, law):
     if kind == "reduced-published":
-        return pf.ReducedModelPublished(DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC))
+        return pf.ReducedModelPublished(
+            DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC)
+        )
     return pf.DistributedModel(GROOVED if kind == "grooved" else DISC, law)
 
 
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
 @pytest.mark.parametrize("kind", ["distributed", "grooved", "reduced-published"])
 def test_models_of_other_laws_have_the_slopes_of_their_differences(kind, law):
-    model, rng = model_of(kind, law), np.random.default_rng(1)
+    model = model_of(kind, law)
+    rng = np.random.default_rng(1)
     # the third state of the published model is a moment
-    scale = law.largest_deflection * (np.array([1.0, 1.0, 0.005]) if kind == "reduced-published" else 1.0)
-    state, sideways = 0.5 * scale * rng.normal(size=model.state_shape), scale * rng.normal(size=model.state_shape)
-    twist, dt = np.array([1e-3, -5e-4, 0.2]), 2e-3
-    slopes, step = model.jacobians(state, twist, LOAD), model.step_jacobians(state, twist, LOAD, dt)
+    scale = law.largest_deflection * (
+        np.array([1.0, 1.0, 0.005]) if kind == "reduced-published" else 1.0
+    )
+    state = 0.5 * scale * rng.normal(size=model.state_shape)
+    sideways = scale * rng.normal(size=model.state_shape)
+    twist = np.array([1e-3, -5e-4, 0.2])
+    dt = 2e-3
+    slopes = model.jacobians(state, twist, LOAD)
+    step = model.step_jacobians(state, twist, LOAD, dt)
     ahead = rng.normal(size=3) * np.array([1e-3, 1e-3, 0.1])
     h = 1e-5  # central differences of the second order: 1e-10 of the third derivative, above 1e-16/1e-5 of rounding
 
@@ -167,71 +221,111 @@ def test_models_of_other_laws_have_the_slopes_of_their_differences(kind, law):
         return (function(h) - function(-h)) / (2.0 * h)
 
     def close(found, expected):
-        assert found == pytest.approx(expected, rel=1e-6, abs=1e-7 * np.abs(expected).max())
+        assert found == pytest.approx(
+            expected, rel=1e-6, abs=1e-7 * np.abs(expected).max()
+        )
 
     inner = "cd,d->c" if kind == "reduced-published" else "cdn,dn->cn"
     close(
         np.einsum(inner, slopes.rate_state, sideways),
         difference(lambda e: model.rate(state + e * sideways, twist, LOAD)),
     )
-    close(slopes.rate_twist @ ahead, difference(lambda e: model.rate(state, twist + e * ahead, LOAD)))
-    close(slopes.wrench_twist @ ahead, difference(lambda e: model.wrench(state, twist + e * ahead, LOAD)))
-    close(step.wrench_twist @ ahead, difference(lambda e: model.step(state, twist + e * ahead, LOAD, dt)[1]))
-    close(step.state_twist @ ahead, difference(lambda e: model.step(state, twist + e * ahead, LOAD, dt)[0]))
+    close(
+        slopes.rate_twist @ ahead,
+        difference(lambda e: model.rate(state, twist + e * ahead, LOAD)),
+    )
+    close(
+        slopes.wrench_twist @ ahead,
+        difference(lambda e: model.wrench(state, twist + e * ahead, LOAD)),
+    )
+    close(
+        step.wrench_twist @ ahead,
+        difference(lambda e: model.step(state, twist + e * ahead, LOAD, dt)[1]),
+    )
+    close(
+        step.state_twist @ ahead,
+        difference(lambda e: model.step(state, twist + e * ahead, LOAD, dt)[0]),
+    )
 
 
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
 def test_a_disc_that_slides_straight_has_the_friction_of_its_law(law):
     for kind in ("distributed", "reduced-published"):
         model = model_of(kind, law)
-        scene = pf.scenes.driven(model, twist=(3e-3, 4e-3, 0.0), normal_force=LOAD, t_end=0.2)
+        scene = pf.scenes.driven(
+            model, twist=(3e-3, 4e-3, 0.0), normal_force=LOAD, t_end=0.2
+        )
         data = pf.simulate(scene, rtol=1e-8).data
         friction = LOAD * float(law.steady_friction(5e-3))
         end = [float(data[name][-1, 0]) for name in ("fx", "fy")]
-        assert end == pytest.approx([-0.6 * friction, -0.8 * friction], rel=1e-6)  # of the solver
+        assert end == pytest.approx(
+            [-0.6 * friction, -0.8 * friction], rel=1e-6
+        )  # of the solver
 
 
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
 def test_grooves_turn_and_scale_the_friction_of_a_law(law):
     """In steady sliding with v, `f = -L (u/|u|) mu(|u|)` with `u = L v` and `L` the root of the metric."""
-    v, root = np.array([3e-3, 4e-3]), GROOVED.root
+    v = np.array([3e-3, 4e-3])
+    root = GROOVED.root
     u = root @ v
-    expected = -LOAD * root @ u / np.linalg.norm(u) * law.steady_friction(np.linalg.norm(u))
-    scene = pf.scenes.driven(model_of("grooved", law), twist=(*v, 0.0), normal_force=LOAD, t_end=0.2)
+    expected = (
+        -LOAD * root @ u / np.linalg.norm(u) * law.steady_friction(np.linalg.norm(u))
+    )
+    scene = pf.scenes.driven(
+        model_of("grooved", law), twist=(*v, 0.0), normal_force=LOAD, t_end=0.2
+    )
     data = pf.simulate(scene, rtol=1e-8).data
     end = [float(data[name][-1, 0]) for name in ("fx", "fy")]
     assert end == pytest.approx(expected, rel=1e-6)  # of the solver
     _, wrench = held(model_of("grooved", law), 5e-3, 1.0, 2)
     along = root @ [5e-3, 0.0]
     size = np.linalg.norm(along)
-    assert wrench[:2] == pytest.approx(-LOAD * root @ along / size * law.steady_friction(size), rel=1e-9)
+    assert wrench[:2] == pytest.approx(
+        -LOAD * root @ along / size * law.steady_friction(size), rel=1e-9
+    )
 
 
 def test_the_reduced_model_takes_dahl_and_refuses_creep():
     reduced, same = (
-        pf.ReducedModel(DISC, law) for law in (DAHL, pf.LuGre(mu_c=0.4, sigma_0=2e4, sigma_1=0.0, sigma_2=0.0))
+        pf.ReducedModel(DISC, law)
+        for law in (DAHL, pf.LuGre(mu_c=0.4, sigma_0=2e4, sigma_1=0.0, sigma_2=0.0))
     )
     twist = (1e-3, 2e-3, 0.3)
     assert reduced.step(reduced.rest(), twist, LOAD, 1e-2)[1] == pytest.approx(
         same.step(same.rest(), twist, LOAD, 1e-2)[1], rel=1e-12
     )
     leaning = DISC.with_friction_metric(None, (0.1, 0.0))
-    with pytest.raises(InvalidValueError, match="no creep_speed for patches with an asymmetry: take LuGre or Dahl"):
+    with pytest.raises(
+        InvalidValueError,
+        match="no creep_speed for patches with an asymmetry: take LuGre or Dahl",
+    ):
         pf.DistributedModel(leaning, CREEPING)
 
 
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
 def test_sensitivities_of_other_laws_are_those_of_differences(law):
     model = pf.ReducedModelPublished(DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC))
-    given = (model.rest(), np.array([[1e-3, 2e-4, 0.1]] * 12), np.full(12, LOAD), np.full(12, 1e-3))
-    names, base = pf.derivatives.parameter_names(model), pf.derivatives.parameters_of(model)
+    given = (
+        model.rest(),
+        np.array([[1e-3, 2e-4, 0.1]] * 12),
+        np.full(12, LOAD),
+        np.full(12, 1e-3),
+    )
+    names = pf.derivatives.parameter_names(model)
+    base = pf.derivatives.parameters_of(model)
     slopes = rollout_jacobian(model, *given).d_wrenches
     for name in ("sigma_0", "mu_c"):
         i = names.index(name)
         change = 1e-6 * base[i] * np.eye(len(base))[i]
-        ends = [rollout(model, *given, parameters=base + sign * change).wrenches for sign in (1.0, -1.0)]
+        ends = [
+            rollout(model, *given, parameters=base + sign * change).wrenches
+            for sign in (1.0, -1.0)
+        ]
         expected = (ends[0] - ends[1]) / (2.0 * change[i])
-        assert slopes[..., i] == pytest.approx(expected, rel=1e-5, abs=1e-6 * np.abs(expected).max())
+        assert slopes[..., i] == pytest.approx(
+            expected, rel=1e-5, abs=1e-6 * np.abs(expected).max()
+        )
 
 
 class Halved(pf.LuGre):
@@ -244,33 +338,48 @@ class Halved(pf.LuGre):
 
 
 def test_a_subclass_is_what_its_numbers_say():
-    halved, plain = Halved(mu_c=0.8, mu_s=1.0), pf.LuGre(mu_c=0.4, mu_s=0.5)
+    halved = Halved(mu_c=0.8, mu_s=1.0)
+    plain = pf.LuGre(mu_c=0.4, mu_s=0.5)
     twist = 1e-2, 2e-3, 0.3
     for make in (
         lambda law: pf.DistributedModel(DISC, law),
         lambda law: pf.ReducedModel(DISC, law),
         lambda law: pf.ReducedModelPublished(DISC, law),
     ):
-        of_halved, of_plain = make(halved), make(plain)
+        of_halved = make(halved)
+        of_plain = make(plain)
         state, wrench = of_plain.step(of_plain.rest(), twist, LOAD, 1e-2)
-        assert of_halved.step(of_halved.rest(), twist, LOAD, 1e-2)[1] == pytest.approx(wrench, rel=1e-14)
-        assert of_halved.wrench(state, twist, LOAD) == pytest.approx(of_plain.wrench(state, twist, LOAD), rel=1e-12)
-    assert halved.force(1e-6, 1e-3, LOAD) == pytest.approx(plain.force(1e-6, 1e-3, LOAD), rel=1e-14)
+        assert of_halved.step(of_halved.rest(), twist, LOAD, 1e-2)[1] == pytest.approx(
+            wrench, rel=1e-14
+        )
+        assert of_halved.wrench(state, twist, LOAD) == pytest.approx(
+            of_plain.wrench(state, twist, LOAD), rel=1e-12
+        )
+    assert halved.force(1e-6, 1e-3, LOAD) == pytest.approx(
+        plain.force(1e-6, 1e-3, LOAD), rel=1e-14
+    )
     with pytest.raises(InvalidValueError, match="start must be a LuGre law"):
         pf.identify.identify_lugre(
-            pf.identify.Log(np.arange(20.0), np.ones((20, 3)), np.ones((20, 3)), 1.0), DISC, start=halved
+            pf.identify.Log(np.arange(20.0), np.ones((20, 3)), np.ones((20, 3)), 1.0),
+            DISC,
+            start=halved,
         )
 
 
 @pytest.mark.torch
 def test_torch_takes_a_law_by_its_numbers_and_refuses_creep():
-    torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
+    torch = pytest.importorskip(
+        "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
+    )
     import planarfriction.torch as pt
 
     for law in (Halved(mu_c=0.8, mu_s=1.0), DAHL):
         model = pt.DistributedModel(DISC, law, dtype=torch.float64)
-        twist, reference = (1e-2, 2e-3, 0.3), pf.DistributedModel(DISC, law)
-        _, wrench = model.step(model.rest(), torch.tensor(twist, dtype=torch.float64), LOAD, 1e-2)
+        twist = (1e-2, 2e-3, 0.3)
+        reference = pf.DistributedModel(DISC, law)
+        _, wrench = model.step(
+            model.rest(), torch.tensor(twist, dtype=torch.float64), LOAD, 1e-2
+        )
         assert wrench.numpy(force=True) == pytest.approx(
             reference.step(reference.rest(), twist, LOAD, 1e-2)[1], rel=1e-9
         )
@@ -285,9 +394,12 @@ def test_jax_takes_a_law_by_its_numbers_and_refuses_creep():
 
     for law in (Halved(mu_c=0.8, mu_s=1.0), DAHL):
         model = pj.DistributedModel(DISC, law)
-        twist, reference = (1e-2, 2e-3, 0.3), pf.DistributedModel(DISC, law)
+        twist = (1e-2, 2e-3, 0.3)
+        reference = pf.DistributedModel(DISC, law)
         _, wrench = model.step(model.rest(), jax.numpy.asarray(twist), LOAD, 1e-2)
         expected = reference.step(reference.rest(), twist, LOAD, 1e-2)[1]
-        assert np.asarray(wrench) == pytest.approx(expected, rel=1e-4, abs=1e-6)  # single precision
+        assert np.asarray(wrench) == pytest.approx(
+            expected, rel=1e-4, abs=1e-6
+        )  # single precision
     with pytest.raises(InvalidValueError, match="law must have no creep_speed"):
         pj.DistributedModel(DISC, CREEPING)

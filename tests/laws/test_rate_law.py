@@ -30,8 +30,13 @@ LUGRE = pf.LuGre(mu_c=0.8, mu_s=1.0, v_s=1e-3, sigma_0=1e5, sigma_1=100.0, sigma
 
 def bristles(law, rng, model) -> np.ndarray:
     """Bristles within their largest deflection."""
-    angle, size = rng.uniform(0.0, 2.0 * np.pi, model.state_shape[1:]), law.largest_deflection
-    return size * rng.uniform(0.0, 1.0, angle.shape) * np.array([np.cos(angle), np.sin(angle)])
+    angle = rng.uniform(0.0, 2.0 * np.pi, model.state_shape[1:])
+    size = law.largest_deflection
+    return (
+        size
+        * rng.uniform(0.0, 1.0, angle.shape)
+        * np.array([np.cos(angle), np.sin(angle)])
+    )
 
 
 def directional() -> pf.ContactPatch:
@@ -45,40 +50,77 @@ def directional() -> pf.ContactPatch:
 def test_along_a_line_it_is_dahl():
     """With beta = 1 and n = 1 a bristle follows `z_max (1 - exp(-x/z_max))`."""
     law = BoucWen(beta=1.0, n=1.0)
-    model, dt = pf.DistributedModel(POINT, law), 1e-5
-    x, state = 0.0, model.rest()
+    model = pf.DistributedModel(POINT, law)
+    dt = 1e-5
+    x = 0.0
+    state = model.rest()
     for _ in range(200):
         state, wrench = model.step(state, (2e-3, 0.0, 0.0), 3.0, dt)
         x += 2e-3 * dt
-    assert -wrench[0] == pytest.approx(3.0 * 0.4 * -np.expm1(-x / law.largest_deflection), rel=1e-5)
+    assert -wrench[0] == pytest.approx(
+        3.0 * 0.4 * -np.expm1(-x / law.largest_deflection), rel=1e-5
+    )
 
 
 def test_steady_friction_and_rest():
-    assert BoucWen().steady_friction([0.0, 1e-3, 2.0]) == pytest.approx([0.4, 0.4, 0.4], rel=1e-9)
+    assert BoucWen().steady_friction([0.0, 1e-3, 2.0]) == pytest.approx(
+        [0.4, 0.4, 0.4], rel=1e-9
+    )
     speed = np.array([1e-4, 1e-3, 0.1])
-    assert Written().steady_friction(speed) == pytest.approx(LUGRE.steady_friction(speed), rel=1e-9)
-    assert BoucWen().holds_at_rest and Written().holds_at_rest and not Gum().holds_at_rest
+    assert Written().steady_friction(speed) == pytest.approx(
+        LUGRE.steady_friction(speed), rel=1e-9
+    )
+    assert (
+        BoucWen().holds_at_rest and Written().holds_at_rest and not Gum().holds_at_rest
+    )
 
 
-@pytest.mark.parametrize("patch", [DISC, directional()], ids=["isotropic", "directional"])
+@pytest.mark.parametrize(
+    "patch", [DISC, directional()], ids=["isotropic", "directional"]
+)
 def test_lugre_written_down_is_lugre(patch):
-    own, known = pf.DistributedModel(patch, Written()), pf.DistributedModel(patch, LUGRE)
+    own = pf.DistributedModel(patch, Written())
+    known = pf.DistributedModel(patch, LUGRE)
     rng = np.random.default_rng(1)
-    state, twist = bristles(LUGRE, rng, known), np.array([2e-3, -1e-3, 0.3])
-    assert own.rate(state, twist, 2.0) == pytest.approx(known.rate(state, twist, 2.0), rel=1e-12)
-    assert own.wrench(state, twist, 2.0) == pytest.approx(known.wrench(state, twist, 2.0), rel=1e-12)
-    for mine, theirs in zip(own.jacobians(state, twist, 2.0), known.jacobians(state, twist, 2.0), strict=True):
-        assert mine == pytest.approx(theirs, rel=1e-10, abs=1e-10 * np.abs(theirs).max())
-    assert Written().rate(3e-6, [-1e-3, 2e-3]) == pytest.approx(LUGRE.rate(3e-6, [-1e-3, 2e-3]), rel=1e-13)
+    state = bristles(LUGRE, rng, known)
+    twist = np.array([2e-3, -1e-3, 0.3])
+    assert own.rate(state, twist, 2.0) == pytest.approx(
+        known.rate(state, twist, 2.0), rel=1e-12
+    )
+    assert own.wrench(state, twist, 2.0) == pytest.approx(
+        known.wrench(state, twist, 2.0), rel=1e-12
+    )
+    for mine, theirs in zip(
+        own.jacobians(state, twist, 2.0),
+        known.jacobians(state, twist, 2.0),
+        strict=True,
+    ):
+        assert mine == pytest.approx(
+            theirs, rel=1e-10, abs=1e-10 * np.abs(theirs).max()
+        )
+    assert Written().rate(3e-6, [-1e-3, 2e-3]) == pytest.approx(
+        LUGRE.rate(3e-6, [-1e-3, 2e-3]), rel=1e-13
+    )
     two = [[1e-6, 2e-6]], [[2e-3, 1e-3]]
-    assert Written().force(*two, 2.0, axis=-1) == pytest.approx(LUGRE.force(*two, 2.0, axis=-1), rel=1e-13)
+    assert Written().force(*two, 2.0, axis=-1) == pytest.approx(
+        LUGRE.force(*two, 2.0, axis=-1), rel=1e-13
+    )
 
 
 def test_a_scene_with_lugre_written_down_ends_alike():
     ends = []
     for law in (Written(), LUGRE):
-        found = pf.simulate(pf.scenes.in_hand(pf.DistributedModel(DISC, law), t_end=0.4), rtol=1e-8, atol=1e-8).data
-        ends.append([float(found[name][-1]) for name in ("x", "y", "theta", "vx", "vy", "omega")])
+        found = pf.simulate(
+            pf.scenes.in_hand(pf.DistributedModel(DISC, law), t_end=0.4),
+            rtol=1e-8,
+            atol=1e-8,
+        ).data
+        ends.append(
+            [
+                float(found[name][-1])
+                for name in ("x", "y", "theta", "vx", "vy", "omega")
+            ]
+        )
     assert ends[0] == pytest.approx(ends[1], rel=1e-6, abs=1e-9)
 
 
@@ -87,7 +129,9 @@ def test_a_scene_with_lugre_written_down_ends_alike():
 
 @pytest.mark.parametrize("law", [BoucWen(), Written()], ids=["bouc-wen", "lugre"])
 def test_steps_are_of_order_two(law):
-    model, rng, time = pf.DistributedModel(DISC, law), np.random.default_rng(0), 4e-4
+    model = pf.DistributedModel(DISC, law)
+    rng = np.random.default_rng(0)
+    time = 4e-4
     start = 0.5 * bristles(law, rng, model)
 
     def end(steps: int) -> np.ndarray:
@@ -110,8 +154,10 @@ def test_steps_are_of_order_two(law):
 def test_no_step_stores_more_than_the_work_done(size, angle, distance, speed, shape):
     """`sigma_0 |z|^2/2` grows by less than the work of the motion, for steps of any length; bristles stay in bounds."""
     law = BoucWen(beta=shape[0], n=shape[1])
-    model, largest = pf.DistributedModel(POINT, law), law.largest_deflection
-    before, velocity = size * largest * np.array([[np.cos(angle)], [np.sin(angle)]]), 10.0**speed
+    model = pf.DistributedModel(POINT, law)
+    largest = law.largest_deflection
+    before = size * largest * np.array([[np.cos(angle)], [np.sin(angle)]])
+    velocity = 10.0**speed
     dt = 10.0**distance * largest / velocity
     after, wrench = model.step(before, (velocity, 0.0, 0.0), 1.0, dt)
     stored = 0.5 * law.sigma_0 * ((after**2).sum() - (before**2).sum())
@@ -121,7 +167,9 @@ def test_no_step_stores_more_than_the_work_done(size, angle, distance, speed, sh
 
 def test_what_is_stiff_is_damped_in_one_step():
     """Bristles that flow within 1 us are at `z = v T` after 1 ms; of where they were 4.8/1000 is left."""
-    state, _ = pf.DistributedModel(POINT, Gum(time=1e-6)).step([[5e-7], [0.0]], (0.1, 0.0, 0.0), 1.0, 1e-3)
+    state, _ = pf.DistributedModel(POINT, Gum(time=1e-6)).step(
+        [[5e-7], [0.0]], (0.1, 0.0, 0.0), 1.0, 1e-3
+    )
     assert state[0] == pytest.approx(0.1 * 1e-6, abs=0.005 * 5e-7)
 
 
@@ -134,11 +182,16 @@ def test_without_load_bristles_are_forgotten():
 # ---------------------------------------------------------------------- derivatives
 
 
-@pytest.mark.parametrize("patch", [DISC, directional()], ids=["isotropic", "directional"])
+@pytest.mark.parametrize(
+    "patch", [DISC, directional()], ids=["isotropic", "directional"]
+)
 def test_derivatives_of_steps_are_differences(patch):
     law = BoucWen()
     model = pf.DistributedModel(patch, law)
-    state, twist, load, dt = bristles(law, np.random.default_rng(2), model), np.array([6e-3, -4e-3, 0.5]), 2.0, 1e-4
+    state = bristles(law, np.random.default_rng(2), model)
+    twist = np.array([6e-3, -4e-3, 0.5])
+    load = 2.0
+    dt = 1e-4
     found = model.step_jacobians(state, twist, load, dt)
 
     def difference(change, index: int) -> np.ndarray:
@@ -147,20 +200,35 @@ def test_derivatives_of_steps_are_differences(patch):
 
     for i in range(3):
         h = 1e-7 * np.eye(3)[i]
-        new, wrench = (difference(lambda s, h=h: (state, twist + s * h, load), k) / 1e-7 for k in (0, 1))
-        assert found.state_twist[..., i] == pytest.approx(new, rel=1e-5, abs=1e-6 * np.abs(found.state_twist).max())
-        assert found.wrench_twist[:, i] == pytest.approx(wrench, rel=1e-5, abs=1e-6 * np.abs(wrench).max())
+        new, wrench = (
+            difference(lambda s, h=h: (state, twist + s * h, load), k) / 1e-7
+            for k in (0, 1)
+        )
+        assert found.state_twist[..., i] == pytest.approx(
+            new, rel=1e-5, abs=1e-6 * np.abs(found.state_twist).max()
+        )
+        assert found.wrench_twist[:, i] == pytest.approx(
+            wrench, rel=1e-5, abs=1e-6 * np.abs(wrench).max()
+        )
     for a in range(2):
         h = np.zeros_like(state)
         h[a] = 1e-12
         new = difference(lambda s, h=h: (state + s * h, twist, load), 0) / 1e-12
         assert found.state_state[:, a] == pytest.approx(new, rel=1e-4, abs=1e-5)
         wrench = difference(lambda s, h=h: (state + s * h, twist, load), 1) / 1e-12
-        assert found.wrench_state[:, a].sum(axis=-1) == pytest.approx(wrench, rel=1e-5, abs=1e-5 * np.abs(wrench).max())
-    assert load * found.wrench_load == pytest.approx(model.step(state, twist, load, dt)[1], rel=1e-12)
+        assert found.wrench_state[:, a].sum(axis=-1) == pytest.approx(
+            wrench, rel=1e-5, abs=1e-5 * np.abs(wrench).max()
+        )
+    assert load * found.wrench_load == pytest.approx(
+        model.step(state, twist, load, dt)[1], rel=1e-12
+    )
 
 
-@pytest.mark.parametrize(("patch", "law"), [(DISC, Written()), (directional(), BoucWen())], ids=["viscous", "yielding"])
+@pytest.mark.parametrize(
+    ("patch", "law"),
+    [(DISC, Written()), (directional(), BoucWen())],
+    ids=["viscous", "yielding"],
+)
 def test_derivatives_of_scenes_are_differences_and_each_other_s_transpose(patch, law):
     model = pf.DistributedModel(patch, law)
     load = pf.Signal([0.0, 0.02], [3.0, 2.0], "linear")
@@ -168,10 +236,8 @@ def test_derivatives_of_scenes_are_differences_and_each_other_s_transpose(patch,
     force = pf.Signal([0.0, 0.02], [[0.2, 0.0, 1e-3], [0.0, 0.1, -1e-3]], "linear")
     body = pf.Body(0.3, 3e-5, velocity=(0.1, 0.02, 5.0), gravity=(0.0, 0.0))
     scene = pf.Scene(body, [contact], 0.02, force=force)  # it slides throughout
-    last, numbers = (
-        np.eye(6)[0] + np.eye(6)[2],
-        {"signals": {"own.normal_force": [0.0, 0.02]}, "initial": ["vx", "omega"]},
-    )
+    last = np.eye(6)[0] + np.eye(6)[2]
+    numbers = {"signals": {"own.normal_force": [0.0, 0.02]}, "initial": ["vx", "omega"]}
     numbers["options"] = SolverOptions(rtol=1e-8, atol=1e-8)
 
     def cotangent(time: np.ndarray, motion: np.ndarray) -> np.ndarray:
@@ -182,7 +248,9 @@ def test_derivatives_of_scenes_are_differences_and_each_other_s_transpose(patch,
     assert found == pytest.approx(forwards.d_motion[-1].T @ last, rel=1e-5)
 
     def end(change: float) -> np.ndarray:
-        heavier = dataclasses.replace(scene, body=dataclasses.replace(body, mass=0.3 * (1.0 + change)))
+        heavier = dataclasses.replace(
+            scene, body=dataclasses.replace(body, mass=0.3 * (1.0 + change))
+        )
         data = pf.simulate(heavier, rtol=1e-10, atol=1e-10).data
         return np.array([float(data[name][-1]) for name in ("vx", "vy", "omega")])
 
@@ -210,17 +278,25 @@ def test_a_contact_sticks_where_bristles_keep_their_deflection():
         scene = pf.Scene(pf.Body(1.0, 1e-3, gravity=(3.0, 0.0)), [contact], 0.2)
         assert (abs(float(pf.simulate(scene).data.x[-1])) > 1e-3) is moves
     contact = pf.Contact(pf.DistributedModel(DISC, BoucWen()), 10.0, mounted_on="body")
-    scene = pf.Scene(pf.Body(1.0, 1e-3, gravity=(3.0, 0.0)), [contact], 0.2, start="equilibrium")
+    scene = pf.Scene(
+        pf.Body(1.0, 1e-3, gravity=(3.0, 0.0)), [contact], 0.2, start="equilibrium"
+    )
     assert abs(float(pf.simulate(scene).data.x[-1])) < 1e-12
     contact = dataclasses.replace(contact, model=pf.DistributedModel(DISC, Gum()))
-    with pytest.raises(InvalidValueError, match="start must be 'rest' or 'sliding' with a law that creeps"):
+    with pytest.raises(
+        InvalidValueError,
+        match="start must be 'rest' or 'sliding' with a law that creeps",
+    ):
         pf.simulate(dataclasses.replace(scene, contacts=[contact]))
 
 
 def test_a_law_that_was_used_goes_to_another_process():
     law = BoucWen()
-    rate, steady = law.rate(1e-6, 0.1), law.steady_friction(0.1)
-    assert not any(isinstance(each, np.ndarray) for each in vars(law).values())  # no address of this process
+    rate = law.rate(1e-6, 0.1)
+    steady = law.steady_friction(0.1)
+    assert not any(
+        isinstance(each, np.ndarray) for each in vars(law).values()
+    )  # no address of this process
     again = pickle.loads(pickle.dumps(law))
     assert again == law
     assert again.rate(1e-6, 0.1) == rate
@@ -235,7 +311,9 @@ def test_what_needs_the_bristles_of_lugre_refuses_it_in_one_line():
     with pytest.raises(InvalidValueError, match=rule):
         pf.ReducedModelPublished(DISC, BoucWen())
     with pytest.raises(InvalidValueError, match="for patches with an asymmetry"):
-        pf.DistributedModel(DISC.with_friction_metric(np.eye(2), asymmetry=(0.2, 0.1)), BoucWen())
+        pf.DistributedModel(
+            DISC.with_friction_metric(np.eye(2), asymmetry=(0.2, 0.1)), BoucWen()
+        )
     scene = pf.scenes.in_hand(pf.DistributedModel(DISC, BoucWen()), t_end=0.1)
     with pytest.raises(InvalidValueError, match="for derivatives by mu"):
         scene_sensitivities(scene, ("mu",))
@@ -263,7 +341,9 @@ def test_wrong_laws_are_refused_in_one_line():
         def bristle_rate(xp, law, z, v):
             return plus(v, xp.exp(700.0) * xp.exp(700.0), z)
 
-    with pytest.raises(InvalidValueError, match=r"^law must be a straight line \(.*line \d+: `if norm") as caught:
+    with pytest.raises(
+        InvalidValueError, match=r"^law must be a straight line \(.*line \d+: `if norm"
+    ) as caught:
         Branches()
     assert "\n" not in str(caught.value)
     with pytest.raises(InvalidValueError, match="mu must be a number"):
@@ -286,7 +366,10 @@ def test_machine_code_goes_by_all_that_a_law_uses(tmp_path):
         spec = importlib.util.spec_from_file_location("own", path)
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
-        prints |= {fingerprint(["a", "b"], module.rate), fingerprint(["a", "b"], module.rate)}
+        prints |= {
+            fingerprint(["a", "b"], module.rate),
+            fingerprint(["a", "b"], module.rate),
+        }
     assert len(prints) == 3
     assert fingerprint(["b", "a"], module.rate) not in prints
 
@@ -294,7 +377,9 @@ def test_machine_code_goes_by_all_that_a_law_uses(tmp_path):
 def test_machine_code_knows_numbers_of_one_name_apart(tmp_path):
     """A number of the rate and one of the same name in another module, which a function that it calls reads."""
     prints = set()
-    for i, (inner, outer) in enumerate([(1.0, 2.0), (2.0, 2.0), (1.0, 3.0), (2.0, 1.0)]):
+    for i, (inner, outer) in enumerate(
+        [(1.0, 2.0), (2.0, 2.0), (1.0, 3.0), (2.0, 1.0)]
+    ):
         texts = {
             "inner": f"K = {inner}\ndef more(x):\n    return K * x\n",
             "outer": f"K = {outer}\nmore = None\ndef rate(xp, law, z, v):\n    return v - K * more(z)\n",

@@ -13,8 +13,12 @@ from tests.support.rate_laws import BoucWen
 
 RING = pf.ContactPatch.ring(0.006, 0.01, cells=9)
 BOX = pf.ContactPatch.rectangle(0.02, 0.01, cells=7)
-SOFT = pf.ContactPatch.disc(0.012, cells=9, pressure=pf.SoftFinger(c=0.006, n=0.3, k=2.5))
-LEVEL = pf.ContactPatch.rectangle(0.02, 0.01, cells=7, pressure=pf.LinearGradient((30.0, -10.0)))
+SOFT = pf.ContactPatch.disc(
+    0.012, cells=9, pressure=pf.SoftFinger(c=0.006, n=0.3, k=2.5)
+)
+LEVEL = pf.ContactPatch.rectangle(
+    0.02, 0.01, cells=7, pressure=pf.LinearGradient((30.0, -10.0))
+)
 SURFACES: dict[str, Any] = {
     "cells": lambda: pf.LimitSurfaceCells(BOX),
     "cells, metrics": lambda: pf.LimitSurfaceCells(PATCHES["metrics"]),
@@ -37,7 +41,8 @@ def numbers_of_surface(make: Any) -> dict[str, Any]:
     surface = make()
     twists = 0.01 * directions(7) * [1.0, 1.0, 100.0]
     wrenches = surface.wrench(twists)
-    numbers, cells = surface.numbers, pf.LimitSurfaceCells(surface.patch, normal_force=surface.normal_force)
+    numbers = surface.numbers
+    cells = pf.LimitSurfaceCells(surface.patch, normal_force=surface.normal_force)
     return {
         "text": repr(surface), "centre": surface.centre_of_pressure, "radius": surface.contact_radius,
         "wrench": list(wrenches),
@@ -50,7 +55,8 @@ def numbers_of_surface(make: Any) -> dict[str, Any]:
 
 def numbers_of_laws() -> dict[str, Any]:
     """Compute friction, rates and forces of every law at loads of 2 N, and the wrench of rigid friction."""
-    z, v = 1e-6 * np.array([[0.3, -0.2], [0.9, 0.5]]), 0.01 * np.array([[1.0, 0.2], [-0.4, 1.0]])
+    z = 1e-6 * np.array([[0.3, -0.2], [0.9, 0.5]])
+    v = 0.01 * np.array([[1.0, 0.2], [-0.4, 1.0]])
     found: dict[str, Any] = {
         name: {
             "text": repr(law), "numbers": law.numbers, "steady": law.steady_friction([0.0, 1e-3, 0.1]),
@@ -60,11 +66,18 @@ def numbers_of_laws() -> dict[str, Any]:
         }
         for name, law in {**LAWS, "stribeck": pf.CoulombStribeck(0.4, 0.6), "Bouc-Wen": BoucWen()}.items()
     }  # fmt: skip
-    return found | {"coulomb": pf.Coulomb(0.4).wrench(pf.LimitSurfaceCells(BOX), [0.01, 0.002, 1.0], 2.0)}
+    return found | {
+        "coulomb": pf.Coulomb(0.4).wrench(
+            pf.LimitSurfaceCells(BOX), [0.01, 0.002, 1.0], 2.0
+        )
+    }
 
 
 SOURCES: dict[str, Any] = {
-    **{name: (lambda make=make: numbers_of_surface(make)) for name, make in SURFACES.items()},
+    **{
+        name: (lambda make=make: numbers_of_surface(make))
+        for name, make in SURFACES.items()
+    },
     "laws": numbers_of_laws,
 }
 """What is computed, by name."""

@@ -34,7 +34,8 @@ class Superellipsoid(LimitSurface):
 
     def direction(self, units):
         q = self.exponent / (self.exponent - 1.0)
-        speed, spin = np.linalg.norm(units[:, :2], axis=1), np.abs(units[:, 2])
+        speed = np.linalg.norm(units[:, :2], axis=1)
+        spin = np.abs(units[:, 2])
         weights = np.stack([speed, speed, spin], axis=1) ** (q - 2.0)
         return units * weights / ((speed**q + spin**q) ** ((q - 1.0) / q))[:, None]
 
@@ -44,43 +45,70 @@ TWISTS = np.random.default_rng(3).normal(size=(40, 3)) * [0.01, 0.01, 1.0]
 
 @pytest.mark.parametrize("patch", [DISC, LEANING], ids=["disc", "line"])
 def test_the_direction_alone_makes_the_ellipsoid(patch):
-    own, library = Round(patch), pf.LimitSurfaceEllipsoid(patch)
-    twists = np.concatenate([TWISTS, [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 1.0]]])
+    own = Round(patch)
+    library = pf.LimitSurfaceEllipsoid(patch)
+    twists = np.concatenate(
+        [TWISTS, [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 1.0]]]
+    )
     wrenches = library.wrench(twists)
-    assert own.wrench(twists) == pytest.approx(wrenches, rel=1e-13, abs=1e-16)  # rounding
-    assert own.dissipation(twists) == pytest.approx(library.dissipation(twists), rel=1e-13)
-    assert own.twist(wrenches[:40]) == pytest.approx(library.twist(wrenches[:40]), rel=1e-9, abs=1e-12)
+    assert own.wrench(twists) == pytest.approx(
+        wrenches, rel=1e-13, abs=1e-16
+    )  # rounding
+    assert own.dissipation(twists) == pytest.approx(
+        library.dissipation(twists), rel=1e-13
+    )
+    assert own.twist(wrenches[:40]) == pytest.approx(
+        library.twist(wrenches[:40]), rel=1e-9, abs=1e-12
+    )
     slopes = library.jacobian(twists)
     # central differences over 1e-5 rad: 1e-10 of the third derivative, 1e-11 of rounding
-    assert own.jacobian(twists) == pytest.approx(slopes, abs=1e-9 * np.abs(slopes).max())
+    assert own.jacobian(twists) == pytest.approx(
+        slopes, abs=1e-9 * np.abs(slopes).max()
+    )
 
 
 def test_what_an_asymmetry_adds_comes_from_the_base():
     leaning = DISC.with_friction_metric([[1.2, 0.1], [0.1, 0.9]], (0.1, -0.2))
-    own, library = Round(leaning), pf.LimitSurfaceEllipsoid(leaning)
+    own = Round(leaning)
+    library = pf.LimitSurfaceEllipsoid(leaning)
     twists = np.concatenate([TWISTS, [[0.0, 0.0, 0.0]]])
-    assert own.wrench(twists) == pytest.approx(library.wrench(twists), rel=1e-13, abs=1e-16)
+    assert own.wrench(twists) == pytest.approx(
+        library.wrench(twists), rel=1e-13, abs=1e-16
+    )
     slopes = library.jacobian(twists)
-    assert own.jacobian(twists) == pytest.approx(slopes, abs=1e-9 * np.abs(slopes).max())
+    assert own.jacobian(twists) == pytest.approx(
+        slopes, abs=1e-9 * np.abs(slopes).max()
+    )
 
 
 @pytest.mark.parametrize("exponent", [1.4, 1.6, 2.0])
 def test_a_superellipsoid_has_its_shape_its_normals_and_its_slopes(exponent):
     surface = Superellipsoid(DISC, exponent)
     wrench = surface.wrench(TWISTS)
-    force, torque = np.linalg.norm(wrench[:, :2], axis=1), np.abs(wrench[:, 2]) / RADIUS
-    assert force**exponent + torque**exponent == pytest.approx(1.0, rel=1e-13)  # rounding
+    force = np.linalg.norm(wrench[:, :2], axis=1)
+    torque = np.abs(wrench[:, 2]) / RADIUS
+    assert force**exponent + torque**exponent == pytest.approx(
+        1.0, rel=1e-13
+    )  # rounding
     found = surface.twist(wrench)
-    assert found == pytest.approx(TWISTS / surface.dissipation(TWISTS)[:, None], rel=1e-7, abs=1e-9)
-    slope, h = surface.jacobian(TWISTS), 1e-4 * np.array([0.01, 0.01, 1.0])
+    assert found == pytest.approx(
+        TWISTS / surface.dissipation(TWISTS)[:, None], rel=1e-7, abs=1e-9
+    )
+    slope = surface.jacobian(TWISTS)
+    h = 1e-4 * np.array([0.01, 0.01, 1.0])
     for i in range(3):
         step = h[i] * np.eye(3)[i]
-        expected = (surface.wrench(TWISTS + step) - surface.wrench(TWISTS - step)) / (2.0 * h[i])
-        assert slope[:, :, i] == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())  # of these differences
+        expected = (surface.wrench(TWISTS + step) - surface.wrench(TWISTS - step)) / (
+            2.0 * h[i]
+        )
+        assert slope[:, :, i] == pytest.approx(
+            expected, abs=1e-3 * np.abs(expected).max()
+        )  # of these differences
 
 
 def test_models_store_it_as_a_table_that_gets_finer():
-    surface, errors = Superellipsoid(DISC), []
+    surface = Superellipsoid(DISC)
+    errors = []
     scaled = np.ascontiguousarray(np.random.default_rng(0).normal(size=(500, 3)))
     scaled /= np.linalg.norm(scaled, axis=1)[:, None]
     for segments in (10, 20, 40):
@@ -99,7 +127,9 @@ def test_a_model_slides_with_it_and_its_step_agrees_with_its_rate():
     model = pf.ReducedModelPublished(LEANING, law, surface=surface)
     twist = np.array([0.01, 0.004, 1.0])
     state, wrench = model.step(model.rest(), twist, 2.0, 10.0)
-    assert wrench == pytest.approx(surface.wrench(twist), rel=5e-3)  # of the table; mu f_N = 1
+    assert wrench == pytest.approx(
+        surface.wrench(twist), rel=5e-3
+    )  # of the table; mu f_N = 1
     assert model.wrench(state, twist, 2.0) == pytest.approx(wrench, rel=5e-3)
 
 
@@ -107,15 +137,23 @@ def test_a_surface_without_a_direction_says_what_is_missing():
     class Empty(LimitSurface):
         pass
 
-    with pytest.raises(NotImplementedError, match=r"Empty has to implement direction\(units\)"):
+    with pytest.raises(
+        NotImplementedError, match=r"Empty has to implement direction\(units\)"
+    ):
         Empty(DISC).wrench((1.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize("make", [pf.LimitSurfaceExact, pf.LimitSurfaceTable, pf.LimitSurfaceCells])
+@pytest.mark.parametrize(
+    "make", [pf.LimitSurfaceExact, pf.LimitSurfaceTable, pf.LimitSurfaceCells]
+)
 def test_the_library_s_own_say_their_direction_too(make):
     surface = make(DISC)
     units = TWISTS * [1.0, 1.0, RADIUS]
     units /= np.linalg.norm(units, axis=1)[:, None]
     at_centre = units / [1.0, 1.0, surface.contact_radius]
     wrench = surface.wrench(at_centre)
-    assert -surface.direction(units) * [1.0, 1.0, surface.contact_radius] == pytest.approx(wrench, abs=1e-14)
+    assert -surface.direction(units) * [
+        1.0,
+        1.0,
+        surface.contact_radius,
+    ] == pytest.approx(wrench, abs=1e-14)

@@ -34,7 +34,12 @@ def order(errors, refinement: float = 2.0) -> float:
 def ring_dissipation(slide, spin, radius):
     """`(2/pi)(v + omega R) E(4 v omega R/(v + omega R)^2)` of a ring of that radius."""
     rim = spin * radius
-    return 2.0 / math.pi * (slide + rim) * special.ellipe(4.0 * slide * rim / (slide + rim) ** 2)
+    return (
+        2.0
+        / math.pi
+        * (slide + rim)
+        * special.ellipe(4.0 * slide * rim / (slide + rim) ** 2)
+    )
 
 
 def ring(radius: float, points: int) -> pf.ContactPatch:
@@ -45,17 +50,21 @@ def ring(radius: float, points: int) -> pf.ContactPatch:
 
 @pytest.mark.parametrize("slide", [0.0, 0.2, 0.5, 2.0, 5.0])
 def test_ring(slide):
-    radius, spin = 0.03, 1.0
+    radius = 0.03
+    spin = 1.0
     surface = pf.LimitSurfaceCells(ring(radius, 200))
     phi = surface.dissipation((slide * radius, 0.0, spin))
     # The trapezoidal rule converges like 2^-200 where the centre of rotation is off the ring by half a radius or more.
-    assert phi == pytest.approx(ring_dissipation(slide * radius, spin, radius), rel=1e-13)
+    assert phi == pytest.approx(
+        ring_dissipation(slide * radius, spin, radius), rel=1e-13
+    )
 
 
 def test_ring_with_the_centre_of_rotation_on_it():
     """The speed has a kink there: second order in the distance of the points."""
     errors = [
-        pf.LimitSurfaceCells(ring(0.03, points)).dissipation((0.03, 0.0, 1.0)) - ring_dissipation(0.03, 1.0, 0.03)
+        pf.LimitSurfaceCells(ring(0.03, points)).dissipation((0.03, 0.0, 1.0))
+        - ring_dissipation(0.03, 1.0, 0.03)
         for points in (50, 100, 200, 400)
     ]
     assert order(errors) == pytest.approx(2.0, abs=0.05)
@@ -71,7 +80,15 @@ def disc_dissipation(slide, spin, radius):
         t = 0.5 * (nodes + 1.0)
         s, jacobian = (high - (high - low) * (1 - t) ** 3, 3 * (1 - t) ** 2) if low == 0.0 else (
             low + (high - low) * t**3, 3 * t**2)  # fmt: skip
-        total += (0.5 * weights * jacobian * (high - low) * ring_dissipation(slide, spin, s) * 2 * s).sum()
+        total += (
+            0.5
+            * weights
+            * jacobian
+            * (high - low)
+            * ring_dissipation(slide, spin, s)
+            * 2
+            * s
+        ).sum()
     return total / radius**2
 
 
@@ -80,7 +97,11 @@ def test_disc(slide):
     """Cells cut by the rim, at their centroids: second order, with the centre of rotation in the disc and outside."""
     exact = disc_dissipation(slide, 1.0, 0.01)
     errors = [
-        pf.LimitSurfaceCells(pf.ContactPatch.disc(0.01, n)).dissipation((slide * 0.6, -slide * 0.8, 1.0)) / exact - 1.0
+        pf.LimitSurfaceCells(pf.ContactPatch.disc(0.01, n)).dissipation(
+            (slide * 0.6, -slide * 0.8, 1.0)
+        )
+        / exact
+        - 1.0
         for n in (10, 20, 40, 80)
     ]
     assert order(errors) > 1.7  # 2, and the scatter of where the kink lies in its cell
@@ -89,7 +110,10 @@ def test_disc(slide):
 
 def test_disc_radius():
     """A pure spin of a uniform disc: r = 2R/3."""
-    errors = [pf.ContactPatch.disc(0.01, n).contact_radius() / (0.02 / 3) - 1.0 for n in (11, 22, 44, 88)]
+    errors = [
+        pf.ContactPatch.disc(0.01, n).contact_radius() / (0.02 / 3) - 1.0
+        for n in (11, 22, 44, 88)
+    ]
     assert order(errors) > 1.7 and abs(errors[-1]) < 1e-4
 
 
@@ -99,16 +123,22 @@ def rod_dissipation(across, along, spin, half):
     def integral(u):
         return u * math.hypot(u, along) + along**2 * math.asinh(u / abs(along))
 
-    return (integral(across + spin * half) - integral(across - spin * half)) / (4.0 * half * spin)
+    return (integral(across + spin * half) - integral(across - spin * half)) / (
+        4.0 * half * spin
+    )
 
 
 @pytest.mark.parametrize("direction", ["x", "y"])
-@pytest.mark.parametrize(("across", "along"), [(0.004, 0.002), (0.03, -0.01), (0.0, 0.02)])
+@pytest.mark.parametrize(
+    ("across", "along"), [(0.004, 0.002), (0.03, -0.01), (0.0, 0.02)]
+)
 def test_rod(direction, across, along):
     # Counter-clockwise spin moves the +x end of a rod along x up; the +y end of one along y to the left.
     twist = (along, across, 1.0) if direction == "x" else (-across, along, 1.0)
     errors = [
-        pf.LimitSurfaceCells(pf.ContactPatch.line(0.02, n, direction=direction)).dissipation(twist)
+        pf.LimitSurfaceCells(
+            pf.ContactPatch.line(0.02, n, direction=direction)
+        ).dissipation(twist)
         / rod_dissipation(across, along, 1.0, 0.01)
         - 1.0
         for n in (40, 80, 160, 320)
@@ -121,22 +151,40 @@ def corner_integral(a, b):
     """Integral of the distance from a corner over a rectangle a x b; odd in both."""
     if a == 0.0 or b == 0.0:
         return 0.0
-    sign, a, b = math.copysign(1.0, a * b), abs(a), abs(b)
-    return sign * (2.0 * a * b * math.hypot(a, b) + a**3 * math.asinh(b / a) + b**3 * math.asinh(a / b)) / 6.0
+    sign = math.copysign(1.0, a * b)
+    a = abs(a)
+    b = abs(b)
+    return (
+        sign
+        * (
+            2.0 * a * b * math.hypot(a, b)
+            + a**3 * math.asinh(b / a)
+            + b**3 * math.asinh(a / b)
+        )
+        / 6.0
+    )
 
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (0.0031, -0.0017), (0.02, 0.004)])
 def test_rectangle_about_any_centre_of_rotation(centre):
     """A rectangle is a signed sum of four with the centre of rotation at their corner."""
-    width, height = 0.03, 0.012
-    (cx, cy), exact = centre, 0.0
+    width = 0.03
+    height = 0.012
+    (cx, cy) = centre
+    exact = 0.0
     for sx in (-1.0, 1.0):
         for sy in (-1.0, 1.0):
-            exact += sx * sy * corner_integral(sx * 0.5 * width - cx, sy * 0.5 * height - cy)
+            exact += (
+                sx * sy * corner_integral(sx * 0.5 * width - cx, sy * 0.5 * height - cy)
+            )
     exact /= width * height
     twist = (cy, -cx, 1.0)  # unit spin about the centre
     errors = [
-        pf.LimitSurfaceCells(pf.ContactPatch.rectangle(width, height, n)).dissipation(twist) / exact - 1.0
+        pf.LimitSurfaceCells(pf.ContactPatch.rectangle(width, height, n)).dissipation(
+            twist
+        )
+        / exact
+        - 1.0
         for n in (10, 20, 40, 80)
     ]
     assert order(errors) > 1.7  # 2, and the scatter of where the kink lies in its cell
@@ -144,18 +192,26 @@ def test_rectangle_about_any_centre_of_rotation(centre):
 
 
 @pytest.mark.parametrize(
-    ("k", "ratio"), [(1.0, 0.5), (2.0, 3.0 * math.pi / 16.0), (3.0, None), (math.inf, 2.0 / 3.0)], ids=str
+    ("k", "ratio"),
+    [(1.0, 0.5), (2.0, 3.0 * math.pi / 16.0), (3.0, None), (math.inf, 2.0 / 3.0)],
+    ids=str,
 )
 def test_soft_finger_radius(k, ratio):
     """`r/R = 2 (3/8) Gamma(3/k)^2/(Gamma(2/k) Gamma(4/k))`, of a pure spin."""
     exponent = min(k, 1e4)  # so flat that the rest is below the error of the cells
-    formula = 0.75 * math.gamma(3 / exponent) ** 2 / (math.gamma(2 / exponent) * math.gamma(4 / exponent))
+    formula = (
+        0.75
+        * math.gamma(3 / exponent) ** 2
+        / (math.gamma(2 / exponent) * math.gamma(4 / exponent))
+    )
     if ratio is not None:
         assert formula == pytest.approx(ratio, rel=1e-3 if k > 1e4 else 1e-12)
     patch = pf.ContactPatch.disc(0.01, 161, pressure=pf.SoftFinger(c=0.01, k=exponent))
     surface = pf.LimitSurfaceCells(patch)
     # Pressure at the cells' positions: 160 cells across, the rim's singularity costs most at k = 2 and above.
-    assert -surface.wrench((0.0, 0.0, 3.0))[2] == pytest.approx(0.01 * formula, rel=1e-3)
+    assert -surface.wrench((0.0, 0.0, 3.0))[2] == pytest.approx(
+        0.01 * formula, rel=1e-3
+    )
 
 
 # ---------------------------------------------------------------------- published numbers
@@ -175,17 +231,27 @@ def test_soft_finger_radius(k, ratio):
 )
 def test_contact_radius_as_published(name, radius):
     surface = pf.LimitSurfaceTablePublished(PUBLISHED_PATCHES[name]())
-    assert surface.contact_radius * 1e3 == pytest.approx(radius, abs=0.5e-8)  # half a unit of the last printed digit
+    assert surface.contact_radius * 1e3 == pytest.approx(
+        radius, abs=0.5e-8
+    )  # half a unit of the last printed digit
 
 
 @pytest.mark.parametrize(
-    ("surface", "plateau"), [(pf.LimitSurfaceCells, -4.988662e-3), (pf.LimitSurfaceTablePublished, -4.949980e-3)]
+    ("surface", "plateau"),
+    [
+        (pf.LimitSurfaceCells, -4.988662e-3),
+        (pf.LimitSurfaceTablePublished, -4.949980e-3),
+    ],
 )
 @pytest.mark.parametrize("spin", [1e-3, 1.0, 50.0])
 def test_torque_plateaus_of_the_published_line(surface, plateau, spin):
     wrench = surface(PUBLISHED_PATCHES["Line"]()).wrench((0.0, 0.0, spin))
-    assert wrench[2] == pytest.approx(plateau, abs=0.5e-9)  # half a unit of the last printed digit
-    assert wrench[:2] == pytest.approx([0.0, 0.0], abs=1e-15)  # sums of 21 terms that cancel
+    assert wrench[2] == pytest.approx(
+        plateau, abs=0.5e-9
+    )  # half a unit of the last printed digit
+    assert wrench[:2] == pytest.approx(
+        [0.0, 0.0], abs=1e-15
+    )  # sums of 21 terms that cancel
 
 
 # ---------------------------------------------------------------------- signs
@@ -198,25 +264,36 @@ def test_pure_sliding(kind):
         patch = PUBLISHED_PATCHES[name]()
         x, y = patch.centre_of_pressure()
         for angle in np.linspace(0.0, 2 * math.pi, 8, endpoint=False) + 0.2:
-            c, s = math.cos(angle), math.sin(angle)
+            c = math.cos(angle)
+            s = math.sin(angle)
             # Tables have 80 segments around: cos misses by (2 pi/80)^2/8 = 8e-4 linearly, 1e-6 cubically.
             allowed = 8e-4 if kind is pf.LimitSurfaceTablePublished else 2e-6
-            assert kind(patch).wrench((c, s, 0.0)) == pytest.approx([-c, -s, -(x * s - y * c)], abs=allowed)
+            assert kind(patch).wrench((c, s, 0.0)) == pytest.approx(
+                [-c, -s, -(x * s - y * c)], abs=allowed
+            )
 
 
 @pytest.mark.parametrize("kind", SURFACES)
 def test_a_gradient_pulls_to_its_heavy_side(kind):
     """Row 0 is the top: LineGrad is heavy at +y, LineGradX at -x; the wrench is about the origin, not about the CoP."""
-    top, left = kind(PUBLISHED_PATCHES["LineGrad"]()), kind(PUBLISHED_PATCHES["LineGradX"]())
+    top = kind(PUBLISHED_PATCHES["LineGrad"]())
+    left = kind(PUBLISHED_PATCHES["LineGradX"]())
     assert top.centre_of_pressure == pytest.approx([0.0, 10 / 3 * 0.02 / 21], abs=1e-17)
-    assert left.centre_of_pressure == pytest.approx([-10 / 3 * 0.02 / 21, 0.0], abs=1e-17)
+    assert left.centre_of_pressure == pytest.approx(
+        [-10 / 3 * 0.02 / 21, 0.0], abs=1e-17
+    )
     # Sliding to the right, friction pulls the heavy top to the left: counter-clockwise.
-    assert top.wrench((1.0, 0.0, 0.0)) == pytest.approx([-1.0, 0.0, 3.174603e-3], abs=1e-9)
+    assert top.wrench((1.0, 0.0, 0.0)) == pytest.approx(
+        [-1.0, 0.0, 3.174603e-3], abs=1e-9
+    )
     # Sliding up, friction pulls the heavy left end down: counter-clockwise.
-    assert left.wrench((0.0, 1.0, 0.0)) == pytest.approx([0.0, -1.0, 3.174603e-3], abs=1e-9)
+    assert left.wrench((0.0, 1.0, 0.0)) == pytest.approx(
+        [0.0, -1.0, 3.174603e-3], abs=1e-9
+    )
     # Spinning counter-clockwise about the origin, the top moves left and is pulled right, the left end moves down and
     # is pulled up; the torque opposes the spin.
-    force_top, force_left = top.wrench((0.0, 0.0, 1.0)), left.wrench((0.0, 0.0, 1.0))
+    force_top = top.wrench((0.0, 0.0, 1.0))
+    force_left = left.wrench((0.0, 0.0, 1.0))
     assert force_top[0] > 0.3 and abs(force_top[1]) < 1e-9 and force_top[2] < 0.0
     assert force_left[1] > 0.3 and abs(force_left[0]) < 1e-9 and force_left[2] < 0.0
 
@@ -227,7 +304,11 @@ def test_a_gradient_pulls_to_its_heavy_side(kind):
 def smooth_disc(cells: int = 101) -> pf.ContactPatch:
     """Disc whose pressure and its first derivatives vanish at the rim: its dissipation is smooth."""
     return pf.ContactPatch.disc_published(
-        0.01, cells, pressure=lambda x, y: max(0.0, 1.0 - (x * x + y * y) / 0.01**2) ** 3 * (1.0 + 60.0 * x)
+        0.01,
+        cells,
+        pressure=lambda x, y: (
+            max(0.0, 1.0 - (x * x + y * y) / 0.01**2) ** 3 * (1.0 + 60.0 * x)
+        ),
     )
 
 
@@ -238,17 +319,30 @@ def some_twists(count: int = 300) -> np.ndarray:
 
 
 def test_tables_converge():
-    patch, twist = smooth_disc(), some_twists()
-    surface, cells = pf.LimitSurfaceExact(patch), pf.LimitSurfaceCells(smooth_disc(201))
-    exact_phi, exact = surface.dissipation(twist), surface.wrench(twist) / (1.0, 1.0, surface.contact_radius)
+    patch = smooth_disc()
+    twist = some_twists()
+    surface = pf.LimitSurfaceExact(patch)
+    cells = pf.LimitSurfaceCells(smooth_disc(201))
+    exact_phi = surface.dissipation(twist)
+    exact = surface.wrench(twist) / (1.0, 1.0, surface.contact_radius)
     summed = cells.wrench(twist) / (1.0, 1.0, cells.contact_radius)
-    phi_errors, smooth, published = [], [], []
+    phi_errors = []
+    smooth = []
+    published = []
     for segments in (8, 16, 32):
         table = pf.LimitSurfaceTable(patch, segments)
         phi_errors.append(np.abs(table.dissipation(twist) / exact_phi - 1.0).mean())
-        smooth.append(np.abs(table.wrench(twist) / (1.0, 1.0, table.contact_radius) - exact).mean())
+        smooth.append(
+            np.abs(
+                table.wrench(twist) / (1.0, 1.0, table.contact_radius) - exact
+            ).mean()
+        )
         table = pf.LimitSurfaceTablePublished(smooth_disc(201), segments)
-        published.append(np.abs(table.wrench(twist) / (1.0, 1.0, table.contact_radius) - summed).mean())
+        published.append(
+            np.abs(
+                table.wrench(twist) / (1.0, 1.0, table.contact_radius) - summed
+            ).mean()
+        )
     # Bicubic potential: fourth order, its gradient third; bilinear: second order.
     assert order(phi_errors) > 3.7
     assert order(smooth) > 2.8
@@ -257,7 +351,11 @@ def test_tables_converge():
     assert smooth_table_is_convex(patch)
     # Beside the equator (almost pure sliding), where both halves meet, it is as good as elsewhere.
     twist[:, 2] *= 0.05
-    miss = (pf.LimitSurfaceTable(patch).wrench(twist) - surface.wrench(twist)) / (1.0, 1.0, surface.contact_radius)
+    miss = (pf.LimitSurfaceTable(patch).wrench(twist) - surface.wrench(twist)) / (
+        1.0,
+        1.0,
+        surface.contact_radius,
+    )
     assert np.abs(miss).mean() < 4e-6
 
 
@@ -270,12 +368,18 @@ def smooth_table_is_convex(patch) -> bool:
 
 
 @pytest.mark.parametrize("name", PUBLISHED_PATCHES)
-@pytest.mark.parametrize(("kind", "allowed"), [(pf.LimitSurfaceTable, 0.02), (pf.LimitSurfaceTablePublished, 0.02)])
+@pytest.mark.parametrize(
+    ("kind", "allowed"),
+    [(pf.LimitSurfaceTable, 0.02), (pf.LimitSurfaceTablePublished, 0.02)],
+)
 def test_tables_follow_the_cells_of_published_patches(name, kind, allowed):
     patch = PUBLISHED_PATCHES[name]()
-    cells, table = pf.LimitSurfaceCells(patch), kind(patch)
+    cells = pf.LimitSurfaceCells(patch)
+    table = kind(patch)
     scale = (1.0, 1.0, cells.contact_radius)
-    miss = np.linalg.norm((table.wrench(some_twists()) - cells.wrench(some_twists())) / scale, axis=-1)
+    miss = np.linalg.norm(
+        (table.wrench(some_twists()) - cells.wrench(some_twists())) / scale, axis=-1
+    )
     # Cells jump by up to 2 w as the centre of rotation crosses one (w = 1/21 on lines); tables do not. On average:
     assert miss.mean() < allowed
 
@@ -283,14 +387,21 @@ def test_tables_follow_the_cells_of_published_patches(name, kind, allowed):
 @pytest.mark.parametrize("name", PUBLISHED_PATCHES)
 def test_smooth_table_at_the_spin_axis(name):
     """A patch without symmetry has a force in a pure spin; polar coordinates must neither lose it nor blow up there."""
-    surface, exact = (kind(PUBLISHED_PATCHES[name]()) for kind in (pf.LimitSurfaceTable, pf.LimitSurfaceExact))
+    surface, exact = (
+        kind(PUBLISHED_PATCHES[name]())
+        for kind in (pf.LimitSurfaceTable, pf.LimitSurfaceExact)
+    )
     r = surface.contact_radius
     x, y = surface.centre_of_pressure
     spin = np.array([y, -x, 1.0])
-    assert surface.wrench(spin) / (1.0, 1.0, r) == pytest.approx(exact.wrench(spin) / (1.0, 1.0, r), abs=1e-7)  # a node
+    assert surface.wrench(spin) / (1.0, 1.0, r) == pytest.approx(
+        exact.wrench(spin) / (1.0, 1.0, r), abs=1e-7
+    )  # a node
     for distance in (1e-3, 1e-5, 1e-7, 1e-9, 0.0):
         for angle in (0.3, 2.0, 4.0):
-            nearby = spin + distance * r * np.array([math.cos(angle), math.sin(angle), 0.0])
+            nearby = spin + distance * r * np.array(
+                [math.cos(angle), math.sin(angle), 0.0]
+            )
             jump = surface.wrench(nearby) - surface.wrench(spin)
             # Slopes of the scaled map are below 40 even where the table meets single cells (lines).
             assert np.abs(jump / (1.0, 1.0, r)).max() <= 40.0 * distance + 1e-15
@@ -303,12 +414,19 @@ def test_smooth_table_at_the_spin_axis(name):
 
 
 def test_the_load_fixes_the_shape():
-    patch = pf.ContactPatch.disc(0.01, 41, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01))
+    patch = pf.ContactPatch.disc(
+        0.01, 41, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01)
+    )
     for kind in SURFACES:
-        small, large = kind(patch, normal_force=0.5), kind(patch, normal_force=2.0)
+        small = kind(patch, normal_force=0.5)
+        large = kind(patch, normal_force=2.0)
         # r = 3 pi/16 R on cells of 0.5 mm in a radius of 5 mm: a percent.
-        assert small.contact_radius == pytest.approx(3 * math.pi / 16 * 0.006 * 0.5 ** (1 / 3), rel=0.02)
-        assert large.contact_radius == pytest.approx(3 * math.pi / 16 * 0.006 * 2.0 ** (1 / 3), rel=0.02)
+        assert small.contact_radius == pytest.approx(
+            3 * math.pi / 16 * 0.006 * 0.5 ** (1 / 3), rel=0.02
+        )
+        assert large.contact_radius == pytest.approx(
+            3 * math.pi / 16 * 0.006 * 2.0 ** (1 / 3), rel=0.02
+        )
         twist = (0.003, 0.0, 1.0)
         again = small.at(2.0)
         assert type(again) is kind
@@ -328,12 +446,20 @@ def test_a_fixed_shape_ignores_the_load():
 @pytest.mark.parametrize("kind", SURFACES)
 def test_a_single_point_has_no_limit_surface(kind):
     with pytest.raises(
-        InvalidValueError, match=r"patch must have a contact radius > 0 \(more than one point\), got r=0"
+        InvalidValueError,
+        match=r"patch must have a contact radius > 0 \(more than one point\), got r=0",
     ):
         kind(POINT)
-    shrunk = pf.ContactPatch.rectangle(0.02, cells=21, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
-    if kind in (pf.LimitSurfaceExact, pf.LimitSurfaceTable):  # only the middle cell is left, and it has a size
-        assert kind(shrunk, normal_force=1e-9).contact_radius == pytest.approx(0.3826 * 0.02 / 21, rel=1e-4)
+    shrunk = pf.ContactPatch.rectangle(
+        0.02, cells=21, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
+    )
+    if kind in (
+        pf.LimitSurfaceExact,
+        pf.LimitSurfaceTable,
+    ):  # only the middle cell is left, and it has a size
+        assert kind(shrunk, normal_force=1e-9).contact_radius == pytest.approx(
+            0.3826 * 0.02 / 21, rel=1e-4
+        )
         return
     with pytest.raises(InvalidValueError, match="contact radius > 0"):
         kind(shrunk, normal_force=1e-9)
@@ -345,18 +471,30 @@ SQUARE = PUBLISHED_PATCHES["Square"]()
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda s: s.wrench((1.0, 0.0)), r"twist must have shape \[..., 3\], got shape \[2\]"),
+        (
+            lambda s: s.wrench((1.0, 0.0)),
+            r"twist must have shape \[..., 3\], got shape \[2\]",
+        ),
         (lambda s: s.wrench(1.0), r"twist must have shape \[..., 3\], got shape \[\]"),
         (lambda s: s.dissipation((1.0, math.nan, 0.0)), "twist must be finite"),
         (lambda s: s.jacobian((1.0, math.inf, 0.0)), "twist must be finite"),
         (lambda s: s.wrench("fast"), "twist must be an array of numbers, got 'fast'"),
         (lambda s: s.twist((0.0, 0.0, 0.0)), "wrench must not be zero"),
-        (lambda s: s.twist([(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)]), "wrench must not be zero"),
+        (
+            lambda s: s.twist([(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)]),
+            "wrench must not be zero",
+        ),
         (lambda s: s.twist((1.0, 0.0)), r"wrench must have shape \[..., 3\]"),
         (lambda s: s.twist((1.0, 0.0, math.nan)), "wrench must be finite"),
         (lambda s: type(s)("square"), "patch must be a ContactPatch, got 'square'"),
-        (lambda s: type(s)(SQUARE, normal_force=0.0), "normal_force must be > 0, got 0.0"),
-        (lambda s: type(s)(SQUARE, normal_force=-1.0), "normal_force must be > 0, got -1.0"),
+        (
+            lambda s: type(s)(SQUARE, normal_force=0.0),
+            "normal_force must be > 0, got 0.0",
+        ),
+        (
+            lambda s: type(s)(SQUARE, normal_force=-1.0),
+            "normal_force must be > 0, got -1.0",
+        ),
     ],
 )
 @pytest.mark.parametrize("kind", SURFACES)

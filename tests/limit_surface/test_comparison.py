@@ -9,7 +9,9 @@ import planarfriction as pf
 from planarfriction.limit_surface.comparison import directions
 
 PATCH = pf.ContactPatch.rectangle(0.1, cells=9)
-FEET = pf.ContactPatch.points([(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0])
+FEET = pf.ContactPatch.points(
+    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
+)
 
 
 def test_two_spheres_of_different_radius():
@@ -19,7 +21,13 @@ def test_two_spheres_of_different_radius():
     surface = pf.LimitSurfaceEllipsoid(pf.ContactPatch.rectangle(0.1 * ratio, cells=9))
     found = surface.compare(reference, samples=4000)
     u = directions(4000)
-    h = u * [1.0, 1.0, ratio] / np.linalg.norm(u * [1.0, 1.0, ratio], axis=1)[:, None] * [1.0, 1.0, ratio] - u
+    h = (
+        u
+        * [1.0, 1.0, ratio]
+        / np.linalg.norm(u * [1.0, 1.0, ratio], axis=1)[:, None]
+        * [1.0, 1.0, ratio]
+        - u
+    )
     normal = u / [1.0, 1.0, ratio**2]  # of fx^2 + fy^2 + (tau/(c r))^2
     cosine = np.einsum("mi,mi->m", normal, u) / np.linalg.norm(normal, axis=1)
     further = 1.0 / np.linalg.norm(u / [1.0, 1.0, ratio], axis=1) - 1.0
@@ -34,25 +42,40 @@ def test_two_spheres_of_different_radius():
         assert spread.largest == pytest.approx(values.max(), rel=1e-9), name
         assert spread.mean == pytest.approx(values.mean(), rel=1e-9), name
         assert spread.rms == pytest.approx(np.sqrt(np.mean(values**2)), rel=1e-9), name
-    assert found.angle.largest == pytest.approx(np.degrees(np.arctan2(ratio - 1 / ratio, 2.0)), abs=0.01)  # at tan = c
+    assert found.angle.largest == pytest.approx(
+        np.degrees(np.arctan2(ratio - 1 / ratio, 2.0)), abs=0.01
+    )  # at tan = c
 
 
 @pytest.mark.parametrize("patch", [PATCH, FEET], ids=["square", "feet"])
 def test_a_surface_is_itself(patch):
     surface = pf.LimitSurfaceCells(patch)
     found = surface.compare(surface)
-    assert found.force.largest == found.torque.largest == found.radius.largest == found.angle.largest == 0.0
+    assert (
+        found.force.largest
+        == found.torque.largest
+        == found.radius.largest
+        == found.angle.largest
+        == 0.0
+    )
     table = pf.LimitSurfaceTable(patch).compare(surface)
     assert 0.0 < table.force.rms < 0.1 and 0.0 < table.angle.rms < 10.0
 
 
 def test_does_not_depend_on_the_origin():
     """The same two surfaces, both moved by the same way."""
-    moved = pf.ContactPatch.points(FEET.positions + np.array([0.3, -0.2]), FEET.weights())
-    here, there = (pf.LimitSurfaceEllipsoid(p).compare(pf.LimitSurfaceCells(p)) for p in (FEET, moved))
+    moved = pf.ContactPatch.points(
+        FEET.positions + np.array([0.3, -0.2]), FEET.weights()
+    )
+    here, there = (
+        pf.LimitSurfaceEllipsoid(p).compare(pf.LimitSurfaceCells(p))
+        for p in (FEET, moved)
+    )
     assert there.force.rms == pytest.approx(here.force.rms, rel=1e-9)
     assert there.radius.largest == pytest.approx(here.radius.largest, rel=1e-9)
-    assert there.angle.mean == pytest.approx(here.angle.mean, rel=1e-6)  # kinks are rounded off by 1e-10
+    assert there.angle.mean == pytest.approx(
+        here.angle.mean, rel=1e-6
+    )  # kinks are rounded off by 1e-10
 
 
 def test_directions_are_even():
@@ -69,4 +92,10 @@ def test_prints_a_table():
     text = str(pf.LimitSurfaceEllipsoid(PATCH).compare(pf.LimitSurfaceCells(PATCH)))
     lines = text.splitlines()
     assert len(lines) == 5
-    assert [line.split()[0] for line in lines] == ["difference", "force", "torque", "radius", "angle"]
+    assert [line.split()[0] for line in lines] == [
+        "difference",
+        "force",
+        "torque",
+        "radius",
+        "angle",
+    ]

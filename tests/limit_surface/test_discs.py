@@ -14,9 +14,13 @@ ONE = pf.ContactPatch([[0.3, -0.2]], [1e-4], radii=[R])
 FEW = pf.ContactPatch.disc(R).discs(23)
 GRAIN = FEW.with_friction_metric(pf.friction_metric(0.3, 1.5, 0.7), (0.1, -0.2))
 GRAINS = FEW.with_friction_metric(
-    np.array([pf.friction_metric(0.3 * k, 1.0 + 0.02 * k, 0.8) for k in range(FEW.cells)])
+    np.array(
+        [pf.friction_metric(0.3 * k, 1.0 + 0.02 * k, 0.8) for k in range(FEW.cells)]
+    )
 )
-MIXED = dataclasses.replace(FEW, radii=np.where(np.arange(FEW.cells) % 2, FEW.radii, 0.0))
+MIXED = dataclasses.replace(
+    FEW, radii=np.where(np.arange(FEW.cells) % 2, FEW.radii, 0.0)
+)
 PATCHES = {"one": ONE, "few": FEW, "grain": GRAIN, "grains": GRAINS, "mixed": MIXED}
 SCALE = np.array([1.0, 1.0, 1.0 / R])
 """Scales of twists; wrenches over it are of the order of 1."""
@@ -31,7 +35,11 @@ def some_twists(patch: pf.ContactPatch, count: int = 100) -> np.ndarray:
 
 
 def surfaces(patch: pf.ContactPatch) -> list[pf.LimitSurface]:
-    kinds = [pf.LimitSurfaceCells] if patch.root is not None and patch.root.ndim == 3 else SUMS
+    kinds = (
+        [pf.LimitSurfaceCells]
+        if patch.root is not None and patch.root.ndim == 3
+        else SUMS
+    )
     return [kind(patch) for kind in kinds]
 
 
@@ -43,10 +51,18 @@ SUMS = [pf.LimitSurfaceCells, pf.LimitSurfaceExact]
 
 def test_friction_of_one_disc_is_within_a_hundredth_of_the_closed_form():
     q = np.concatenate([[0.0], np.geomspace(1e-4, 1e4, 4001)])
-    about = np.stack([q * R + ONE.positions[0, 1], -ONE.positions[0, 0] + 0.0 * q, np.ones_like(q)], -1)
+    about = np.stack(
+        [q * R + ONE.positions[0, 1], -ONE.positions[0, 0] + 0.0 * q, np.ones_like(q)],
+        -1,
+    )
     one, exact = (kind(ONE).wrench(about) for kind in SUMS)
-    torque, other = (each @ np.array([ONE.positions[0, 1], -ONE.positions[0, 0], 1.0]) for each in (one, exact))
-    assert np.abs((one - exact)[:, :2]).max() < 0.0085  # as published for the fit of the mean speed
+    torque, other = (
+        each @ np.array([ONE.positions[0, 1], -ONE.positions[0, 0], 1.0])
+        for each in (one, exact)
+    )
+    assert (
+        np.abs((one - exact)[:, :2]).max() < 0.0085
+    )  # as published for the fit of the mean speed
     assert np.abs(torque - other).max() < 0.0085 * R
     assert exact[0] @ [0.0, 0.0, 1.0] == pytest.approx(-2.0 / 3.0 * R, rel=1e-12)
 
@@ -60,8 +76,11 @@ def test_one_disc_has_a_surface_with_two_thirds_of_its_radius():
 
 def test_closed_forms_of_discs_add_up():
     """Two discs far apart, turned about the middle of one: its friction there, and that of a slide at the other."""
-    d, a = 0.5, 0.01
-    pair = pf.LimitSurfaceExact(pf.ContactPatch([[0.0, 0.0], [d, 0.0]], [1e-4, 1e-4], radii=[a, a]))
+    d = 0.5
+    a = 0.01
+    pair = pf.LimitSurfaceExact(
+        pf.ContactPatch([[0.0, 0.0], [d, 0.0]], [1e-4, 1e-4], radii=[a, a])
+    )
     far = pf.LimitSurfaceExact(pf.ContactPatch([[d, 0.0]], [1e-4], radii=[a]))
     wrench = pair.wrench((0.0, 0.0, 1.0))
     wanted = 0.5 * far.wrench((0.0, 0.0, 1.0)) - [0.0, 0.0, 0.5 * 2 / 3 * a]
@@ -70,10 +89,13 @@ def test_closed_forms_of_discs_add_up():
 
 def test_the_disc_of_an_outline_is_one_disc():
     by_outline, by_cell = (
-        pf.LimitSurfaceExact(each) for each in (pf.ContactPatch.disc(R), pf.ContactPatch([[0, 0]], [1], radii=[R]))
+        pf.LimitSurfaceExact(each)
+        for each in (pf.ContactPatch.disc(R), pf.ContactPatch([[0, 0]], [1], radii=[R]))
     )
     twists = some_twists(pf.ContactPatch.disc(R))
-    assert by_cell.wrench(twists) * SCALE == pytest.approx(by_outline.wrench(twists) * SCALE, abs=1e-13)
+    assert by_cell.wrench(twists) * SCALE == pytest.approx(
+        by_outline.wrench(twists) * SCALE, abs=1e-13
+    )
 
 
 # ---------------------------------------------------------------------- gradients
@@ -84,8 +106,13 @@ def test_wrench_is_the_gradient_of_the_dissipation(name):
     for surface in surfaces(PATCHES[name]):
         for twist in some_twists(PATCHES[name], 20):
             steps = 1e-6 * np.diag(SCALE)
-            slopes = [surface.dissipation(twist + step) - surface.dissipation(twist - step) for step in steps]
-            assert -surface.wrench(twist) * SCALE == pytest.approx(np.array(slopes) / 2e-6, rel=1e-8, abs=1e-8)
+            slopes = [
+                surface.dissipation(twist + step) - surface.dissipation(twist - step)
+                for step in steps
+            ]
+            assert -surface.wrench(twist) * SCALE == pytest.approx(
+                np.array(slopes) / 2e-6, rel=1e-8, abs=1e-8
+            )
 
 
 @pytest.mark.parametrize("name", PATCHES)
@@ -94,10 +121,22 @@ def test_jacobian_is_symmetric_and_the_slope_of_the_wrench(name):
         twists = some_twists(PATCHES[name], 20)
         jacobian = surface.jacobian(twists) * SCALE[:, None] * SCALE
         assert jacobian == pytest.approx(np.swapaxes(jacobian, 1, 2), abs=1e-12)
-        ends = [surface.wrench(twists + sign * 1e-6 * step) * SCALE for step in np.diag(SCALE) for sign in (1, -1)]
-        slope = np.stack([(one - other) / 2e-6 for one, other in zip(ends[::2], ends[1::2], strict=True)], -1)
+        ends = [
+            surface.wrench(twists + sign * 1e-6 * step) * SCALE
+            for step in np.diag(SCALE)
+            for sign in (1, -1)
+        ]
+        slope = np.stack(
+            [
+                (one - other) / 2e-6
+                for one, other in zip(ends[::2], ends[1::2], strict=True)
+            ],
+            -1,
+        )
         assert jacobian == pytest.approx(slope, abs=2e-8 * np.abs(slope).max())
-        assert np.einsum("mij,mj->mi", surface.jacobian(twists), twists) == pytest.approx(0.0, abs=1e-12)
+        assert np.einsum(
+            "mij,mj->mi", surface.jacobian(twists), twists
+        ) == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", PATCHES)
@@ -113,29 +152,41 @@ def test_twist_of_a_wrench(name):
             pulls = surface.wrench(twists)
             about = pulls * SCALE, wrenches * SCALE
             lengths = [np.linalg.norm(each, axis=1)[:, None] for each in about]
-            assert about[0] / lengths[0] == pytest.approx(about[1] / lengths[1], abs=1e-9)
+            assert about[0] / lengths[0] == pytest.approx(
+                about[1] / lengths[1], abs=1e-9
+            )
 
 
 def test_radii_of_zero_are_the_sum_over_points():
     points = dataclasses.replace(FEW, radii=None)
-    almost = pf.LimitSurfaceCells(dataclasses.replace(FEW, radii=np.full(FEW.cells, 1e-12)))
+    almost = pf.LimitSurfaceCells(
+        dataclasses.replace(FEW, radii=np.full(FEW.cells, 1e-12))
+    )
     twists = some_twists(FEW)
-    assert almost.wrench(twists) * SCALE == pytest.approx(pf.LimitSurfaceCells(points).wrench(twists) * SCALE, abs=1e-9)
+    assert almost.wrench(twists) * SCALE == pytest.approx(
+        pf.LimitSurfaceCells(points).wrench(twists) * SCALE, abs=1e-9
+    )
 
 
 def test_dissipation_is_convex():
     for name, patch in PATCHES.items():
         for surface in surfaces(patch):
             jacobian = surface.jacobian(some_twists(patch)) * SCALE[:, None] * SCALE
-            assert (np.linalg.eigvalsh(-jacobian) > -1e-3).all(), name  # the fit of a disc leaves -1e-4
+            assert (np.linalg.eigvalsh(-jacobian) > -1e-3).all(), (
+                name
+            )  # the fit of a disc leaves -1e-4
 
 
 # ---------------------------------------------------------------------- what discs stand for
 
 
 def test_cells_as_discs_are_closer_to_the_outline_than_points():
-    exact, points = pf.LimitSurfaceExact(pf.ContactPatch.disc(R)), pf.ContactPatch.disc(R)
-    off = [pf.LimitSurfaceCells(each).compare(exact).force.largest for each in (FEW, points, points.discs())]
+    exact = pf.LimitSurfaceExact(pf.ContactPatch.disc(R))
+    points = pf.ContactPatch.disc(R)
+    off = [
+        pf.LimitSurfaceCells(each).compare(exact).force.largest
+        for each in (FEW, points, points.discs())
+    ]
     assert off[0] < 0.005 and off[2] < 0.5 * off[1]
 
 
@@ -144,28 +195,41 @@ def test_one_metric_is_a_change_of_coordinates():
     metric = pf.friction_metric(0.7, 1.6, 0.9)
     turned = FEW.with_friction_metric(metric)
     x, y = turned.lever_coordinates(*FEW.positions.T)
-    plain = pf.ContactPatch(np.stack([x, y], -1), FEW.areas, FEW.weights() / FEW.areas, radii=turned.lever_radii)
+    plain = pf.ContactPatch(
+        np.stack([x, y], -1),
+        FEW.areas,
+        FEW.weights() / FEW.areas,
+        radii=turned.lever_radii,
+    )
     twists = some_twists(FEW)
     seen = np.concatenate([twists[:, :2] @ turned.root.T, twists[:, 2:]], axis=1)
     for kind in SUMS:
-        assert kind(turned).dissipation(twists) == pytest.approx(kind(plain).dissipation(seen), rel=1e-12)
+        assert kind(turned).dissipation(twists) == pytest.approx(
+            kind(plain).dissipation(seen), rel=1e-12
+        )
 
 
 def test_the_published_table_and_model_take_discs():
     for patch in (ONE, FEW):
-        table, cells = pf.LimitSurfaceTablePublished(patch), pf.LimitSurfaceCells(patch)
+        table = pf.LimitSurfaceTablePublished(patch)
+        cells = pf.LimitSurfaceCells(patch)
         assert table.contact_radius == cells.contact_radius
         assert table.compare(cells).force.largest < 0.01  # bilinear in 4.5 degrees
-        model = pf.ReducedModelPublished(patch, pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_2=0.0))
+        model = pf.ReducedModelPublished(
+            patch, pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_2=0.0)
+        )
         x, y = cells.centre_of_pressure
         spin = np.array([y, -x, 1.0])
         wrench = model.step(model.rest(), 3.0 * spin, 2.0, 10.0)[1]
-        assert spin @ wrench == pytest.approx(-0.5 * 2.0 * cells.contact_radius, rel=1e-6)
+        assert spin @ wrench == pytest.approx(
+            -0.5 * 2.0 * cells.contact_radius, rel=1e-6
+        )
 
 
 def test_tables_and_models_take_surfaces_of_discs():
     law = pf.LuGre()
-    cells, table = pf.LimitSurfaceCells(FEW), pf.LimitSurfaceTable(FEW)
+    cells = pf.LimitSurfaceCells(FEW)
+    table = pf.LimitSurfaceTable(FEW)
     assert table.compare(cells).force.largest < 1e-3
     model = pf.ReducedModelPublished(FEW, law, surface=cells)
     twist = np.array([0.01, 0.0, 1.0])

@@ -29,10 +29,17 @@ def random_map(seed: int) -> pf.ContactPatch:
     return pf.ContactPatch.from_pressure(pressure, (0.002, 0.0015))
 
 
-FEET = pf.ContactPatch.points([(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0])
-PATCHES = {name: PUBLISHED_PATCHES[name]() for name in ("Square", "Circle", "LineGrad", "NonConvex2")}
+FEET = pf.ContactPatch.points(
+    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
+)
+PATCHES = {
+    name: PUBLISHED_PATCHES[name]()
+    for name in ("Square", "Circle", "LineGrad", "NonConvex2")
+}
 PATCHES |= {"map": random_map(1), "feet": FEET}
-BUILT = {(kind, name): kind(patch) for kind in SURFACES for name, patch in PATCHES.items()}
+BUILT = {
+    (kind, name): kind(patch) for kind in SURFACES for name, patch in PATCHES.items()
+}
 del BUILT[EXACT, "feet"]  # points are integrated as they are summed
 
 checked = settings(deadline=None, max_examples=25)
@@ -46,10 +53,18 @@ def scales(surface) -> np.ndarray:
     return np.array([1.0, 1.0, surface.contact_radius])
 
 
-def twist_towards(surface, polar: float, azimuth: float, speed: float = 1.0) -> np.ndarray:
+def twist_towards(
+    surface, polar: float, azimuth: float, speed: float = 1.0
+) -> np.ndarray:
     """Twist about the origin with that direction in scaled coordinates at the centre of pressure."""
-    scaled = [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)]
-    return speed * geometry.twist_at(np.array(scaled) / scales(surface), -surface.centre_of_pressure)
+    scaled = [
+        math.sin(polar) * math.cos(azimuth),
+        math.sin(polar) * math.sin(azimuth),
+        math.cos(polar),
+    ]
+    return speed * geometry.twist_at(
+        np.array(scaled) / scales(surface), -surface.centre_of_pressure
+    )
 
 
 def lowest_speed(surface, twist) -> float:
@@ -61,7 +76,9 @@ def lowest_speed(surface, twist) -> float:
 
 
 surfaces = pytest.mark.parametrize(("kind", "name"), BUILT)
-potentials = pytest.mark.parametrize(("kind", "name"), [key for key in BUILT if key[0] in POTENTIALS])
+potentials = pytest.mark.parametrize(
+    ("kind", "name"), [key for key in BUILT if key[0] in POTENTIALS]
+)
 
 
 # ---------------------------------------------------------------------- every surface
@@ -74,15 +91,24 @@ def test_power_sign_and_scale(kind, name):
     @given(polars, angles, st.floats(1e-6, 1e3))
     @checked
     def check(polar, azimuth, speed):
-        unit, twist = (twist_towards(surface, polar, azimuth, size) for size in (1.0, speed))
-        wrench, phi = surface.wrench(twist), surface.dissipation(twist)
+        unit, twist = (
+            twist_towards(surface, polar, azimuth, size) for size in (1.0, speed)
+        )
+        wrench = surface.wrench(twist)
+        phi = surface.dissipation(twist)
         # Rounding: the frame's offset (0.1 m against r of 4 cm) costs a few digits of 1e-16.
         assert -wrench @ twist == pytest.approx(phi, rel=1e-12)
-        assert phi > 0.1 * speed  # far from zero in every direction: w of the cells that move
-        assert surface.wrench(-twist) / scales(surface) == pytest.approx(-wrench / scales(surface), abs=1e-11)
+        assert (
+            phi > 0.1 * speed
+        )  # far from zero in every direction: w of the cells that move
+        assert surface.wrench(-twist) / scales(surface) == pytest.approx(
+            -wrench / scales(surface), abs=1e-11
+        )
         assert surface.dissipation(-twist) == pytest.approx(phi, rel=1e-12)
         assert phi == pytest.approx(speed * surface.dissipation(unit), rel=1e-12)
-        assert wrench / scales(surface) == pytest.approx(surface.wrench(unit) / scales(surface), abs=1e-10)
+        assert wrench / scales(surface) == pytest.approx(
+            surface.wrench(unit) / scales(surface), abs=1e-10
+        )
 
     check()
 
@@ -96,12 +122,19 @@ def test_rest_batches_and_shapes(kind, name):
     assert surface.dissipation(twist).shape == (2, 3)
     assert surface.jacobian(twist).shape == (2, 3, 3, 3)
     assert surface.twist(surface.wrench(twist[0])).shape == (3, 3)
-    assert not surface.wrench(twist)[1, 1].any() and not surface.jacobian(twist)[1, 1].any()
+    assert (
+        not surface.wrench(twist)[1, 1].any()
+        and not surface.jacobian(twist)[1, 1].any()
+    )
     assert surface.dissipation(twist)[1, 1] == 0.0
     assert np.isfinite(surface.jacobian(twist)).all()
     for index in np.ndindex(2, 3):
-        assert np.array_equal(surface.wrench(twist)[index], surface.wrench(twist[index]))
-        assert np.array_equal(surface.jacobian(twist)[index], surface.jacobian(twist[index]))
+        assert np.array_equal(
+            surface.wrench(twist)[index], surface.wrench(twist[index])
+        )
+        assert np.array_equal(
+            surface.jacobian(twist)[index], surface.jacobian(twist[index])
+        )
 
 
 @surfaces
@@ -111,7 +144,12 @@ def test_jacobian_is_the_slope(kind, name):
     scale = scales(surface)
 
     # Inside the cells of a table; the kinks are on their borders.
-    @given(st.integers(0, 39), st.integers(0, 79), st.floats(0.02, 0.98), st.floats(0.02, 0.98))
+    @given(
+        st.integers(0, 39),
+        st.integers(0, 79),
+        st.floats(0.02, 0.98),
+        st.floats(0.02, 0.98),
+    )
     @checked
     def check(i, j, a, b):
         twist = twist_towards(surface, (i + a) * segment, (j + b) * segment)
@@ -121,10 +159,14 @@ def test_jacobian_is_the_slope(kind, name):
         for column, scaled in enumerate(np.diag(step / scale)):
             # steps in scaled coordinates, so that none of them leaves the cell of the table
             change = geometry.twist_at(scaled, -surface.centre_of_pressure)
-            expected = (surface.wrench(twist + change) - surface.wrench(twist - change)) / (2.0 * step)
+            expected = (
+                surface.wrench(twist + change) - surface.wrench(twist - change)
+            ) / (2.0 * step)
             # Truncation: step^2 of the third derivative, up to 1/(lowest speed)^3 of one cell; rounding 1e-15/step.
             got = jacobian @ change / step
-            assert got / scale == pytest.approx(expected / scale, abs=2e-5 + 1e-14 / step), column
+            assert got / scale == pytest.approx(
+                expected / scale, abs=2e-5 + 1e-14 / step
+            ), column
         # Homogeneous of degree 0: zero along the twist.
         assert jacobian @ twist / scale == pytest.approx(np.zeros(3), abs=1e-10)
 
@@ -133,12 +175,19 @@ def test_jacobian_is_the_slope(kind, name):
 
 @surfaces
 def test_covariance_when_the_patch_moves(kind, name):
-    patch, surface = PATCHES[name], BUILT[kind, name]
+    patch = PATCHES[name]
+    surface = BUILT[kind, name]
     # As points: the published smoothing and the sides of cells belong to the grid and stay with it.
-    at_home = surface if kind in (CELLS, ELLIPSOID) else kind(pf.ContactPatch.points(patch.positions, patch.weights()))
+    at_home = (
+        surface
+        if kind in (CELLS, ELLIPSOID)
+        else kind(pf.ContactPatch.points(patch.positions, patch.weights()))
+    )
 
     # Tables turn exactly by whole segments.
-    @given(st.integers(0, 79), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), polars, angles)
+    @given(
+        st.integers(0, 79), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), polars, angles
+    )
     @settings(deadline=None, max_examples=10)
     def check(segments, dx, dy, polar, azimuth):
         turn = segments * 0.5 * math.pi / 20
@@ -146,12 +195,16 @@ def test_covariance_when_the_patch_moves(kind, name):
         moved = kind(pf.ContactPatch.points(positions, patch.weights()))
         twist = twist_towards(at_home, polar, azimuth)
         assume(kind not in SUMS or lowest_speed(at_home, twist) > 1e-3)
-        expected = geometry.wrench_at(geometry.rotate(at_home.wrench(twist), turn), (-dx, -dy))
+        expected = geometry.wrench_at(
+            geometry.rotate(at_home.wrench(twist), turn), (-dx, -dy)
+        )
         got = moved.wrench(geometry.twist_at(geometry.rotate(twist, turn), (-dx, -dy)))
         # Rounding of positions (1e-16 of 0.3 m against r of 4 mm), over the lowest speed or distance to the axis; in
         # the second derivatives that a table stores, over the square of a node's distance from a point (1e-4).
         tolerance = 1e-6 if kind is TABLE else 1e-9
-        assert got / scales(surface) == pytest.approx(expected / scales(surface), abs=tolerance)
+        assert got / scales(surface) == pytest.approx(
+            expected / scales(surface), abs=tolerance
+        )
 
     check()
 
@@ -160,7 +213,9 @@ def test_covariance_when_the_patch_moves(kind, name):
 def test_mirror_symmetry(kind, name):
     patch = PATCHES[name]
     at_home = kind(pf.ContactPatch.points(patch.positions, patch.weights()))
-    mirrored = kind(pf.ContactPatch.points(patch.positions * (-1.0, 1.0), patch.weights()))
+    mirrored = kind(
+        pf.ContactPatch.points(patch.positions * (-1.0, 1.0), patch.weights())
+    )
 
     @given(polars, angles)
     @checked
@@ -169,7 +224,9 @@ def test_mirror_symmetry(kind, name):
         assume(kind not in SUMS or lowest_speed(at_home, twist) > 1e-3)
         got = mirrored.wrench(twist * (-1.0, 1.0, -1.0))
         expected = at_home.wrench(twist) * (-1.0, 1.0, -1.0)
-        assert got / scales(at_home) == pytest.approx(expected / scales(at_home), abs=1e-11)  # rounding over 1e-3
+        assert got / scales(at_home) == pytest.approx(
+            expected / scales(at_home), abs=1e-11
+        )  # rounding over 1e-3
 
     check()
 
@@ -189,9 +246,14 @@ def test_wrench_is_minus_the_gradient_of_the_dissipation(kind, name):
         assume(kind is not CELLS or lowest_speed(surface, twist) > 3e-3)
         step = 1e-5 * math.sin(polar)
         for column, change in enumerate(np.diag(step / scale)):
-            slope = (surface.dissipation(twist + change) - surface.dissipation(twist - change)) / (2.0 * step)
+            slope = (
+                surface.dissipation(twist + change)
+                - surface.dissipation(twist - change)
+            ) / (2.0 * step)
             # Truncation: step^2 of the third derivative of a cell near the centre of rotation; rounding 1e-15/step.
-            assert -surface.wrench(twist)[column] / scale[column] == pytest.approx(slope, abs=1e-5 + 1e-15 / step)
+            assert -surface.wrench(twist)[column] / scale[column] == pytest.approx(
+                slope, abs=1e-5 + 1e-15 / step
+            )
 
     check()
 
@@ -233,12 +295,12 @@ def test_dissipation_is_convex(kind, name):
     @given(polars, angles, polars, angles, st.floats(0.01, 100.0))
     @checked
     def check(polar, azimuth, other_polar, other_azimuth, speed):
-        first, second = (
-            twist_towards(surface, polar, azimuth),
-            twist_towards(surface, other_polar, other_azimuth, speed),
-        )
+        first = twist_towards(surface, polar, azimuth)
+        second = twist_towards(surface, other_polar, other_azimuth, speed)
         together = surface.dissipation(first + second)
-        assert together <= (surface.dissipation(first) + surface.dissipation(second)) * (1 + 1e-13)  # rounding
+        assert together <= (
+            surface.dissipation(first) + surface.dissipation(second)
+        ) * (1 + 1e-13)  # rounding
 
     check()
 
@@ -267,14 +329,17 @@ def test_twist_of_the_wrench_of_a_twist(kind, name):
         found = surface.twist(magnitude * surface.wrench(twist))
         assert surface.dissipation(found) == pytest.approx(1.0, rel=1e-12)  # rounding
         # The wrench comes back: to the balance of 1e-12, for cells to the rounding-off of 1e-10 over the lowest speed.
-        back, wrench = surface.wrench(found) / scales(surface), surface.wrench(twist) / scales(surface)
+        back = surface.wrench(found) / scales(surface)
+        wrench = surface.wrench(twist) / scales(surface)
         if kind is CELLS:
             assert back == pytest.approx(wrench, abs=1e-6)
         else:
             # Parallel. Tables of few cells fold: of several answers that of least dissipation is the shortest, and the
             # smooth table finds one of the local ones, which differ by the depth of the folds.
             assert np.cross(back, wrench) == pytest.approx(np.zeros(3), abs=1e-9)
-            assert np.linalg.norm(back) <= np.linalg.norm(wrench) * (1 + (1e-2 if kind is TABLE else 1e-9))
+            assert np.linalg.norm(back) <= np.linalg.norm(wrench) * (
+                1 + (1e-2 if kind is TABLE else 1e-9)
+            )
 
     check()
 
@@ -282,13 +347,22 @@ def test_twist_of_the_wrench_of_a_twist(kind, name):
 def smooth_disc() -> pf.ContactPatch:
     """Many cells and a pressure that ends smoothly: the smooth table has no folds."""
     return pf.ContactPatch.disc_published(
-        0.01, 201, pressure=lambda x, y: max(0.0, 1.0 - (x * x + y * y) / 0.01**2) ** 3 * (1.0 + 60.0 * x)
+        0.01,
+        201,
+        pressure=lambda x, y: (
+            max(0.0, 1.0 - (x * x + y * y) / 0.01**2) ** 3 * (1.0 + 60.0 * x)
+        ),
     )
 
 
 @pytest.mark.parametrize(
     "surface",
-    [TABLE(smooth_disc()), BUILT[PUBLISHED, "Square"], BUILT[PUBLISHED, "Circle"], BUILT[ELLIPSOID, "NonConvex2"]],
+    [
+        TABLE(smooth_disc()),
+        BUILT[PUBLISHED, "Square"],
+        BUILT[PUBLISHED, "Circle"],
+        BUILT[ELLIPSOID, "NonConvex2"],
+    ],
     ids=["table", "published table, square", "published table, disc", "ellipsoid"],
 )
 def test_twist_comes_back_from_a_surface_without_folds(surface):
@@ -298,7 +372,9 @@ def test_twist_comes_back_from_a_surface_without_folds(surface):
         twist = twist_towards(surface, polar, azimuth)
         expected = twist / surface.dissipation(twist) * scales(surface)
         # Balance of 1e-12, over the smallest curvature of these surfaces (0.1) and the distance to the axis (0.01).
-        assert surface.twist(surface.wrench(twist)) * scales(surface) == pytest.approx(expected, abs=1e-9)
+        assert surface.twist(surface.wrench(twist)) * scales(surface) == pytest.approx(
+            expected, abs=1e-9
+        )
 
     check()
 
@@ -310,12 +386,18 @@ def test_every_wrench_has_a_twist(kind, name):
     asked = np.random.default_rng(6).normal(size=(20, 3)) * scales(surface)
     found = surface.twist(asked)
     to_centre = geometry.wrench_at(asked, surface.centre_of_pressure)
-    for wrench, scaled_wrench, twist in zip(asked, to_centre / scales(surface), found, strict=True):
+    for wrench, scaled_wrench, twist in zip(
+        asked, to_centre / scales(surface), found, strict=True
+    ):
         # Stationary where W(V) is parallel; for cells the rest is a force that a resting cell can bear.
         missing = surface.dissipation(twist) / -(wrench @ twist) * scaled_wrench
-        missing = missing - geometry.wrench_at(surface.wrench(twist), surface.centre_of_pressure) / scales(surface)
+        missing = missing - geometry.wrench_at(
+            surface.wrench(twist), surface.centre_of_pressure
+        ) / scales(surface)
         if kind is not CELLS:
-            assert missing == pytest.approx(np.zeros(3), abs=1e-9)  # balance of 1e-12, over |h| of 0.1 and more
+            assert missing == pytest.approx(
+                np.zeros(3), abs=1e-9
+            )  # balance of 1e-12, over |h| of 0.1 and more
             continue
         x, y = (surface.patch.positions - surface.centre_of_pressure).T
         vx, vy, omega = geometry.twist_at(twist, surface.centre_of_pressure)
@@ -323,11 +405,15 @@ def test_every_wrench_has_a_twist(kind, name):
         if np.linalg.norm(missing) > 1e-6:
             # |v| below the rounding-off: that cell holds any force up to its weight, instead of its sliding one
             assert lowest_speed(surface, twist) < 1e-6
-            force, lever = missing[:2], (x[nearest], y[nearest])
+            force = missing[:2]
+            lever = (x[nearest], y[nearest])
             assert missing[2] * surface.contact_radius == pytest.approx(
-                lever[0] * force[1] - lever[1] * force[0], abs=1e-6 * surface.contact_radius
+                lever[0] * force[1] - lever[1] * force[0],
+                abs=1e-6 * surface.contact_radius,
             )
-            assert np.linalg.norm(force) <= 2.0 * surface.patch.weights()[nearest] * (1 + 1e-6)
+            assert np.linalg.norm(force) <= 2.0 * surface.patch.weights()[nearest] * (
+                1 + 1e-6
+            )
 
 
 @pytest.mark.parametrize("foot", [0, 1, 2])
@@ -336,7 +422,8 @@ def test_every_wrench_has_a_twist(kind, name):
 def test_facets_of_a_three_legged_object(foot, spin, share):
     """A foot that rests while the others turn about it bears any force below its friction: a flat facet."""
     surface = BUILT[CELLS, "feet"]
-    place, weight = FEET.positions[foot], FEET.weights()[foot]
+    place = FEET.positions[foot]
+    weight = FEET.weights()[foot]
     about_foot = spin * np.array([place[1], -place[0], 1.0])
     turning = surface.wrench(about_foot)  # the foot itself adds nothing
     for angle in (0.4, 2.5, 4.6):
@@ -345,5 +432,9 @@ def test_facets_of_a_three_legged_object(foot, spin, share):
         found = surface.twist(wrench)
         expected = about_foot / surface.dissipation(about_foot)
         # The rounding-off of 1e-10 r moves the foot by about that over sqrt(1 - share^2).
-        assert found * scales(surface) == pytest.approx(expected * scales(surface), abs=1e-7)
-        assert -wrench @ found == pytest.approx(1.0, abs=1e-7)  # on the facet all wrenches dissipate alike
+        assert found * scales(surface) == pytest.approx(
+            expected * scales(surface), abs=1e-7
+        )
+        assert -wrench @ found == pytest.approx(
+            1.0, abs=1e-7
+        )  # on the facet all wrenches dissipate alike

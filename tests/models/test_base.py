@@ -29,7 +29,9 @@ SURFACES = {
 }
 PATCH = PUBLISHED_PATCHES["NonConvex2"]()
 """No symmetry: its centre of pressure is off the origin and off the cells."""
-FEET = pf.ContactPatch.points([(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0])
+FEET = pf.ContactPatch.points(
+    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
+)
 LOAD = 2.0
 
 checked = settings(deadline=None, max_examples=25)
@@ -54,7 +56,8 @@ every_law = pytest.mark.parametrize("law", LAWS)
 
 def twist_towards(patch, polar: float, azimuth: float, speed: float) -> np.ndarray:
     """Twist about the origin with that direction, in scaled coordinates at the centre of pressure."""
-    vx, vy = speed * math.sin(polar) * math.cos(azimuth), speed * math.sin(polar) * math.sin(azimuth)
+    vx = speed * math.sin(polar) * math.cos(azimuth)
+    vy = speed * math.sin(polar) * math.sin(azimuth)
     spin = speed * math.cos(polar) / patch.contact_radius()
     return geometry.twist_at((vx, vy, spin), -patch.centre_of_pressure())
 
@@ -87,7 +90,9 @@ def test_steady_sliding_is_passive_and_bounded(kind, law):
     model = (
         pf.DistributedModel(PATCH, pf.LuGre(**parameters))
         if kind == "distributed"
-        else pf.ReducedModelPublished(PATCH, pf.LuGre(**parameters), surface=model.surface)
+        else pf.ReducedModelPublished(
+            PATCH, pf.LuGre(**parameters), surface=model.surface
+        )
     )
 
     @given(polars, angles, speeds)
@@ -103,7 +108,11 @@ def test_steady_sliding_is_passive_and_bounded(kind, law):
         bound = 1.2 * LOAD * (1.001 if kind == "published" else 1.0)
         assert math.hypot(fx, fy) <= bound + slack
         # a table's radius is that of the continuous patch, a little more than that of its cells' middles
-        radius = PATCH.contact_radius() if kind == "distributed" else model.surface.contact_radius
+        radius = (
+            PATCH.contact_radius()
+            if kind == "distributed"
+            else model.surface.contact_radius
+        )
         assert abs(tau) <= bound * radius + slack
 
     check()
@@ -124,17 +133,27 @@ def test_distributed_steady_state_is_coulomb_of_every_cell(polar, azimuth, speed
     expected = [*force.sum(axis=1), (x * force[1] - y * force[0]).sum()]
     # Rounding of zdot times sigma_1 = 8e2.
     assert wrench == pytest.approx(expected, abs=1e-12 + 1e-12 * speed)
-    assert state == pytest.approx(g * v / size / 1e6, rel=1e-9, abs=1e-15)  # exp(-1e6 s grip v) is nothing
+    assert state == pytest.approx(
+        g * v / size / 1e6, rel=1e-9, abs=1e-15
+    )  # exp(-1e6 s grip v) is nothing
 
 
 @given(polars, angles, speeds)
 @checked
-def test_slow_and_fast_steady_states_are_coulomb_on_the_cells_surface(polar, azimuth, speed):
+def test_slow_and_fast_steady_states_are_coulomb_on_the_cells_surface(
+    polar, azimuth, speed
+):
     """Without the Stribeck effect the distributed model slides on the limit surface of its cells."""
     law = pf.LuGre(mu_c=0.8, mu_s=0.8, sigma_2=0.0)
-    _, wrench = steady(pf.DistributedModel(FEET, law), twist_towards(FEET, polar, azimuth, speed))
-    expected = pf.Coulomb(0.8).wrench(pf.LimitSurfaceCells(FEET), twist_towards(FEET, polar, azimuth, speed), LOAD)
-    assert wrench == pytest.approx(expected, abs=1e-12 + 1e-12 * speed)  # rounding, as above
+    _, wrench = steady(
+        pf.DistributedModel(FEET, law), twist_towards(FEET, polar, azimuth, speed)
+    )
+    expected = pf.Coulomb(0.8).wrench(
+        pf.LimitSurfaceCells(FEET), twist_towards(FEET, polar, azimuth, speed), LOAD
+    )
+    assert wrench == pytest.approx(
+        expected, abs=1e-12 + 1e-12 * speed
+    )  # rounding, as above
 
 
 @pytest.mark.parametrize("kind", SURFACES)
@@ -145,14 +164,22 @@ def test_reduced_steady_state(kind, polar, azimuth, speed):
     model = model_of(kind)
     twist = twist_towards(PATCH, polar, azimuth, speed)
     state, wrench = steady(model, twist)
-    surface, centre = model.surface, PATCH.centre_of_pressure()
+    surface = model.surface
+    centre = PATCH.centre_of_pressure()
     at_centre = geometry.twist_at(twist, centre)
     v_n = np.linalg.norm(at_centre * (1.0, 1.0, surface.contact_radius))
-    viscous = geometry.wrench_at(0.2 * at_centre * (1.0, 1.0, PATCH.second_moment()), -centre)
+    viscous = geometry.wrench_at(
+        0.2 * at_centre * (1.0, 1.0, PATCH.second_moment()), -centre
+    )
     g = formulas.stribeck(np, v_n, model.law)
     expected = (g * surface.wrench(twist) - viscous) * LOAD
-    for got in (wrench, model.wrench(state, twist, LOAD)):  # of compiled loops and of NumPy
-        assert got == pytest.approx(expected, abs=1e-11 + 1e-12 * speed)  # rounding, as above, through the offset
+    for got in (
+        wrench,
+        model.wrench(state, twist, LOAD),
+    ):  # of compiled loops and of NumPy
+        assert got == pytest.approx(
+            expected, abs=1e-11 + 1e-12 * speed
+        )  # rounding, as above, through the offset
 
 
 def test_pre_sliding_stiffness():
@@ -160,13 +187,26 @@ def test_pre_sliding_stiffness():
     tiny = 1e-9  # displacement per unit twist of one step
     for kind in ("distributed", "ellipsoid"):
         model = model_of(kind)
-        torsional = PATCH.second_moment() if kind == "distributed" else PATCH.contact_radius() ** 2
+        torsional = (
+            PATCH.second_moment()
+            if kind == "distributed"
+            else PATCH.contact_radius() ** 2
+        )
         for index, stiffness in enumerate((1.0, 1.0, torsional)):
             twist = np.zeros(3)
             twist[index] = 1.0
-            state, _ = model.step(model.rest(), geometry.twist_at(twist, -PATCH.centre_of_pressure()), LOAD, tiny)
-            wrench = geometry.wrench_at(model.wrench(state, (0, 0, 0), LOAD), PATCH.centre_of_pressure())
-            assert wrench[index] == pytest.approx(-LOAD * 1e6 * stiffness * tiny, rel=1e-9)  # elastic: rounding
+            state, _ = model.step(
+                model.rest(),
+                geometry.twist_at(twist, -PATCH.centre_of_pressure()),
+                LOAD,
+                tiny,
+            )
+            wrench = geometry.wrench_at(
+                model.wrench(state, (0, 0, 0), LOAD), PATCH.centre_of_pressure()
+            )
+            assert wrench[index] == pytest.approx(
+                -LOAD * 1e6 * stiffness * tiny, rel=1e-9
+            )  # elastic: rounding
 
 
 # ---------------------------------------------------------------------- covariance
@@ -175,24 +215,45 @@ def test_pre_sliding_stiffness():
 def some_state(model, seed: int, size: float = 1e-6):
     """A random state of that deflection, about where slip begins."""
     state = np.random.default_rng(seed).normal(size=model.state_shape) * size
-    return state * (1.0, 1.0, model.patch.contact_radius()) if model.state_shape == (3,) else state
+    return (
+        state * (1.0, 1.0, model.patch.contact_radius())
+        if model.state_shape == (3,)
+        else state
+    )
 
 
 @every_model
 @every_law
 def test_turning_everything_turns_the_wrench_and_nothing_else(kind, law):
     """By any angle; by whole segments where a table is stored."""
-    model, patch = model_of(kind, law, True), FEET
+    model = model_of(kind, law, True)
+    patch = FEET
 
-    @given(st.integers(-40, 40), st.floats(0.0, 1.0), polars, angles, st.floats(1e-5, 1.0), st.integers(0, 1000))
+    @given(
+        st.integers(-40, 40),
+        st.floats(0.0, 1.0),
+        polars,
+        angles,
+        st.floats(1e-5, 1.0),
+        st.integers(0, 1000),
+    )
     @settings(deadline=None, max_examples=10)
     def check(segments, rest, polar, azimuth, speed, seed):
-        angle = (segments + (0.0 if kind in ("table", "published") else rest)) * 0.5 * math.pi / 20
-        turned_patch = pf.ContactPatch.points(geometry.rotate(patch.positions, angle), patch.weights())
+        angle = (
+            (segments + (0.0 if kind in ("table", "published") else rest))
+            * 0.5
+            * math.pi
+            / 20
+        )
+        turned_patch = pf.ContactPatch.points(
+            geometry.rotate(patch.positions, angle), patch.weights()
+        )
         if kind == "distributed":
             turned = pf.DistributedModel(turned_patch, LAWS[law])
         else:
-            turned = pf.ReducedModelPublished(turned_patch, LAWS[law], surface=SURFACES[kind](turned_patch))
+            turned = pf.ReducedModelPublished(
+                turned_patch, LAWS[law], surface=SURFACES[kind](turned_patch)
+            )
         state = np.random.default_rng(seed).normal(size=model.state_shape) * 1e-6
         twist = twist_towards(patch, polar, azimuth, speed)
 
@@ -204,19 +265,27 @@ def test_turning_everything_turns_the_wrench_and_nothing_else(kind, law):
                 else geometry.rotate(value, angle)
             )
 
-        arguments, turned_arguments = (state, twist, LOAD), (turn(state), geometry.rotate(twist, angle), LOAD)
+        arguments = (state, twist, LOAD)
+        turned_arguments = (turn(state), geometry.rotate(twist, angle), LOAD)
         # Rounding, times the stiffest number of each: k z with k = 1e6 v, sigma_1 zdot. Beside the spin axis the smooth
         # table divides rounding by the distance to it, at most by 1e-5.
         allowed = (1e-8 if kind == "table" else 1e-11) * (speed + 1e-3)
-        assert turned.rate(*turned_arguments) == pytest.approx(turn(model.rate(*arguments)), abs=allowed)
-        wrench, turned_wrench = model.wrench(*arguments), turned.wrench(*turned_arguments)
-        assert turned_wrench == pytest.approx(geometry.rotate(wrench, angle), abs=1e3 * allowed)
-        (end, wrench), (turned_end, turned_wrench) = (
-            model.step(*arguments, 1e-4),
-            turned.step(*turned_arguments, 1e-4),
+        assert turned.rate(*turned_arguments) == pytest.approx(
+            turn(model.rate(*arguments)), abs=allowed
         )
-        assert turned_end == pytest.approx(turn(end), abs=1e-15)  # a nanometre's millionth
-        assert turned_wrench == pytest.approx(geometry.rotate(wrench, angle), abs=1e3 * allowed)
+        wrench = model.wrench(*arguments)
+        turned_wrench = turned.wrench(*turned_arguments)
+        assert turned_wrench == pytest.approx(
+            geometry.rotate(wrench, angle), abs=1e3 * allowed
+        )
+        (end, wrench) = model.step(*arguments, 1e-4)
+        (turned_end, turned_wrench) = turned.step(*turned_arguments, 1e-4)
+        assert turned_end == pytest.approx(
+            turn(end), abs=1e-15
+        )  # a nanometre's millionth
+        assert turned_wrench == pytest.approx(
+            geometry.rotate(wrench, angle), abs=1e3 * allowed
+        )
 
     check()
 
@@ -225,9 +294,16 @@ def test_turning_everything_turns_the_wrench_and_nothing_else(kind, law):
 def test_mirroring(kind):
     """Odd: the opposite twist of the opposite state gives the opposite wrench."""
     model = model_of(kind)
-    state, twist = some_state(model, 3), np.array([0.01, -0.02, 3.0])
-    for function in (model.rate, model.wrench, lambda *a: model.step(*a, 1e-4)[0], lambda *a: model.step(*a, 1e-4)[1]):
-        there, back = function(state, twist, LOAD), function(-state, -twist, LOAD)
+    state = some_state(model, 3)
+    twist = np.array([0.01, -0.02, 3.0])
+    for function in (
+        model.rate,
+        model.wrench,
+        lambda *a: model.step(*a, 1e-4)[0],
+        lambda *a: model.step(*a, 1e-4)[1],
+    ):
+        there = function(state, twist, LOAD)
+        back = function(-state, -twist, LOAD)
         assert back == pytest.approx(-there, rel=1e-9, abs=1e-15)  # rounding
 
 
@@ -272,9 +348,13 @@ def check_slopes(model, state, twist):
         (model.rate, "rate", 1e6 * speed),
         (model.wrench, "wrench", LOAD * 1e6 * (1 + 8e2 * speed)),
     ):
-        by_state = differences(lambda z, of=of: of(z, twist, LOAD), state, state_scale(model))
+        by_state = differences(
+            lambda z, of=of: of(z, twist, LOAD), state, state_scale(model)
+        )
         by_twist = differences(lambda v, of=of: of(state, v, LOAD), twist, twist_steps)
-        if model.state_shape != (3,) and name == "rate":  # cell by cell: no other cell matters
+        if (
+            model.state_shape != (3,) and name == "rate"
+        ):  # cell by cell: no other cell matters
             assert np.count_nonzero(by_state) <= 4 * model.patch.cells
             cells = np.arange(model.patch.cells)
             by_state = by_state[:, cells, :, cells].transpose(1, 2, 0)
@@ -283,9 +363,13 @@ def check_slopes(model, state, twist):
         allowed = 1e-9 * natural + 3e-5 * np.abs(by_state).max()
         assert getattr(got, f"{name}_state") == pytest.approx(by_state, abs=allowed)
         # Tables bend at their cells, and one cell near the centre of rotation bends within its own distance.
-        assert getattr(got, f"{name}_twist") == pytest.approx(by_twist, rel=1e-4, abs=3e-4 * np.abs(by_twist).max())
+        assert getattr(got, f"{name}_twist") == pytest.approx(
+            by_twist, rel=1e-4, abs=3e-4 * np.abs(by_twist).max()
+        )
     assert not got.rate_load.any()
-    assert got.wrench_load * LOAD == pytest.approx(model.wrench(state, twist, LOAD), rel=1e-12)  # linear: rounding
+    assert got.wrench_load * LOAD == pytest.approx(
+        model.wrench(state, twist, LOAD), rel=1e-12
+    )  # linear: rounding
 
 
 @every_model
@@ -297,15 +381,19 @@ def test_jacobians_are_the_slopes(kind, law, twist):
     for seed, deflection in enumerate((0.4e-6, 0.8e-6, 0.95e-6, 1.1e-6, 1.3e-6)):
         state = some_state(model, seed)
         if kind != "distributed":
-            state *= deflection / np.linalg.norm(state / (1.0, 1.0, PATCH.contact_radius()))
+            state *= deflection / np.linalg.norm(
+                state / (1.0, 1.0, PATCH.contact_radius())
+            )
         check_slopes(model, state, np.array(twist))
 
 
 @every_model
 @every_law
 def test_jacobians_at_undeflected_bristles(kind, law):
-    model, twist = model_of(kind, law, feet=True), np.array([4e-3, 3e-3, 0.7])
-    state, steps = model.rest(), state_scale(model)
+    model = model_of(kind, law, feet=True)
+    twist = np.array([4e-3, 3e-3, 0.7])
+    state = model.rest()
+    steps = state_scale(model)
     got = model.jacobians(state, twist, LOAD)
     expected = differences(lambda z: model.rate(z, twist, LOAD), state, steps)
     if kind == "distributed":
@@ -337,22 +425,32 @@ def test_jacobians_at_rest_are_finite_and_elastic(kind, law):
 def test_jacobians_have_batch_axes(kind):
     model = model_of(kind)
     states = np.stack([some_state(model, seed) for seed in range(3)])
-    twists, loads = np.random.default_rng(1).normal(size=(4, 1, 3)) * 0.01, np.array([0.5, 1.0, 2.0])
+    twists = np.random.default_rng(1).normal(size=(4, 1, 3)) * 0.01
+    loads = np.array([0.5, 1.0, 2.0])
     batch = model.jacobians(states, twists, loads)
     for i, j in np.ndindex(4, 3):
         single = model.jacobians(states[j], twists[i, 0], loads[j])
         for all_of_them, one in zip(batch, single, strict=True):
             assert all_of_them.shape == (4, 3, *one.shape)
             # Sums over cells in another order: rounding.
-            assert all_of_them[i, j] == pytest.approx(one, rel=1e-9, abs=1e-12 * np.abs(one).max())
+            assert all_of_them[i, j] == pytest.approx(
+                one, rel=1e-9, abs=1e-12 * np.abs(one).max()
+            )
 
 
 @pytest.mark.parametrize("front", [None, "planarfriction.torch", "planarfriction.jax"])
 def test_batches_at_rest(front):
-    patch, law = pf.ContactPatch.disc(0.01, 5), pf.LuGre()
+    patch = pf.ContactPatch.disc(0.01, 5)
+    law = pf.LuGre()
     module = pf if front is None else pytest.importorskip(front, exc_type=ImportError)
     for model in (module.DistributedModel(patch, law), module.ReducedModel(patch, law)):
-        for batch, axes in (((), ()), (64, (64,)), ((64,), (64,)), ([2, 3], (2, 3)), (0, (0,))):
+        for batch, axes in (
+            ((), ()),
+            (64, (64,)),
+            ((64,), (64,)),
+            ([2, 3], (2, 3)),
+            (0, (0,)),
+        ):
             assert tuple(model.rest(batch).shape) == (*axes, *model.state_shape)
         for wrong in (-1, 1.5, "many", (2, -1), 10**9, (1,) * 40, None):
             with pytest.raises(pf.errors.InvalidValueError, match="batch must"):

@@ -12,14 +12,25 @@ import pytest
 import planarfriction as pf
 from tests.support.anisotropic import PATCHES as ANISOTROPIC
 
-MAP = pf.ContactPatch.from_pressure(np.random.default_rng(1).uniform(size=(5, 4)) ** 3, (0.002, 0.0015), name="map")
-FEET = pf.ContactPatch.points([(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0], name="feet")
-SOFT = pf.ContactPatch.disc(0.01, 7, pressure=pf.SoftFinger(c=0.007, n=0.4, k_per_newton=1.5), name="soft")
-LOADED = pf.ContactPatch.from_pressure({0.5: np.eye(4) + 0.1, 2.0: np.ones((4, 4)) / 3.0}, 1e-3, name="maps over load")
+MAP = pf.ContactPatch.from_pressure(
+    np.random.default_rng(1).uniform(size=(5, 4)) ** 3, (0.002, 0.0015), name="map"
+)
+FEET = pf.ContactPatch.points(
+    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0], name="feet"
+)
+SOFT = pf.ContactPatch.disc(
+    0.01, 7, pressure=pf.SoftFinger(c=0.007, n=0.4, k_per_newton=1.5), name="soft"
+)
+LOADED = pf.ContactPatch.from_pressure(
+    {0.5: np.eye(4) + 0.1, 2.0: np.ones((4, 4)) / 3.0}, 1e-3, name="maps over load"
+)
 METRIC, CELLS = ANISOTROPIC["both"], ANISOTROPIC["cells"]
 ONE_METRIC = ANISOTROPIC["metric"]
 
-LAWS = {"plain": pf.LuGre(mu_s=1.2), "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))}
+LAWS = {
+    "plain": pf.LuGre(mu_s=1.2),
+    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)),
+}
 
 SURFACES = {
     "cells": pf.LimitSurfaceCells(MAP),
@@ -37,7 +48,9 @@ SURFACES = {
 
 MODELS = {
     "distributed": lambda law: pf.DistributedModel(MAP, law),
-    "distributed, one cell": lambda law: pf.DistributedModel(pf.ContactPatch.points([(0.01, 0.02)]), law),
+    "distributed, one cell": lambda law: pf.DistributedModel(
+        pf.ContactPatch.points([(0.01, 0.02)]), law
+    ),
     "distributed, metrics": lambda law: pf.DistributedModel(CELLS, law),
     "distributed, soft": lambda law: pf.DistributedModel(SOFT, law),
     "distributed, maps over load": lambda law: pf.DistributedModel(LOADED, law),
@@ -51,7 +64,11 @@ MODELS = {
 }
 
 RANDOM = np.random.default_rng(7)
-TWISTS = RANDOM.normal(size=(2, 5, 3)) * [1e-2, 1e-2, 1.0] * 10.0 ** RANDOM.uniform(-4.0, 1.0, size=(2, 5, 1))
+TWISTS = (
+    RANDOM.normal(size=(2, 5, 3))
+    * [1e-2, 1e-2, 1.0]
+    * 10.0 ** RANDOM.uniform(-4.0, 1.0, size=(2, 5, 1))
+)
 TWISTS[0, 1] = 0.0
 LAYOUTS = {
     "as it is": lambda rows: rows,
@@ -63,7 +80,10 @@ layouts = pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS)
 
 def same(batch, alone, index) -> None:
     """All that a call returns, member by member."""
-    batch, alone = ((values,) if isinstance(values, np.ndarray | float) else values for values in (batch, alone))
+    batch, alone = (
+        (values,) if isinstance(values, np.ndarray | float) else values
+        for values in (batch, alone)
+    )
     for of_batch, of_one in zip(batch, alone, strict=True):
         np.testing.assert_array_equal(of_batch[index], of_one)
 
@@ -71,7 +91,8 @@ def same(batch, alone, index) -> None:
 @layouts
 @pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
 def test_limit_surfaces(surface, layout):
-    twists, wrenches = layout(TWISTS), layout(RANDOM.normal(size=TWISTS.shape) * [1.0, 1.0, 0.01])
+    twists = layout(TWISTS)
+    wrenches = layout(RANDOM.normal(size=TWISTS.shape) * [1.0, 1.0, 0.01])
     for method in ("wrench", "dissipation", "jacobian"):
         batch = getattr(surface, method)(twists)
         for index in np.ndindex(2, 5):
@@ -90,15 +111,27 @@ def test_models(make, law, layout):
     scale = 1e-6 * (np.array([1.0, 1.0, 0.01]) if model.state_shape == (3,) else 1.0)
     states = layout(random.normal(size=(2, 5, *model.state_shape)) * scale)
     states[1, 1] = 0.0
-    twists, loads = layout(TWISTS), layout(random.uniform(0.5, 2.0, size=(2, 5)))
+    twists = layout(TWISTS)
+    loads = layout(random.uniform(0.5, 2.0, size=(2, 5)))
     loads[0, 3] = 0.0
     dts = 10.0 ** random.uniform(-6.0, -2.0, size=(2, 5))
     for method in ("rate", "wrench", "jacobians", "step", "step_jacobians"):
-        call, steps = getattr(model, method), (dts,) if method.startswith("step") else ()
+        call = getattr(model, method)
+        steps = (dts,) if method.startswith("step") else ()
         batch = call(states, twists, loads, *steps)
         shared = call(states[0, 0], twists, 1.0, *(1e-4 for _ in steps))
         for index in np.ndindex(2, 5):
-            alone = states[index].copy(), twists[index].copy(), float(loads[index]), *(float(s[index]) for s in steps)
+            alone = (
+                states[index].copy(),
+                twists[index].copy(),
+                float(loads[index]),
+                *(float(s[index]) for s in steps),
+            )
             same(batch, call(*alone), index)
-            alone = states[0, 0].copy(), twists[index].copy(), 1.0, *(1e-4 for _ in steps)
+            alone = (
+                states[0, 0].copy(),
+                twists[index].copy(),
+                1.0,
+                *(1e-4 for _ in steps),
+            )
             same(shared, call(*alone), index)

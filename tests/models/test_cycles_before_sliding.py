@@ -15,13 +15,16 @@ LEG, STEPS, DT, CYCLES = 1e-7, 50, 1e-3, 6
 SPRINGS = {
     "distributed": pf.DistributedModel(PATCH, LAW),
     "reduced": pf.ReducedModel(PATCH, LAW),
-    "published, ellipsoid": pf.ReducedModelPublished(PATCH, LAW, pf.LimitSurfaceEllipsoid(PATCH)),
+    "published, ellipsoid": pf.ReducedModelPublished(
+        PATCH, LAW, pf.LimitSurfaceEllipsoid(PATCH)
+    ),
 }
 
 
 def cycle() -> np.ndarray:
     """Twists of a push, a turn and the straight way back, `[3, 3]`."""
-    push, turn = np.array([LEG, 0.0, 0.0]), np.array([0.0, 0.0, LEG / PATCH.contact_radius()])
+    push = np.array([LEG, 0.0, 0.0])
+    turn = np.array([0.0, 0.0, LEG / PATCH.contact_radius()])
     return np.array([push, turn, -(push + turn)]) / (STEPS * DT)
 
 
@@ -30,7 +33,9 @@ def run(model):
     twists = np.tile(np.repeat(cycle(), STEPS, axis=0), (CYCLES, 1))
     end, wrenches = pf.derivatives.rollout(model, None, twists, 1.0, DT)
     wrenches = np.concatenate([np.zeros((1, 3)), wrenches])
-    work = -0.5 * np.einsum("ti,ti->t", wrenches[1:] + wrenches[:-1], twists) * DT  # exact: forces are linear in time
+    work = (
+        -0.5 * np.einsum("ti,ti->t", wrenches[1:] + wrenches[:-1], twists) * DT
+    )  # exact: forces are linear in time
     work = work.reshape(CYCLES, -1)
     return end, work.sum(1) / np.abs(work).sum(1)
 
@@ -42,7 +47,10 @@ def test_springs_take_nothing(kind):
     assert np.abs(taken).max() < 1e-9
 
 
-@pytest.mark.parametrize("surface", [pf.LimitSurfaceTablePublished, pf.LimitSurfaceTable, pf.LimitSurfaceCells])
+@pytest.mark.parametrize(
+    "surface",
+    [pf.LimitSurfaceTablePublished, pf.LimitSurfaceTable, pf.LimitSurfaceCells],
+)
 def test_the_published_equations_ratchet_and_give_energy(surface):
     """By `sum S h |V_S| dt` a cycle, which only the ellipsoid makes zero."""
     surface = surface(PATCH)

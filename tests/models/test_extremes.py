@@ -11,17 +11,39 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
-LAWS = {"plain": pf.LuGre(mu_s=1.2), "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=0.9)}
+LAWS = {
+    "plain": pf.LuGre(mu_s=1.2),
+    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=0.9),
+}
 KINDS = {
     "distributed": pf.DistributedModel,
     "reduced": lambda patch, law: pf.ReducedModel(patch, law),
     "published": pf.ReducedModelPublished,
 }
-DIRECTIONS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.3, -0.7, 0.5], [-8e-4, -2e-3, -1.0]])
-SPEEDS = [5e-324, 1e-310, 1e-300, 1e-200, 2e-162, 1e-161, 1e-160, 1e-158, 1e-155, 1e-150, 1e-101, 1e-100, 1e-50]
+DIRECTIONS = np.array(
+    [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.3, -0.7, 0.5], [-8e-4, -2e-3, -1.0]]
+)
+SPEEDS = [
+    5e-324,
+    1e-310,
+    1e-300,
+    1e-200,
+    2e-162,
+    1e-161,
+    1e-160,
+    1e-158,
+    1e-155,
+    1e-150,
+    1e-101,
+    1e-100,
+    1e-50,
+]
 
 every_model = pytest.mark.parametrize(
-    "model", [(kind, law) for kind in KINDS for law in LAWS], ids="-".join, indirect=True
+    "model",
+    [(kind, law) for kind in KINDS for law in LAWS],
+    ids="-".join,
+    indirect=True,
 )
 
 
@@ -53,7 +75,10 @@ def test_slow_twists_give_numbers(model, speed):
     for state in states(model):
         batch = np.broadcast_to(state, (len(DIRECTIONS), *state.shape)).copy()
         for load, dt in ((1.0, 1e-3), (0.0, 10.0), (1e-300, 1e-300), (1.0, 1e40)):
-            assert all(np.isfinite(part).all() for part in results(model, batch, DIRECTIONS * speed, load, dt))
+            assert all(
+                np.isfinite(part).all()
+                for part in results(model, batch, DIRECTIONS * speed, load, dt)
+            )
 
 
 @every_model
@@ -64,14 +89,22 @@ def test_large_numbers_give_numbers(model, large):
         batch = np.broadcast_to(state, (len(DIRECTIONS), *state.shape)).copy()
         for speed in (1e-3, large):
             for load, dt in ((1.0, 1e-3), (large, 1e-3), (1.0, large), (large, large)):
-                assert all(np.isfinite(part).all() for part in results(model, batch, DIRECTIONS * speed, load, dt))
+                assert all(
+                    np.isfinite(part).all()
+                    for part in results(model, batch, DIRECTIONS * speed, load, dt)
+                )
 
 
 @every_model
 @pytest.mark.parametrize("name", ["state", "twist", "normal_force", "dt"])
 @pytest.mark.parametrize("value", [1.01 * LARGEST, 1e200, 1.7e308])
 def test_larger_ones_are_refused(model, name, value):
-    given = {"state": model.rest(), "twist": np.ones(3), "normal_force": 1.0, "dt": 1e-3}
+    given = {
+        "state": model.rest(),
+        "twist": np.ones(3),
+        "normal_force": 1.0,
+        "dt": 1e-3,
+    }
     given[name] = given[name] + value
     sequence = {**given, "twist": np.tile(given["twist"], (4, 1))}
     calls = [
@@ -80,5 +113,7 @@ def test_larger_ones_are_refused(model, name, value):
         lambda: derivatives.rollout(model, **sequence),
     ]
     for call in calls:
-        with pytest.raises(InvalidValueError, match=rf"{name} must be between -1e\+50 and 1e\+50"):
+        with pytest.raises(
+            InvalidValueError, match=rf"{name} must be between -1e\+50 and 1e\+50"
+        ):
             call()

@@ -22,7 +22,9 @@ def check(kind: str, name: str, found: dict[str, list[float]]) -> None:
     for part, numbers in expected.items():
         # Sensitivities choose their own steps: with elasto-plastic bristles that begin to yield they are known to 5e-4.
         rounding = 5e-4 if part == "end by start" else 1e-9
-        assert found[part] == pytest.approx(numbers, rel=0.0, abs=rounding * np.abs(numbers).max()), part
+        assert found[part] == pytest.approx(
+            numbers, rel=0.0, abs=rounding * np.abs(numbers).max()
+        ), part
 
 
 @pytest.mark.parametrize("name", golden.MODELS)

@@ -9,10 +9,14 @@ import planarfriction as pf
 from planarfriction.scenes import Signal
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
-SOFT = pf.ContactPatch.disc(0.01, 11, pressure=pf.SoftFinger(k=2.0, c=0.0085, n=1.0 / 3.0))
+SOFT = pf.ContactPatch.disc(
+    0.01, 11, pressure=pf.SoftFinger(k=2.0, c=0.0085, n=1.0 / 3.0)
+)
 """Below 9.8 mN only the middle of its cells is loaded."""
 ASIDE = pf.ContactPatch(
-    [(0.03, -0.02), (0.03, -0.01)], [1e-6, 1e-6], pf.PressureMaps((0.1, 1.0), np.array([[1.0, 0.0], [0.4, 0.6]]))
+    [(0.03, -0.02), (0.03, -0.01)],
+    [1e-6, 1e-6],
+    pf.PressureMaps((0.1, 1.0), np.array([[1.0, 0.0], [0.4, 0.6]])),
 )
 """Two cells far from the frame's origin, of which the second is loaded from 0.1 N on."""
 
@@ -33,29 +37,53 @@ def run(model, load, twists, dt=1e-5):
 @pytest.mark.parametrize("patch", [SOFT, ASIDE], ids=["soft", "aside"])
 def test_a_point_slides_as_one_cell_does(patch, load):
     """Also while it turns about itself, which nothing resists."""
-    twists = np.stack([TWIST * np.sin(0.3 * t + np.array([0.0, 1.0, 2.0])) for t in range(40)])
-    found, wanted = run(model_of(patch), load, twists), run(pf.DistributedModel(patch, LAW), load, twists)
+    twists = np.stack(
+        [TWIST * np.sin(0.3 * t + np.array([0.0, 1.0, 2.0])) for t in range(40)]
+    )
+    found = run(model_of(patch), load, twists)
+    wanted = run(pf.DistributedModel(patch, LAW), load, twists)
     scale = load * np.array([1.0, 1.0, 0.03])
     np.testing.assert_allclose(found / scale, wanted / scale, rtol=0.0, atol=1e-9)
 
 
 def test_jacobians_of_a_point():
-    model, load, dt = model_of(ASIDE), 0.05, 1e-4
-    z, units = np.array([4e-7, -3e-7, 2e-8]), np.array([1e-10, 1e-10, 1e-10])
-    step, rate = model.step_jacobians(z, TWIST, load, dt), model.jacobians(z, TWIST, load)
+    model = model_of(ASIDE)
+    load = 0.05
+    dt = 1e-4
+    z = np.array([4e-7, -3e-7, 2e-8])
+    units = np.array([1e-10, 1e-10, 1e-10])
+    step = model.step_jacobians(z, TWIST, load, dt)
+    rate = model.jacobians(z, TWIST, load)
     for j in range(3):
-        up, down = (model.step(z + sign * units[j] * np.eye(3)[j], TWIST, load, dt) for sign in (1, -1))
-        for found, a, b in zip((step.state_state, step.wrench_state), up, down, strict=True):
+        up, down = (
+            model.step(z + sign * units[j] * np.eye(3)[j], TWIST, load, dt)
+            for sign in (1, -1)
+        )
+        for found, a, b in zip(
+            (step.state_state, step.wrench_state), up, down, strict=True
+        ):
             np.testing.assert_allclose(
-                found[:, j], (a - b) / (2 * units[j]), rtol=1e-4, atol=1e-4 * np.abs(found).max()
+                found[:, j],
+                (a - b) / (2 * units[j]),
+                rtol=1e-4,
+                atol=1e-4 * np.abs(found).max(),
             )
         h = 1e-6 * np.eye(3)[j]
         up, down = (model.step(z, TWIST + sign * h, load, dt) for sign in (1, -1))
-        for found, a, b in zip((step.state_twist, step.wrench_twist), up, down, strict=True):
-            np.testing.assert_allclose(found[:, j], (a - b) / 2e-6, rtol=1e-4, atol=1e-4 * np.abs(found).max())
-        for by, found in ((model.rate, rate.rate_twist), (model.wrench, rate.wrench_twist)):
+        for found, a, b in zip(
+            (step.state_twist, step.wrench_twist), up, down, strict=True
+        ):
+            np.testing.assert_allclose(
+                found[:, j], (a - b) / 2e-6, rtol=1e-4, atol=1e-4 * np.abs(found).max()
+            )
+        for by, found in (
+            (model.rate, rate.rate_twist),
+            (model.wrench, rate.wrench_twist),
+        ):
             slope = (by(z, TWIST + h, load) - by(z, TWIST - h, load)) / 2e-6
-            np.testing.assert_allclose(found[:, j], slope, rtol=1e-4, atol=1e-4 * np.abs(found).max())
+            np.testing.assert_allclose(
+                found[:, j], slope, rtol=1e-4, atol=1e-4 * np.abs(found).max()
+            )
     assert all(np.isfinite(part).all() for part in (*step, *rate))
 
 
@@ -63,17 +91,33 @@ def test_jacobians_of_a_point():
 def slides():
     """A body that slides and turns on a soft finger, whose load ramps to zero, rests there, and comes back."""
     load = Signal.sampled([0.0, 0.04, 0.05, 0.09], [0.4, 0.0, 0.0, 0.4], hold="linear")
-    models = {"distributed": pf.DistributedModel(SOFT, LAW), "published": model_of(SOFT)}
-    options = {"mass": 0.1, "inertia": 2e-6, "twist": (0.3, 0.1, 40.0), "normal_force": load, "save_every": 1e-3}
-    return {name: pf.simulate(pf.scenes.free_slide(model, t_end=0.1, **options)).data for name, model in models.items()}
+    models = {
+        "distributed": pf.DistributedModel(SOFT, LAW),
+        "published": model_of(SOFT),
+    }
+    options = {
+        "mass": 0.1,
+        "inertia": 2e-6,
+        "twist": (0.3, 0.1, 40.0),
+        "normal_force": load,
+        "save_every": 1e-3,
+    }
+    return {
+        name: pf.simulate(pf.scenes.free_slide(model, t_end=0.1, **options)).data
+        for name, model in models.items()
+    }
 
 
 def test_a_load_that_ramps_to_zero_and_back(slides):
-    found, wanted = slides["published"], slides["distributed"]
+    found = slides["published"]
+    wanted = slides["distributed"]
     assert float(found.time[-1]) == pytest.approx(0.1)
     way = float(np.hypot(wanted.x[-1], wanted.y[-1]))
     # the published table errs by a percent, and with so few cells by more in the torque
     assert float(np.hypot(found.x - wanted.x, found.y - wanted.y).max()) < 1e-2 * way
-    assert float(abs(found.theta - wanted.theta).max()) < 2e-2 * float(abs(wanted.theta).max())
-    lost, brake = float(wanted.omega[0] - wanted.omega[-1]), float(found.omega[0] - found.omega[-1])
+    assert float(abs(found.theta - wanted.theta).max()) < 2e-2 * float(
+        abs(wanted.theta).max()
+    )
+    lost = float(wanted.omega[0] - wanted.omega[-1])
+    brake = float(found.omega[0] - found.omega[-1])
     assert brake == pytest.approx(lost, rel=0.15)

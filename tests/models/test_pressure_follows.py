@@ -18,7 +18,9 @@ MODELS = {
     "leaning": pf.DistributedModel(LEANING, LAW),
     "soft distributed": pf.DistributedModel(SOFT, LAW),
     "soft reduced": pf.ReducedModel(SOFT, LAW),
-    "soft published": pf.ReducedModelPublished(SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, normal_force=2.0)),
+    "soft published": pf.ReducedModelPublished(
+        SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, normal_force=2.0)
+    ),
 }
 
 
@@ -37,7 +39,9 @@ def test_moments_of_hardly_any_load_give_numbers(model, load):
     """Its centre lies further away than any patch: one that moves as a whole went to 1e99 m, then to infinity."""
     state = model.rest()
     for _ in range(2):
-        state, wrench = model.step(state, (0.005, 0.002, 0.5), load, 1e-3, moments=(1e-3, -2e-3))
+        state, wrench = model.step(
+            state, (0.005, 0.002, 0.5), load, 1e-3, moments=(1e-3, -2e-3)
+        )
         assert (np.abs(state) < 1e50).all() and (np.abs(wrench) < 1e50).all()
 
 
@@ -46,12 +50,15 @@ def test_translation_pulls_at_the_centre_of_pressure(model):
     size = model.patch.positions.max()
     for share in ((0.1, 0.0), (0.3, -0.2), (0.5, 0.4)):
         x, y = size * np.array(share)
-        fx, fy, tau = model.step(model.rest(), (0.1, 0.05, 0.0), 2.0, 1.0, moments=(2.0 * y, -2.0 * x))[1]
+        fx, fy, tau = model.step(
+            model.rest(), (0.1, 0.05, 0.0), 2.0, 1.0, moments=(2.0 * y, -2.0 * x)
+        )[1]
         assert tau == pytest.approx(x * fy - y * fx, rel=1e-6)
 
 
 def test_moments_of_the_patchs_own_pressure_change_nothing(model):
-    rng, load = np.random.default_rng(1), np.array([1.0, 2.0, 3.0])
+    rng = np.random.default_rng(1)
+    load = np.array([1.0, 2.0, 3.0])
     twist = rng.normal(size=(3, 3)) * (0.1, 0.1, 1.0)
     own = moments_at(model.patch.centre_of_pressure(load), load)
     state, wrench = model.step(model.rest(), twist, load, 1e-2)
@@ -61,43 +68,72 @@ def test_moments_of_the_patchs_own_pressure_change_nothing(model):
 
 
 def test_bristles_of_cells_are_kept_when_the_pressure_moves():
-    model, rng = MODELS["distributed"], np.random.default_rng(2)
-    state, twist = 1e-7 * rng.normal(size=model.state_shape), (1e-3, -2e-3, 0.1)
+    model = MODELS["distributed"]
+    rng = np.random.default_rng(2)
+    state = 1e-7 * rng.normal(size=model.state_shape)
+    twist = (1e-3, -2e-3, 0.1)
     new, _ = model.step(state, twist, 2.0, 1e-3)
     moved, _ = model.step(state, twist, 2.0, 1e-3, moments=(0.05, -0.03))
     np.testing.assert_array_equal(moved, new)
 
 
 def test_jacobians_are_those_of_differences_at_the_moments(model):
-    rng, load, dt = np.random.default_rng(4), np.array([1.0, 2.0]), 1e-3
+    rng = np.random.default_rng(4)
+    load = np.array([1.0, 2.0])
+    dt = 1e-3
     state = 1e-7 * rng.normal(size=(2, *model.state_shape))
-    twist, moments = (
-        rng.normal(size=(2, 3)) * (1e-3, 1e-3, 1e-2),
-        0.2 * model.patch.positions.max() * rng.normal(size=(2, 2)),
-    )
+    twist = rng.normal(size=(2, 3)) * (1e-3, 1e-3, 1e-2)
+    moments = 0.2 * model.patch.positions.max() * rng.normal(size=(2, 2))
     slopes = model.step_jacobians(state, twist, load, dt, moments=moments)
     for i, h in enumerate((1e-9, 1e-9, 1e-8)):
         bump = h * np.eye(3)[i]
-        ends = [model.step(state, twist + sign * bump, load, dt, moments=moments) for sign in (1.0, -1.0)]
-        new, wrench = ((one - other) / (2.0 * h) for one, other in zip(*ends, strict=True))
-        np.testing.assert_allclose(slopes.wrench_twist[..., i], wrench, rtol=1e-5, atol=1e-5 * abs(wrench).max())
-        np.testing.assert_allclose(slopes.state_twist[..., i], new, rtol=1e-5, atol=1e-5 * abs(new).max())
+        ends = [
+            model.step(state, twist + sign * bump, load, dt, moments=moments)
+            for sign in (1.0, -1.0)
+        ]
+        new, wrench = (
+            (one - other) / (2.0 * h) for one, other in zip(*ends, strict=True)
+        )
+        np.testing.assert_allclose(
+            slopes.wrench_twist[..., i],
+            wrench,
+            rtol=1e-5,
+            atol=1e-5 * abs(wrench).max(),
+        )
+        np.testing.assert_allclose(
+            slopes.state_twist[..., i], new, rtol=1e-5, atol=1e-5 * abs(new).max()
+        )
     place = tuple(np.array(model.state_shape) // 2)
     bump = np.zeros(model.state_shape)
     bump[place] = 1e-10
-    ends = [model.step(state + sign * bump, twist, load, dt, moments=moments)[1] for sign in (1.0, -1.0)]
+    ends = [
+        model.step(state + sign * bump, twist, load, dt, moments=moments)[1]
+        for sign in (1.0, -1.0)
+    ]
     wrench = (ends[0] - ends[1]) / 2e-10
     found = slopes.wrench_state[(..., slice(None), *place)]
     np.testing.assert_allclose(found, wrench, rtol=1e-4, atol=1e-6 * abs(wrench).max())
     wrench = model.step(state, twist, load, dt, moments=moments)[1]
-    np.testing.assert_allclose(slopes.wrench_load * load[:, None], wrench, rtol=1e-12, atol=1e-15)  # at a held pressure
+    np.testing.assert_allclose(
+        slopes.wrench_load * load[:, None], wrench, rtol=1e-12, atol=1e-15
+    )  # at a held pressure
 
 
 def test_rates_go_where_short_steps_go(model):
-    state, twist, moments, dt = 1e-7 * np.ones(model.state_shape), (1e-3, -2e-3, 0.02), (0.3e-2, -0.2e-2), 1e-9
+    state = 1e-7 * np.ones(model.state_shape)
+    twist = (1e-3, -2e-3, 0.02)
+    moments = (0.3e-2, -0.2e-2)
+    dt = 1e-9
     new, wrench = model.step(state, twist, 2.0, dt, moments=moments)
-    np.testing.assert_allclose(model.rate(state, twist, 2.0, moments=moments), (new - state) / dt, rtol=1e-3, atol=1e-6)
-    np.testing.assert_allclose(model.wrench(state, twist, 2.0, moments=moments), wrench, rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(
+        model.rate(state, twist, 2.0, moments=moments),
+        (new - state) / dt,
+        rtol=1e-3,
+        atol=1e-6,
+    )
+    np.testing.assert_allclose(
+        model.wrench(state, twist, 2.0, moments=moments), wrench, rtol=1e-3, atol=1e-6
+    )
 
 
 def test_friction_takes_energy_while_the_pressure_moves(model):
@@ -105,11 +141,27 @@ def test_friction_takes_energy_while_the_pressure_moves(model):
 
     What it has taken may fall only by what bristles store, `mu_s^2 f_N / (2 sigma_0)`, at the reversals.
     """
-    time, load, dt = np.arange(4000) * 1e-3, 2.0, 1e-3
-    twist = np.stack([0.02 * np.sin(3.0 * time), 0.03 * np.cos(2.0 * time), 2.0 * np.sin(5.0 * time)], -1)
-    centre = 1.2 * model.patch.positions.max() * np.stack([np.sin(7.0 * time), np.cos(11.0 * time)], -1)
-    state, taken = model.rest(), [0.0]
-    for v, moments in zip(twist, moments_at(centre, np.full(len(time), load)), strict=True):
+    time = np.arange(4000) * 1e-3
+    load = 2.0
+    dt = 1e-3
+    twist = np.stack(
+        [
+            0.02 * np.sin(3.0 * time),
+            0.03 * np.cos(2.0 * time),
+            2.0 * np.sin(5.0 * time),
+        ],
+        -1,
+    )
+    centre = (
+        1.2
+        * model.patch.positions.max()
+        * np.stack([np.sin(7.0 * time), np.cos(11.0 * time)], -1)
+    )
+    state = model.rest()
+    taken = [0.0]
+    for v, moments in zip(
+        twist, moments_at(centre, np.full(len(time), load)), strict=True
+    ):
         state, wrench = model.step(state, v, load, dt, moments=moments)
         taken.append(taken[-1] - wrench @ v * dt)
     stored = 1.2**2 * load / (2.0 * LAW.sigma_0)
@@ -119,22 +171,42 @@ def test_friction_takes_energy_while_the_pressure_moves(model):
 
 def test_coupled_patches_follow_by_the_same_rule():
     """The wrenches of a coupled step are those of the models' own steps at the twists, loads and moments."""
-    models = [MODELS[name] for name in ("distributed", "reduced", "leaning", "published")]
-    patches, rng = CoupledPatches(models), np.random.default_rng(5)
-    twist, load = rng.normal(size=(4, 3)) * (0.01, 0.01, 0.1), rng.uniform(1.0, 3.0, 4)
+    models = [
+        MODELS[name] for name in ("distributed", "reduced", "leaning", "published")
+    ]
+    patches = CoupledPatches(models)
+    rng = np.random.default_rng(5)
+    twist = rng.normal(size=(4, 3)) * (0.01, 0.01, 0.1)
+    load = rng.uniform(1.0, 3.0, 4)
     moments = 0.03 * rng.normal(size=(4, 2))
-    host = HostStep(twist, load, np.zeros((4, 3)), np.diag(np.tile([1e-3, 1e-3, 1.0], 4)), moments=moments)
+    host = HostStep(
+        twist,
+        load,
+        np.zeros((4, 3)),
+        np.diag(np.tile([1e-3, 1e-3, 1.0], 4)),
+        moments=moments,
+    )
     step = patches.step(patches.rest(), host, 1e-3)
     assert step.converged
     for p, model in enumerate(models):
-        new, wrench = model.step(model.rest(), step.twist[p], step.normal_force[p], 1e-3, moments=moments[p])
+        new, wrench = model.step(
+            model.rest(), step.twist[p], step.normal_force[p], 1e-3, moments=moments[p]
+        )
         np.testing.assert_allclose(step.wrench[p], wrench, rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(patches.states(step.state)[p], new, rtol=1e-9, atol=1e-18)
+        np.testing.assert_allclose(
+            patches.states(step.state)[p], new, rtol=1e-9, atol=1e-18
+        )
 
 
 def test_a_coupled_patch_without_cells_refuses_moments_of_loads():
     patches = CoupledPatches([MODELS["soft published"]])
-    host = HostStep(np.zeros((1, 3)), np.ones(1), np.zeros((1, 3)), np.eye(3), moments=np.zeros((1, 2)))
+    host = HostStep(
+        np.zeros((1, 3)),
+        np.ones(1),
+        np.zeros((1, 3)),
+        np.eye(3),
+        moments=np.zeros((1, 2)),
+    )
     with pytest.raises(InvalidValueError, match="moments"):
         patches.step(patches.rest(), host, 1e-3)
 
@@ -142,4 +214,10 @@ def test_a_coupled_patch_without_cells_refuses_moments_of_loads():
 def test_moments_of_another_shape_or_not_finite_are_refused(model):
     for bad in ((0.0,), (0.0, np.inf), np.zeros((7, 2))):
         with pytest.raises(InvalidValueError):
-            model.step(np.broadcast_to(model.rest(), (3, *model.state_shape)), np.zeros((3, 3)), 1.0, 1e-3, moments=bad)
+            model.step(
+                np.broadcast_to(model.rest(), (3, *model.state_shape)),
+                np.zeros((3, 3)),
+                1.0,
+                1e-3,
+                moments=bad,
+            )

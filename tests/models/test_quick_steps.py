@@ -19,11 +19,17 @@ LOADS = np.array([1.0, 2.0, 0.0, 0.5])
 
 def _states(model) -> np.ndarray:
     scale = [1.0, 1.0, 0.01] if isinstance(model, pf.ReducedModelPublished) else 1.0
-    return GENERATOR.uniform(-0.6, 0.6, (4, *model.state_shape)) * LAW.largest_deflection * scale
+    return (
+        GENERATOR.uniform(-0.6, 0.6, (4, *model.state_shape))
+        * LAW.largest_deflection
+        * scale
+    )
 
 
 @pytest.mark.parametrize("name", MODELS)
-@pytest.mark.parametrize("load", [LOADS, 2.0, 2], ids=["loads", "one load", "whole number"])
+@pytest.mark.parametrize(
+    "load", [LOADS, 2.0, 2], ids=["loads", "one load", "whole number"]
+)
 def test_batches_step_as_their_members_do(name, load):
     model = MODELS[name]
     states = _states(model)
@@ -40,12 +46,17 @@ def test_batches_step_as_their_members_do(name, load):
 @pytest.mark.parametrize("load", [2.0, 0.0])
 def test_derivatives_are_differences_of_steps(name, load):
     model = MODELS[name]
-    state, twist, dt = _states(model)[0], TWISTS[0], 1e-4
+    state = _states(model)[0]
+    twist = TWISTS[0]
+    dt = 1e-4
     found = model.step_jacobians(state, twist, load, dt)
     assert model.compiled.jacobians_one(state, twist, load, dt) is not None
 
     def change(by_state, by_twist):
-        ends = [model.step(state + sign * by_state, twist + sign * by_twist, load, dt) for sign in (1.0, -1.0)]
+        ends = [
+            model.step(state + sign * by_state, twist + sign * by_twist, load, dt)
+            for sign in (1.0, -1.0)
+        ]
         return [0.5 * (one - other) for one, other in zip(*ends, strict=True)]
 
     for direction in np.eye(state.size):
@@ -58,8 +69,12 @@ def test_derivatives_are_differences_of_steps(name, load):
         np.testing.assert_allclose(new, own, rtol=1e-4, atol=1e-17)
     for direction in np.diag([1e-8, 1e-8, 1e-6]):
         new, wrench = change(np.zeros_like(state), direction)
-        np.testing.assert_allclose(wrench, found.wrench_twist @ direction, rtol=1e-4, atol=1e-11)
-        np.testing.assert_allclose(new, found.state_twist @ direction, rtol=1e-4, atol=1e-17)
+        np.testing.assert_allclose(
+            wrench, found.wrench_twist @ direction, rtol=1e-4, atol=1e-11
+        )
+        np.testing.assert_allclose(
+            new, found.state_twist @ direction, rtol=1e-4, atol=1e-17
+        )
     small = model.step(state, twist, 1e-9, dt)[1] * 1e9
     np.testing.assert_allclose(found.wrench_load, small, rtol=1e-9)
 
@@ -71,17 +86,25 @@ def test_derivatives_of_a_batch_are_those_of_its_members(name):
     many = model.step_jacobians(states, TWISTS, LOADS, 1e-3)
     for b in range(4):
         one = model.step_jacobians(states[b], TWISTS[b], float(LOADS[b]), 1e-3)
-        assert all(np.array_equal(all_[b], own) for all_, own in zip(many, one, strict=True))
+        assert all(
+            np.array_equal(all_[b], own) for all_, own in zip(many, one, strict=True)
+        )
 
 
 WRONG = {
     "NaN in a state": ({"state": np.full((4, 3), np.nan)}, "state must be finite"),
-    "a twist beyond all range": ({"twist": np.full((4, 3), 1e60)}, "twist must be between -1e"),
+    "a twist beyond all range": (
+        {"twist": np.full((4, 3), 1e60)},
+        "twist must be between -1e",
+    ),
     "a negative load": ({"normal_force": -LOADS}, "normal_force must be >= 0"),
     "an infinite load": ({"normal_force": float("inf")}, "normal_force must be finite"),
     "a negative step": ({"dt": -1.0}, "dt must be >= 0"),
     "loads for three": ({"normal_force": np.ones(3)}, "batch axes must broadcast"),
-    "a truth value": ({"normal_force": True}, "normal_force must be an array of numbers and no truth value"),
+    "a truth value": (
+        {"normal_force": True},
+        "normal_force must be an array of numbers and no truth value",
+    ),
 }
 
 
@@ -89,10 +112,19 @@ WRONG = {
 def test_what_is_not_in_order_is_refused(name):
     wrong, message = WRONG[name]
     model = MODELS["published"]
-    given = {"state": np.zeros((4, 3)), "twist": TWISTS, "normal_force": LOADS, "dt": 1e-3, **wrong}
+    given = {
+        "state": np.zeros((4, 3)),
+        "twist": TWISTS,
+        "normal_force": LOADS,
+        "dt": 1e-3,
+        **wrong,
+    }
     with pytest.raises(pf.errors.InvalidValueError, match=message):
         model.step(**given)
-    one = {key: value[0] if isinstance(value, np.ndarray) else value for key, value in given.items()}
+    one = {
+        key: value[0] if isinstance(value, np.ndarray) else value
+        for key, value in given.items()
+    }
     if name != "loads for three":
         with pytest.raises(pf.errors.InvalidValueError, match=message):
             model.step_jacobians(**{**one, "normal_force": _plain(one["normal_force"])})
@@ -100,7 +132,9 @@ def test_what_is_not_in_order_is_refused(name):
 
 @pytest.mark.parametrize("twist", [np.array(0.0), np.zeros((1, 3, 1))])
 def test_twists_of_other_axes_are_one_clear_line(twist):
-    with pytest.raises(pf.errors.InvalidValueError, match=r"^twist must have shape \[..., 3\]"):
+    with pytest.raises(
+        pf.errors.InvalidValueError, match=r"^twist must have shape \[..., 3\]"
+    ):
         MODELS["published"].step(np.zeros((1, 3)), twist, 1.0, 1e-3)
 
 

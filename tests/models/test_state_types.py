@@ -69,9 +69,21 @@ every_form = pytest.mark.parametrize("form", FORMS)
 
 def compiled() -> dict[str, int]:
     """Return the number of compilations of each kernel."""
-    modules = [module for name, module in sys.modules.items() if name.startswith("planarfriction._engine")]
-    found = {id(value): value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher)}
-    return {f"{each.__module__}.{each.__name__}": len(each.signatures) for each in found.values()}
+    modules = [
+        module
+        for name, module in sys.modules.items()
+        if name.startswith("planarfriction._engine")
+    ]
+    found = {
+        id(value): value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, Dispatcher)
+    }
+    return {
+        f"{each.__module__}.{each.__name__}": len(each.signatures)
+        for each in found.values()
+    }
 
 
 def calls(model):
@@ -87,9 +99,15 @@ def rollouts(model):
     """The same of rollouts, with twists `[T, 3]`."""
     yield lambda state, twist: derivatives.rollout(model, state, twist, LOAD, DT)
     if model is MODELS["reduced"] or model is MODELS["published"]:
-        yield lambda state, twist: derivatives.rollout_states(model, state, twist, LOAD, DT)
-        yield lambda state, twist: derivatives.rollout_jacobian(model, state, twist, LOAD, DT)
-        yield lambda state, twist: derivatives.rollout_vjp(model, state, twist, LOAD, DT, twist)
+        yield lambda state, twist: derivatives.rollout_states(
+            model, state, twist, LOAD, DT
+        )
+        yield lambda state, twist: derivatives.rollout_jacobian(
+            model, state, twist, LOAD, DT
+        )
+        yield lambda state, twist: derivatives.rollout_vjp(
+            model, state, twist, LOAD, DT, twist
+        )
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -97,7 +115,8 @@ def everything_is_compiled():
     """One contact and a batch run different loops."""
     for model in MODELS.values():
         for count in ((), (2,)):
-            state, twist = np.zeros((*count, *model.state_shape)), np.broadcast_to(TWIST, (*count, 4, 3))
+            state = np.zeros((*count, *model.state_shape))
+            twist = np.broadcast_to(TWIST, (*count, 4, 3))
             for call in calls(model):
                 call(state, twist[..., 0, :].copy())
             for call in rollouts(model):
@@ -106,10 +125,19 @@ def everything_is_compiled():
 
 def agree(found, wanted, error):
     """Equal but for the rounding of the inputs; elasto-plastic bristles at 1/3 of breakaway magnify it little."""
-    pairs = zip(found, wanted, strict=True) if isinstance(found, tuple) else [(found, wanted)]
+    pairs = (
+        zip(found, wanted, strict=True)
+        if isinstance(found, tuple)
+        else [(found, wanted)]
+    )
     for a, b in pairs:
         assert np.asarray(a).dtype == float
-        np.testing.assert_allclose(a, b, rtol=0.0, atol=100.0 * error * (np.abs(b).max() if np.size(b) else 0.0))
+        np.testing.assert_allclose(
+            a,
+            b,
+            rtol=0.0,
+            atol=100.0 * error * (np.abs(b).max() if np.size(b) else 0.0),
+        )
 
 
 @every_model
@@ -120,9 +148,12 @@ def test_other_types_are_converted_without_compiling(model, form, batch):
     one = np.linspace(-3e-7, 3e-7, model.rest().size).reshape(model.state_shape)
     if form == "float16":
         one[:] = 0.0  # deflections are below its numbers
-    state, twist = np.broadcast_to(one, (*batch, *one.shape)).copy(), np.broadcast_to(TWIST, (*batch, 3)).copy()
+    state = np.broadcast_to(one, (*batch, *one.shape)).copy()
+    twist = np.broadcast_to(TWIST, (*batch, 3)).copy()
     sequence = np.stack([twist] * 4, -2)
-    for call, held in [(call, twist) for call in calls(model)] + [(call, sequence) for call in rollouts(model)]:
+    for call, held in [(call, twist) for call in calls(model)] + [
+        (call, sequence) for call in rollouts(model)
+    ]:
         wanted = call(state, held)
         before = compiled()
         found = call(convert(state), convert(held))
@@ -182,7 +213,17 @@ def test_what_is_no_state_is_refused(model, kind):
 
 @every_model
 @pytest.mark.parametrize(
-    "value", ["1", b"1", 1.0 + 0.0j, np.complex128(1.0 + 1.0j), np.timedelta64(1, "s"), {1.0}, None, np.ma.masked]
+    "value",
+    [
+        "1",
+        b"1",
+        1.0 + 0.0j,
+        np.complex128(1.0 + 1.0j),
+        np.timedelta64(1, "s"),
+        {1.0},
+        None,
+        np.ma.masked,
+    ],
 )
 def test_what_is_no_load_or_step_is_refused(model, value):
     for call in (

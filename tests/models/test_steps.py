@@ -43,18 +43,28 @@ def model_of(kind: str, law: str = "elasto-plastic"):
 
 def scaled(model, state):
     """Deflections [m]: the reduced model's third one over the contact radius."""
-    return state / (1.0, 1.0, model.surface.contact_radius) if model.state_shape == (3,) else state
+    return (
+        state / (1.0, 1.0, model.surface.contact_radius)
+        if model.state_shape == (3,)
+        else state
+    )
 
 
 def norms(model, state):
     """Deflection |z| of each bristle [m]."""
-    return np.linalg.norm(scaled(model, state), axis=-1 if model.state_shape == (3,) else -2)
+    return np.linalg.norm(
+        scaled(model, state), axis=-1 if model.state_shape == (3,) else -2
+    )
 
 
 def some_state(model, seed: int, size: float):
     """A random state of that deflection."""
     state = np.random.default_rng(seed).normal(size=model.state_shape) * size
-    return state * (1.0, 1.0, model.surface.contact_radius) if model.state_shape == (3,) else state
+    return (
+        state * (1.0, 1.0, model.surface.contact_radius)
+        if model.state_shape == (3,)
+        else state
+    )
 
 
 def reference(model, state, twist, time):
@@ -64,9 +74,18 @@ def reference(model, state, twist, time):
         units = units * (1.0, 1.0, model.surface.contact_radius)
 
     def slope(_, z):
-        return (model.rate(z.reshape(model.state_shape) * units, twist, LOAD) / units).ravel()
+        return (
+            model.rate(z.reshape(model.state_shape) * units, twist, LOAD) / units
+        ).ravel()
 
-    found = integrate.solve_ivp(slope, (0.0, time), (state / units).ravel(), method="DOP853", rtol=3e-14, atol=1e-14)
+    found = integrate.solve_ivp(
+        slope,
+        (0.0, time),
+        (state / units).ravel(),
+        method="DOP853",
+        rtol=3e-14,
+        atol=1e-14,
+    )
     assert found.success
     return found.y[:, -1].reshape(model.state_shape) * units
 
@@ -82,7 +101,9 @@ def test_plain_steps_are_exact(kind, time):
     end, wrench = model.step(start, TWIST, LOAD, time)
     expected = reference(model, start, TWIST, time)
     # Deflections of 1e-6 m; the reference's own error, 3e-14 in each of some hundred steps.
-    assert scaled(model, end) == pytest.approx(scaled(model, expected), abs=1e-6 * 1e-11)
+    assert scaled(model, end) == pytest.approx(
+        scaled(model, expected), abs=1e-6 * 1e-11
+    )
     # The wrench is that of the end of the step: sigma_0 times the above, and rounding.
     assert wrench == pytest.approx(model.wrench(end, TWIST, LOAD), abs=1e-10)
 
@@ -93,17 +114,21 @@ def test_wrench_of_a_step_is_that_of_its_end(kind, law):
     model = model_of(kind, law)
     for seed in range(5):
         end, wrench = model.step(some_state(model, seed, 7e-7), TWIST, LOAD, 1e-4)
-        assert wrench == pytest.approx(model.wrench(end, TWIST, LOAD), abs=1e-10)  # rounding
+        assert wrench == pytest.approx(
+            model.wrench(end, TWIST, LOAD), abs=1e-10
+        )  # rounding
 
 
 @every_model
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_elasto_plastic_steps_are_of_second_order(kind, direction):
-    model, time = model_of(kind, "wide"), 3e-4
+    model = model_of(kind, "wide")
+    time = 3e-4
     # Deflected into the elasto-plastic range (0.3 to 1 micrometre), and from there onwards or back.
     start, _ = model.step(model.rest(), TWIST, LOAD, 2.5e-4)
     twist = direction * TWIST + (5e-4, 4e-4, 0.1)
-    expected, errors = reference(model, start, twist, time), []
+    expected = reference(model, start, twist, time)
+    errors = []
     for steps in (20, 40, 80, 160):
         state = start
         for _ in range(steps):
@@ -127,7 +152,9 @@ def test_short_steps_follow_the_rate(kind, law):
             dt = 1e-6 * 1e-6 / np.abs(rate).max()  # a millionth of full deflection
             end, _ = model.step(state, twist, LOAD, dt)
             # Truncation: dt k/2 = 1e-6; rounding of z: 1e-16 of 1e-6 over 1e-12.
-            assert scaled(model, end - state) / dt == pytest.approx(rate, abs=1e-5 * np.abs(rate).max())
+            assert scaled(model, end - state) / dt == pytest.approx(
+                rate, abs=1e-5 * np.abs(rate).max()
+            )
 
 
 # ---------------------------------------------------------------------- stability
@@ -164,14 +191,22 @@ def test_any_step_is_stable_and_does_not_overshoot(kind, law):
 @pytest.mark.parametrize("start", ["rest", "opposite", "far"])
 def test_long_steps_end_in_the_steady_state(kind, law, start):
     model = model_of(kind, law)
-    begin = {"rest": model.rest(), "opposite": some_state(model, 2, 5e-7), "far": some_state(model, 3, 1e-4)}[start]
+    begin = {
+        "rest": model.rest(),
+        "opposite": some_state(model, 2, 5e-7),
+        "far": some_state(model, 3, 1e-4),
+    }[start]
     for twist in (TWIST, 50.0 * TWIST, 1e-3 * TWIST):
         # What is left of the start is its share of the way, squared: (1e-4 m/2e-6 m/s/1e8 s)^2 and less.
         end, wrench = model.step(begin, twist, LOAD, 1e8)
         at_end = model.rate(end, twist, LOAD)
-        assert at_end == pytest.approx(np.zeros(model.state_shape), abs=1e-11 * np.abs(twist).max())
+        assert at_end == pytest.approx(
+            np.zeros(model.state_shape), abs=1e-11 * np.abs(twist).max()
+        )
         again, wrench_again = model.step(end, twist, LOAD, 1e8)
-        assert scaled(model, again) == pytest.approx(scaled(model, end), abs=1e-6 * 1e-11)
+        assert scaled(model, again) == pytest.approx(
+            scaled(model, end), abs=1e-6 * 1e-11
+        )
         assert wrench == pytest.approx(wrench_again, rel=1e-9)
 
 
@@ -189,7 +224,8 @@ def test_nothing_moves_without_time_or_without_velocity(kind, law):
 def test_no_creep_below_breakaway(kind):
     """Elasto-plastic bristles are springs below breakaway: they come back exactly; plain ones creep."""
     for law, allowed in (("elasto-plastic", 1e-19), ("plain", None)):
-        model, state = model_of(kind, law), None
+        model = model_of(kind, law)
+        state = None
         state = model.rest()
         # 50 cycles of pushing there and back, up to a fifth of full deflection.
         for _ in range(50):
@@ -205,10 +241,12 @@ def test_no_creep_below_breakaway(kind):
 @every_model
 @every_law
 def test_batch_axes_broadcast_and_equal_single_calls(kind, law):
-    model, random = model_of(kind, law), np.random.default_rng(9)
+    model = model_of(kind, law)
+    random = np.random.default_rng(9)
     states = np.stack([some_state(model, seed, 6e-7) for seed in range(2)])  # [2]
     twists = random.normal(size=(3, 1, 3)) * (1e-2, 1e-2, 2.0)  # [3, 1]
-    loads, times = np.array([0.0, 1.5]), np.array([[1e-5], [1e-4], [1e-2]])  # [2], [3, 1]
+    loads = np.array([0.0, 1.5])
+    times = np.array([[1e-5], [1e-4], [1e-2]])  # [2], [3, 1]
     ends, wrenches = model.step(states, twists, loads, times)
     assert ends.shape == (3, 2, *model.state_shape) and wrenches.shape == (3, 2, 3)
     assert model.rate(states, twists, loads).shape == (3, 2, *model.state_shape)
@@ -219,17 +257,22 @@ def test_batch_axes_broadcast_and_equal_single_calls(kind, law):
         assert wrenches[i, j] == pytest.approx(wrench, rel=1e-12, abs=1e-15)
         for function in (model.rate, model.wrench):
             single = function(states[j], twists[i, 0], loads[j])
-            assert function(states, twists, loads)[i, j] == pytest.approx(single, rel=1e-12, abs=1e-15)
+            assert function(states, twists, loads)[i, j] == pytest.approx(
+                single, rel=1e-12, abs=1e-15
+            )
 
 
 @pytest.mark.parametrize("kind", ["distributed", "published"])
 def test_one_state_with_many_twists_loads_or_times(kind):
     """A batch of three, which must not be taken for the three components of one twist."""
     model = model_of(kind)
-    rest, twists = model.rest(), np.stack([TWIST, 2 * TWIST, 3 * TWIST])
+    rest = model.rest()
+    twists = np.stack([TWIST, 2 * TWIST, 3 * TWIST])
     ends, wrenches = model.step(rest, twists, LOAD, 1e-4)
     assert ends.shape == (3, *model.state_shape) and wrenches.shape == (3, 3)
-    assert ends[1] == pytest.approx(model.step(rest, twists[1], LOAD, 1e-4)[0], rel=1e-12)
+    assert ends[1] == pytest.approx(
+        model.step(rest, twists[1], LOAD, 1e-4)[0], rel=1e-12
+    )
     assert model.step(rest, TWIST, [1.0, 2.0], 1e-4)[1].shape == (2, 3)
     assert model.step(rest, TWIST, np.array([1.0]), 1e-4)[1].shape == (1, 3)
     assert model.step(rest, TWIST, LOAD, np.array([1e-4]))[1].shape == (1, 3)
@@ -242,11 +285,21 @@ def test_plain_numbers_tuples_and_arrays_are_the_same(kind):
     rest = model.rest()
     expected = model.step(rest, TWIST, LOAD, 1e-4)
     for twist in (tuple(TWIST), list(TWIST), tuple(map(np.float64, TWIST))):
-        for load, dt in ((2, 1e-4), (np.float64(2.0), np.float64(1e-4)), (np.array(2.0), np.array(1e-4))):
-            for got, wanted in zip(model.step(rest.tolist(), twist, load, dt), expected, strict=True):
+        for load, dt in (
+            (2, 1e-4),
+            (np.float64(2.0), np.float64(1e-4)),
+            (np.array(2.0), np.array(1e-4)),
+        ):
+            for got, wanted in zip(
+                model.step(rest.tolist(), twist, load, dt), expected, strict=True
+            ):
                 assert got == pytest.approx(wanted, rel=1e-12)
-            for got, wanted in zip(model.step(rest, twist, load, dt), expected, strict=True):
-                assert got.shape == wanted.shape and got == pytest.approx(wanted, rel=1e-12)
+            for got, wanted in zip(
+                model.step(rest, twist, load, dt), expected, strict=True
+            ):
+                assert got.shape == wanted.shape and got == pytest.approx(
+                    wanted, rel=1e-12
+                )
     assert not rest.any()  # the caller's state is left alone
 
 
@@ -257,8 +310,12 @@ def test_plain_numbers_tuples_and_arrays_are_the_same(kind):
 def test_a_fixed_shape_is_proportional_to_the_load(kind):
     model = model_of(kind)
     state = some_state(model, 6, 6e-7)
-    assert model.wrench(state, TWIST, 6.0) == pytest.approx(3.0 * model.wrench(state, TWIST, 2.0), rel=1e-12)
-    assert model.rate(state, TWIST, 6.0) == pytest.approx(model.rate(state, TWIST, 2.0), rel=1e-15)
+    assert model.wrench(state, TWIST, 6.0) == pytest.approx(
+        3.0 * model.wrench(state, TWIST, 2.0), rel=1e-12
+    )
+    assert model.rate(state, TWIST, 6.0) == pytest.approx(
+        model.rate(state, TWIST, 2.0), rel=1e-15
+    )
 
 
 @every_model
@@ -271,26 +328,41 @@ def test_a_contact_without_load_forgets(kind):
 
 
 FINGER = pf.ContactPatch.rectangle(
-    0.02, cells=21, pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01)
+    0.02,
+    cells=21,
+    pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01),
 )
 
 
-def soft(on_load_change: str = "rebuild", kind=pf.LimitSurfaceTablePublished, normal_force=None):
+def soft(
+    on_load_change: str = "rebuild",
+    kind=pf.LimitSurfaceTablePublished,
+    normal_force=None,
+):
     """Reduced model of the soft finger."""
     surface = kind(FINGER, normal_force=normal_force)
-    return pf.ReducedModelPublished(FINGER, PLAIN, surface=surface, on_load_change=on_load_change)
+    return pf.ReducedModelPublished(
+        FINGER, PLAIN, surface=surface, on_load_change=on_load_change
+    )
 
 
 def fixed_at(load: float) -> pf.ContactPatch:
     """The soft finger's shape at a load, as a patch that keeps it."""
-    positions, weights = FINGER.positions, FINGER.weights(load)
-    return pf.ContactPatch(positions[weights > 0.0], FINGER.areas[weights > 0.0], weights[weights > 0], FINGER.grid)
+    positions = FINGER.positions
+    weights = FINGER.weights(load)
+    return pf.ContactPatch(
+        positions[weights > 0.0],
+        FINGER.areas[weights > 0.0],
+        weights[weights > 0],
+        FINGER.grid,
+    )
 
 
 @pytest.mark.parametrize("kind", SURFACES.values())
 def test_rebuild_follows_the_load_with_everything(kind):
     model = soft(kind=kind)
-    state, loads = np.array([3e-7, -2e-7, 1e-9]), np.array([0.5, 1.0, 3.0])
+    state = np.array([3e-7, -2e-7, 1e-9])
+    loads = np.array([0.5, 1.0, 3.0])
     ends, wrenches = model.step(state, TWIST, loads, 1e-4)
     for load, end, wrench in zip(loads, ends, wrenches, strict=True):
         patch = fixed_at(load)
@@ -299,24 +371,46 @@ def test_rebuild_follows_the_load_with_everything(kind):
         # The same numbers by another way: rounding.
         assert end == pytest.approx(expected_end, rel=1e-9)
         assert wrench == pytest.approx(expected_wrench, rel=1e-9)
-        assert model.rate(state, TWIST, load) == pytest.approx(other.rate(state, TWIST, load), rel=1e-9)
-        for got, wanted in zip(model.jacobians(state, TWIST, load), other.jacobians(state, TWIST, load), strict=True):
-            assert got == pytest.approx(wanted, rel=1e-9, abs=1e-9 * np.abs(wanted).max())
-        assert model.shape_at(load).contact_radius == pytest.approx(other.surface.contact_radius, rel=1e-12)
-        assert model.shape_at(load).second_moment == pytest.approx(patch.second_moment(), rel=1e-12)
+        assert model.rate(state, TWIST, load) == pytest.approx(
+            other.rate(state, TWIST, load), rel=1e-9
+        )
+        for got, wanted in zip(
+            model.jacobians(state, TWIST, load),
+            other.jacobians(state, TWIST, load),
+            strict=True,
+        ):
+            assert got == pytest.approx(
+                wanted, rel=1e-9, abs=1e-9 * np.abs(wanted).max()
+            )
+        assert model.shape_at(load).contact_radius == pytest.approx(
+            other.surface.contact_radius, rel=1e-12
+        )
+        assert model.shape_at(load).second_moment == pytest.approx(
+            patch.second_moment(), rel=1e-12
+        )
 
 
 def test_rescale_lets_only_the_radius_follow():
-    model, reference_load = soft("rescale", normal_force=2.0), 2.0
-    built, small = model.shape_at(reference_load), model.shape_at(0.5)
+    model = soft("rescale", normal_force=2.0)
+    reference_load = 2.0
+    built = model.shape_at(reference_load)
+    small = model.shape_at(0.5)
     assert small.contact_radius < 0.7 * built.contact_radius  # R ~ f_N^(1/3): 0.63
-    assert small.contact_radius == pytest.approx(soft().shape_at(0.5).contact_radius, rel=1e-12)
-    assert small.second_moment == built.second_moment == FINGER.second_moment(reference_load)
+    assert small.contact_radius == pytest.approx(
+        soft().shape_at(0.5).contact_radius, rel=1e-12
+    )
+    assert (
+        small.second_moment
+        == built.second_moment
+        == FINGER.second_moment(reference_load)
+    )
     assert small.surface is model.surface
     # A spin, elastic: torque sigma_0 r^2 theta of the radius that follows.
     state, _ = model.step(model.rest(), (0, 0, 1.0), 0.5, 1e-9)
     torque = model.wrench(state, (0, 0, 0), 0.5)[2]
-    assert torque == pytest.approx(-0.5 * 1e6 * small.contact_radius**2 * 1e-9, rel=1e-4)  # decay over 1e-9 s: 1e6 r dt
+    assert torque == pytest.approx(
+        -0.5 * 1e6 * small.contact_radius**2 * 1e-9, rel=1e-4
+    )  # decay over 1e-9 s: 1e6 r dt
 
 
 def test_keep_keeps_all():
@@ -334,7 +428,8 @@ def test_keep_keeps_all():
 @pytest.mark.parametrize("on_load_change", ["rescale", "keep"])
 def test_a_reference_load_is_needed_to_keep_something(on_load_change):
     with pytest.raises(
-        InvalidValueError, match=f"surface must have a normal_force when on_load_change='{on_load_change}'"
+        InvalidValueError,
+        match=f"surface must have a normal_force when on_load_change='{on_load_change}'",
     ):
         soft(on_load_change)
 
@@ -346,16 +441,22 @@ def test_distributed_weights_follow_the_load():
     ends, wrenches = model.step(state, TWIST, loads, 1e-4)
     for load, end, wrench in zip(loads, ends, wrenches, strict=True):
         single_end, single_wrench = model.step(state, TWIST, load, 1e-4)
-        assert end == pytest.approx(single_end, rel=1e-12) and wrench == pytest.approx(single_wrench, rel=1e-12)
+        assert end == pytest.approx(single_end, rel=1e-12) and wrench == pytest.approx(
+            single_wrench, rel=1e-12
+        )
         assert wrench == pytest.approx(model.wrench(end, TWIST, load), abs=1e-10)
     loaded = FINGER.weights(0.5) > 0.0
     other = pf.DistributedModel(fixed_at(0.5), ELASTIC)
-    assert wrenches[1] == pytest.approx(other.step(state[:, loaded], TWIST, 0.5, 1e-4)[1], rel=1e-9)
+    assert wrenches[1] == pytest.approx(
+        other.step(state[:, loaded], TWIST, 0.5, 1e-4)[1], rel=1e-9
+    )
     # Bristles of cells without load go on moving, as published: the rate does not look at the load.
     assert np.array_equal(model.rate(state, TWIST, 0.5), model.rate(state, TWIST, 3.0))
     got = model.jacobians(state, TWIST, loads)
     assert not got.wrench_load[0].any() and np.isfinite(got.wrench_load).all()
-    assert got.wrench_load[1] * 0.5 == pytest.approx(model.wrench(state, TWIST, 0.5), rel=1e-12)
+    assert got.wrench_load[1] * 0.5 == pytest.approx(
+        model.wrench(state, TWIST, 0.5), rel=1e-12
+    )
 
 
 def test_zero_load_of_a_soft_finger():
@@ -370,13 +471,16 @@ def test_zero_load_of_a_soft_finger():
         assert not end.any() and not wrench.any()
         assert not model.wrench(state, TWIST, 0.0).any()
         assert np.isfinite(model.rate(state, TWIST, 0.0)).all()
-        assert all(np.isfinite(block).all() for block in model.jacobians(state, TWIST, 0.0))
+        assert all(
+            np.isfinite(block).all() for block in model.jacobians(state, TWIST, 0.0)
+        )
 
 
 @pytest.mark.parametrize("model_type", [pf.ReducedModel, pf.ReducedModelPublished])
 def test_a_model_takes_no_addresses_to_another_process(model_type):
     model = model_type(pf.ContactPatch.disc(0.01, cells=9), pf.LuGre())
-    state, twist = model.rest(), (0.01, 0.0, 1.0)
+    state = model.rest()
+    twist = (0.01, 0.0, 1.0)
     expected = model.step(state, twist, 2.0, 1e-3)
     model.rate(state, twist, 2.0)
     copy = pickle.loads(pickle.dumps(model))

@@ -30,10 +30,17 @@ MODELS: dict[str, Callable[[], Any]] = {
     "reduced": lambda: pf.ReducedModel(FIXED, PLAIN, cells=12),
     "reduced soft": lambda: pf.ReducedModel(SOFT, LAW, cells=12),
     "published": lambda: pf.ReducedModelPublished(FIXED, LAW),
-    "published soft": lambda: pf.ReducedModelPublished(SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, segments=4)),
-    "published soft, smooth": lambda: pf.ReducedModelPublished(SOFT, LAW, pf.LimitSurfaceTable(SOFT, segments=3)),
+    "published soft": lambda: pf.ReducedModelPublished(
+        SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, segments=4)
+    ),
+    "published soft, smooth": lambda: pf.ReducedModelPublished(
+        SOFT, LAW, pf.LimitSurfaceTable(SOFT, segments=3)
+    ),
     "published soft, rescaled": lambda: pf.ReducedModelPublished(
-        SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, 4, normal_force=2.0), on_load_change="rescale"
+        SOFT,
+        LAW,
+        pf.LimitSurfaceTablePublished(SOFT, 4, normal_force=2.0),
+        on_load_change="rescale",
     ),
 }
 
@@ -48,13 +55,17 @@ def numbers(results: Any) -> list[np.ndarray]:
 def of_a_scene(model: Any, load: float) -> tuple:
     """A short run whose load changes."""
     ramp = pf.Signal.sampled([0.0, 0.01], [load, 1.1 * load], hold="linear")
-    data = pf.simulate(pf.Scene(pf.Body(0.2, 1e-4), [pf.Contact(model, ramp)], 0.01, save_every=5e-3)).histories
+    data = pf.simulate(
+        pf.Scene(pf.Body(0.2, 1e-4), [pf.Contact(model, ramp)], 0.01, save_every=5e-3)
+    ).histories
     return tuple(data[name].values for name in ("x", "y", "theta", "fx", "fy", "tau"))
 
 
 def of_a_batch(model: Any, load: float) -> tuple:
     loads = np.array([load, 0.0, 1.3 * load])
-    return model.step(np.zeros((3, *model.state_shape)), np.full((3, 3), 0.01), loads, 1e-3)
+    return model.step(
+        np.zeros((3, *model.state_shape)), np.full((3, 3), 0.01), loads, 1e-3
+    )
 
 
 def of_one(what: str) -> Callable[[Any, float], tuple]:
@@ -69,17 +80,25 @@ def of_one(what: str) -> Callable[[Any, float], tuple]:
 
 
 CALLS: dict[str, Callable[[Any, float], tuple]] = {
-    **{what: of_one(what) for what in ("step", "rate", "wrench", "jacobians", "step_jacobians")},
+    **{
+        what: of_one(what)
+        for what in ("step", "rate", "wrench", "jacobians", "step_jacobians")
+    },
     "batch": of_a_batch,
     "simulate": of_a_scene,
-    "pickle": lambda model, load: pickle.loads(pickle.dumps(model)).step(model.rest(), (0.01, 0.0, 0.0), load, 1e-3),
-    "copy": lambda model, load: copy.copy(model).step(model.rest(), (0.01, 0.0, 0.0), load, 1e-3),
+    "pickle": lambda model, load: pickle.loads(pickle.dumps(model)).step(
+        model.rest(), (0.01, 0.0, 0.0), load, 1e-3
+    ),
+    "copy": lambda model, load: copy.copy(model).step(
+        model.rest(), (0.01, 0.0, 0.0), load, 1e-3
+    ),
 }
 
 
 def at_once(work: Callable[[int], Any]) -> list[Any]:
     """`work(i)` of `THREADS` threads, which begin together and take turns every microsecond."""
-    start, interval = threading.Barrier(THREADS), sys.getswitchinterval()
+    start = threading.Barrier(THREADS)
+    interval = sys.getswitchinterval()
 
     def begin(i: int) -> Any:
         start.wait()
@@ -96,10 +115,13 @@ def at_once(work: Callable[[int], Any]) -> list[Any]:
 def compare(name: str, rounds: int, seed: int) -> None:
     """`rounds` random calls, shared by the threads, of one new model against those of another one used alone."""
     generator = np.random.default_rng(seed)
-    chances = np.array([1.0 if call not in ("simulate", "pickle", "copy") else 0.2 for call in CALLS])
+    chances = np.array(
+        [1.0 if call not in ("simulate", "pickle", "copy") else 0.2 for call in CALLS]
+    )
     calls = generator.choice(list(CALLS), size=rounds, p=chances / chances.sum())
     loads = generator.choice(LOADS, size=rounds)
-    alone, together = MODELS[name](), MODELS[name]()
+    alone = MODELS[name]()
+    together = MODELS[name]()
 
     def run(i: int) -> list[list[np.ndarray]]:
         return [
@@ -109,12 +131,20 @@ def compare(name: str, rounds: int, seed: int) -> None:
 
     found = at_once(run)
     for i, thread in enumerate(found):
-        for call, load, given in zip(calls[i::THREADS], loads[i::THREADS], thread, strict=True):
-            for array, true in zip(given, numbers(CALLS[call](alone, load)), strict=True):
-                np.testing.assert_array_equal(array, true, err_msg=f"{call} at {load} N")
+        for call, load, given in zip(
+            calls[i::THREADS], loads[i::THREADS], thread, strict=True
+        ):
+            for array, true in zip(
+                given, numbers(CALLS[call](alone, load)), strict=True
+            ):
+                np.testing.assert_array_equal(
+                    array, true, err_msg=f"{call} at {load} N"
+                )
     for load in LOADS[::40]:  # and it is sound afterwards
         for array, true in zip(
-            numbers(CALLS["step"](together, load)), numbers(CALLS["step"](alone, load)), strict=True
+            numbers(CALLS["step"](together, load)),
+            numbers(CALLS["step"](alone, load)),
+            strict=True,
         ):
             np.testing.assert_array_equal(array, true)
 
@@ -147,10 +177,19 @@ def test_a_surface_is_built_by_many_threads_as_by_one(name):
         patch = FIXED.with_friction_metric(grain)
         if grain is not None and name == "published table":
             continue
-        true = SURFACES[name](patch).wrench(twist), SURFACES[name](patch).jacobian(twist)
+        true = (
+            SURFACES[name](patch).wrench(twist),
+            SURFACES[name](patch).jacobian(twist),
+        )
         for _ in range(4):
             surface = SURFACES[name](patch)
-            found = at_once(lambda i, of=surface: (of.wrench(twist), of.jacobian(twist), pickle.dumps(of))[:2])
+            found = at_once(
+                lambda i, of=surface: (
+                    of.wrench(twist),
+                    of.jacobian(twist),
+                    pickle.dumps(of),
+                )[:2]
+            )
             for thread in found:
                 np.testing.assert_array_equal(thread[0], true[0])
                 np.testing.assert_array_equal(thread[1], true[1])
@@ -166,18 +205,23 @@ def test_torch_models_share_nothing_that_changes():
     def work(model: Any) -> list[np.ndarray]:
         rolled = pft.rollout(model, None, twist, 1.3, 1e-3)
         stepped = model.step(model.rest(), twist[0], 1.3, 1e-3)
-        gradients = torch.autograd.grad(rolled.wrenches.sum() + stepped[1].sum(), list(model.parameters()))
+        gradients = torch.autograd.grad(
+            rolled.wrenches.sum() + stepped[1].sum(), list(model.parameters())
+        )
         return [tensor.detach().numpy() for tensor in (*rolled, *stepped, *gradients)]
 
     for make in (pft.ReducedModel, pft.ReducedModelPublished, pft.DistributedModel):
-        alone, together = make(FIXED, LAW), make(FIXED, LAW)
+        alone = make(FIXED, LAW)
+        together = make(FIXED, LAW)
         for found in at_once(lambda i, model=together: work(model)):
             for array, true in zip(found, work(alone), strict=True):
                 np.testing.assert_array_equal(array, true)
 
 
 def test_threads_that_ask_for_a_load_at_once_share_its_shape(monkeypatch):
-    shapes, together, built = MODELS["published soft"]().shapes, threading.Barrier(THREADS), []
+    shapes = MODELS["published soft"]().shapes
+    together = threading.Barrier(THREADS)
+    built = []
     at = type(shapes._surface).at
 
     def build_slowly(surface, load):

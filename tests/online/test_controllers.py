@@ -7,7 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, SlideBy, TurnBy
+from planarfriction.online import (
+    FrictionObserver,
+    Hinge,
+    Hold,
+    Measurement,
+    SlideBy,
+    TurnBy,
+)
 from planarfriction.online.loops import friction_filter, grips
 from planarfriction_studies.rig import Gripper, Parts
 from planarfriction_studies.rig.trials import known_model, random_parts, trial
@@ -20,49 +27,73 @@ def few(**changes) -> Parts:
 
 
 def test_parts_are_held_with_less_grip_than_by_the_rule():
-    ours, rule = (trial("hold", few(), 0.0, 1.0, ours=own, seed=0) for own in (True, False))
+    ours, rule = (
+        trial("hold", few(), 0.0, 1.0, ours=own, seed=0) for own in (True, False)
+    )
     assert ours["grip"].sum() < 0.9 * rule["grip"].sum()
     assert np.hypot(*ours["later"][:, :2].T).max() < 1e-3  # taps and a tilt
     assert np.abs(ours["slip"][:, 2]).max() < np.radians(15.0)  # the exploration
     assert np.isfinite(ours["first"]).all()
-    assert np.abs(ours["first"][:, :, 0]).max() < 0.3  # errors of the logs of mu_c, mu_s and radius
+    assert (
+        np.abs(ours["first"][:, :, 0]).max() < 0.3
+    )  # errors of the logs of mu_c, mu_s and radius
     assert (ours["late"] <= 0.02).all()
 
 
-@pytest.mark.parametrize("changes", [{"mu_ratio": 1.15, "delay": 0.035}, {"mass": (0.105,) * COUNT, "delay": 0.03}])
+@pytest.mark.parametrize(
+    "changes",
+    [{"mu_ratio": 1.15, "delay": 0.035}, {"mass": (0.105,) * COUNT, "delay": 0.03}],
+)
 def test_parts_slide_as_far_as_they_shall(changes):
     """Parts that jump 4 mm and more when they break loose, and light ones, whose load seems to fall with the grip."""
-    parts = few(centre=((0.0, -0.01),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0, **changes)
+    parts = few(
+        centre=((0.0, -0.01),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0, **changes
+    )
     slip = trial("slide", parts, -0.02, 1.0, ours=True, seed=0)["slip"]
     assert slip[:, 1] == pytest.approx(-0.02, abs=1e-3)
 
 
 def test_a_part_turns_as_far_as_it_shall():
-    parts = few(centre=((0.025, 0.0),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0, mu_ratio=1.0)
+    parts = few(
+        centre=((0.025, 0.0),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0, mu_ratio=1.0
+    )
     slip = trial("turn", parts, np.radians(-45.0), 1.0, ours=True, seed=0)["slip"]
     assert np.median(np.abs(slip[:, 2] - np.radians(-45.0))) < np.radians(2.0)
 
 
 def test_a_hinge_lets_the_part_hang():
-    parts = few(centre=((0.0, -0.05),) * COUNT, tap=(0.0, 0.0, 0.0), tilt=1.2, tilt_time=0.3, tilt_duration=1.0)
+    parts = few(
+        centre=((0.0, -0.05),) * COUNT,
+        tap=(0.0, 0.0, 0.0),
+        tilt=1.2,
+        tilt_time=0.3,
+        tilt_duration=1.0,
+    )
     gripper = Gripper(parts, 20.0)
-    hinge, sample = Hinge(FrictionObserver(known_model(), batch=COUNT)), gripper.measurement
+    hinge = Hinge(FrictionObserver(known_model(), batch=COUNT))
+    sample = gripper.measurement
     for _ in range(1800):
         sample = gripper.step(hinge.update(sample))
-    assert (gripper.slip[:, 2] < -0.6).all()  # half of the turn and more: friction holds the rest
+    assert (
+        gripper.slip[:, 2] < -0.6
+    ).all()  # half of the turn and more: friction holds the rest
     assert np.hypot(*gripper.slip[:, :2].T).max() < 0.05
 
 
 @pytest.mark.parametrize("load", [0.0, 0.2])
 @pytest.mark.parametrize(
-    "kind, options", [(Hold, {}), (Hinge, {}), (SlideBy, {"goal": -0.02}), (TurnBy, {"goal": -0.5})]
+    "kind, options",
+    [(Hold, {}), (Hinge, {}), (SlideBy, {"goal": -0.02}), (TurnBy, {"goal": -0.5})],
 )
 def test_a_controller_begins_when_the_hand_grips(kind, options, load):
     """Samples of a hand that the observer calls empty, which show the bias, change nothing but that."""
     grips = []
     for each in (lambda own: own.observer, lambda own: own):
         gripper = Gripper(few(delay=0.005), 20.0, seed=1)
-        own = kind(FrictionObserver(known_model(), batch=COUNT, least_load=0.1 + 1.5 * load), **options)
+        own = kind(
+            FrictionObserver(known_model(), batch=COUNT, least_load=0.1 + 1.5 * load),
+            **options,
+        )
         for sample in gripper.empty_hand():
             each(own).update(sample._replace(normal_force=sample.normal_force + load))
         sample = gripper.measurement
@@ -74,36 +105,49 @@ def test_a_controller_begins_when_the_hand_grips(kind, options, load):
 
 def held(make, change=lambda k, sample: sample, steps=1800):
     """Controller and gripper after parts hung still from hands whose samples are changed."""
-    gripper, own = (
-        Gripper(few(tap=(0.0, 0.0, 0.0), tilt=0.0), 20.0, seed=1),
-        FrictionObserver(known_model(), batch=COUNT),
-    )
+    gripper = Gripper(few(tap=(0.0, 0.0, 0.0), tilt=0.0), 20.0, seed=1)
+    own = FrictionObserver(known_model(), batch=COUNT)
     for sample in gripper.empty_hand():
         own.update(sample)
-    control, sample = make(own), gripper.measurement
+    control = make(own)
+    sample = gripper.measurement
     for k in range(steps):
         sample = gripper.step(control.update(change(k, sample)))
     return control, gripper
 
 
-KINDS = {"hold": Hold, "slide": lambda own: SlideBy(own, -0.02), "turn": lambda own: TurnBy(own, -0.5), "hinge": Hinge}
+KINDS = {
+    "hold": Hold,
+    "slide": lambda own: SlideBy(own, -0.02),
+    "turn": lambda own: TurnBy(own, -0.5),
+    "hinge": Hinge,
+}
 DEAD = {"stuck": 0.0, "silent": np.nan}
 
 
 @pytest.mark.parametrize("make", KINDS.values(), ids=KINDS)
 @pytest.mark.parametrize("velocity", DEAD.values(), ids=DEAD)
 def test_a_dead_slip_sensor_drops_nothing(make, velocity):
-    control, gripper = held(make, lambda k, s: s._replace(slip_velocity=s.slip_velocity * 0.0 + velocity))
+    control, gripper = held(
+        make, lambda k, s: s._replace(slip_velocity=s.slip_velocity * 0.0 + velocity)
+    )
     assert np.hypot(*gripper.slip[:, :2].T).max() < 5e-3
     assert control.blind.all()
-    assert (gripper.normal_force > 1.5 * control.state["load"] / 0.52).all()  # by the least friction of the prior
+    assert (
+        gripper.normal_force > 1.5 * control.state["load"] / 0.52
+    ).all()  # by the least friction of the prior
 
 
-@pytest.mark.parametrize("kind, goal, centre", [(SlideBy, -0.02, (0.0, -0.01)), (TurnBy, -0.8, (0.025, 0.0))])
+@pytest.mark.parametrize(
+    "kind, goal, centre", [(SlideBy, -0.02, (0.0, -0.01)), (TurnBy, -0.8, (0.025, 0.0))]
+)
 def test_a_slip_sensor_that_dies_in_a_slip_drops_nothing(kind, goal, centre):
     """It says 0 from a share of the way on, another of each part."""
-    gripper = Gripper(few(centre=(centre,) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0), 20.0, seed=1)
-    control, dead = kind(FrictionObserver(known_model(), batch=COUNT), goal), np.zeros(COUNT, bool)
+    gripper = Gripper(
+        few(centre=(centre,) * COUNT, tap=(0.0, 0.0, 0.0), tilt=0.0), 20.0, seed=1
+    )
+    control = kind(FrictionObserver(known_model(), batch=COUNT), goal)
+    dead = np.zeros(COUNT, bool)
     for sample in gripper.empty_hand():
         control.observer.update(sample)
     sample = gripper.measurement
@@ -120,15 +164,28 @@ def test_a_slip_sensor_that_dies_in_a_slip_drops_nothing(kind, goal, centre):
 @pytest.mark.parametrize("fault", ["dies", "tap"])
 def test_a_hinge_whose_slip_sensor_dies_drops_nothing(fault):
     """It says 0 from a share of the turn on, another of each part; a tap is no such fault."""
-    taps = {"tap": (0.3, 0.3, 2e-3), "tap_time": 2.2} if fault == "tap" else {"tap": (0.0, 0.0, 0.0)}
-    parts = few(centre=((0.0, -0.045),) * COUNT, tilt=1.3, tilt_time=0.5, tilt_duration=2.0, **taps)
+    taps = (
+        {"tap": (0.3, 0.3, 2e-3), "tap_time": 2.2}
+        if fault == "tap"
+        else {"tap": (0.0, 0.0, 0.0)}
+    )
+    parts = few(
+        centre=((0.0, -0.045),) * COUNT,
+        tilt=1.3,
+        tilt_time=0.5,
+        tilt_duration=2.0,
+        **taps,
+    )
     gripper = Gripper(parts, 30.0, seed=1)
-    control, dead = Hinge(FrictionObserver(known_model(), batch=COUNT)), np.zeros(COUNT, bool)
+    control = Hinge(FrictionObserver(known_model(), batch=COUNT))
+    dead = np.zeros(COUNT, bool)
     for sample in gripper.empty_hand():
         control.observer.update(sample)
     sample = gripper.measurement
     for _ in range(3500):
-        dead |= (fault == "dies") & (gripper.slip[:, 2] / -1.3 > np.linspace(0.1, 0.7, COUNT))
+        dead |= (fault == "dies") & (
+            gripper.slip[:, 2] / -1.3 > np.linspace(0.1, 0.7, COUNT)
+        )
         sample.slip_velocity[dead] *= 0.0
         sample = gripper.step(control.update(sample))
     assert dead.all() == control.blind.all() == (fault == "dies")
@@ -142,7 +199,13 @@ def test_a_hinge_whose_slip_sensor_dies_drops_nothing(fault):
 def test_one_wrong_load_is_not_the_grip(make, wrong):
     """The last sample before the filters have settled."""
     right, _ = held(make, steps=40)
-    control, _ = held(make, lambda k, s: s._replace(normal_force=s.normal_force * 0.0 + wrong) if k == 29 else s, 40)
+    control, _ = held(
+        make,
+        lambda k, s: (
+            s._replace(normal_force=s.normal_force * 0.0 + wrong) if k == 29 else s
+        ),
+        40,
+    )
     assert control.state["grip"] == pytest.approx(right.state["grip"], rel=0.02)
 
 
@@ -165,18 +228,26 @@ def test_bad_samples_keep_the_grip_finite():
     hold = Hold(FrictionObserver(known_model()), explore=0.0, most=20.0)
     for k in range(100):
         bad = k % 10 == 9
-        sample = Measurement(1e-3 * k, (0.0, np.nan if bad else 1.0, 0.0), np.nan if bad else 5.0)
+        sample = Measurement(
+            1e-3 * k, (0.0, np.nan if bad else 1.0, 0.0), np.nan if bad else 5.0
+        )
         force = float(hold.update(sample))
         assert np.isfinite(force)
     assert 1.0 / 0.52 < force < 20.0
 
 
 @pytest.mark.parametrize("load", [0.0, 0.05, np.nan])
-@pytest.mark.parametrize("start, most, grip", [(20.0, 60.0, 20.0), (8.0, 60.0, 8.0), (20.0, 15.0, 15.0)])
-def test_an_empty_hand_is_asked_for_the_starting_grip(observer, load, start, most, grip):
+@pytest.mark.parametrize(
+    "start, most, grip", [(20.0, 60.0, 20.0), (8.0, 60.0, 8.0), (20.0, 15.0, 15.0)]
+)
+def test_an_empty_hand_is_asked_for_the_starting_grip(
+    observer, load, start, most, grip
+):
     hold = Hold(observer, start=start, most=most)
     for k in range(3):
-        assert hold.update(Measurement([1e-3 * k], [(0.0, 0.0, 0.0)], [load])).tolist() == [grip]
+        assert hold.update(
+            Measurement([1e-3 * k], [(0.0, 0.0, 0.0)], [load])
+        ).tolist() == [grip]
 
 
 def test_a_clock_that_is_set_back_does_not_stop_a_grip(observer):
@@ -189,15 +260,27 @@ def test_a_clock_that_is_set_back_does_not_stop_a_grip(observer):
 def found(count=1, **changes) -> np.ndarray:
     """Estimate of a part that slips under 1 N, a millisecond after the sample before."""
     one = np.zeros(count, friction_filter.ESTIMATE)
-    given = {"mu_c": 0.5, "radius": 5e-3, "slip": 1.0, "gauge": 0.25, "dt": 1e-3, "normal_force": 4.0, "seen": 1}
-    for name, value in (given | {"wrench": (0.0, 1.0, 0.0), "velocity": np.nan} | changes).items():
+    given = {
+        "mu_c": 0.5,
+        "radius": 5e-3,
+        "slip": 1.0,
+        "gauge": 0.25,
+        "dt": 1e-3,
+        "normal_force": 4.0,
+        "seen": 1,
+    }
+    for name, value in (
+        given | {"wrench": (0.0, 1.0, 0.0), "velocity": np.nan} | changes
+    ).items():
         one[name] = value
     return one
 
 
 def gripped(controller, changes, **state) -> float:
     """The next grip of one part in a state whose filters have settled."""
-    for name, value in ({"age": 1.0, "span": 0.0, "start": 50.0, "grip": 10.0} | state).items():
+    for name, value in (
+        {"age": 1.0, "span": 0.0, "start": 50.0, "grip": 10.0} | state
+    ).items():
         controller.state[name] = value
     controller._grip(controller.state, found(**changes), *controller._settings)
     return float(controller.state["grip"][0])
@@ -209,13 +292,34 @@ LEAST_MU = 0.52 * np.exp(-3.0902 * 0.32)
 
 @pytest.mark.parametrize("make", KINDS.values(), ids=KINDS)
 @pytest.mark.parametrize("absent", ["wrench", "load", "frozen load", "weight"])
-def test_an_absent_measurement_keeps_the_load_and_raises_the_grip(observer, make, absent):
+def test_an_absent_measurement_keeps_the_load_and_raises_the_grip(
+    observer, make, absent
+):
     """A wrench or a load that is not there, a load that does not follow the grip, a wrench below half of the weight."""
     control = make(observer)
-    wrench = {"wrench": (0.0, np.nan, 0.0), "weight": (0.0, 0.45, 0.0)}.get(absent, (0.0, 1.0, 0.0))
-    sample = {"seen": int(absent in ("frozen load", "weight")), "slip": 0.0, "velocity": 0.0, "wrench": wrench}
-    known = {"load": 2.0, "lately": 2.0, "weight": 2.0, "pressed": 8.0, "weighed": 1.0, "pulls": 1.0, "grip": 8.0}
-    known |= {"felt": 4.0, "sent": 8.0 if absent != "frozen load" else 12.0, "still": 0.2}
+    wrench = {"wrench": (0.0, np.nan, 0.0), "weight": (0.0, 0.45, 0.0)}.get(
+        absent, (0.0, 1.0, 0.0)
+    )
+    sample = {
+        "seen": int(absent in ("frozen load", "weight")),
+        "slip": 0.0,
+        "velocity": 0.0,
+        "wrench": wrench,
+    }
+    known = {
+        "load": 2.0,
+        "lately": 2.0,
+        "weight": 2.0,
+        "pressed": 8.0,
+        "weighed": 1.0,
+        "pulls": 1.0,
+        "grip": 8.0,
+    }
+    known |= {
+        "felt": 4.0,
+        "sent": 8.0 if absent != "frozen load" else 12.0,
+        "still": 0.2,
+    }
     gripped(control, sample, **known)
     for _ in range(120):
         control._grip(control.state, found(**sample), *control._settings)
@@ -225,8 +329,13 @@ def test_an_absent_measurement_keeps_the_load_and_raises_the_grip(observer, make
 
 def test_the_grip_does_not_fall_while_a_measurement_is_absent(observer):
     hold = Hold(observer)  # it would fall by a thousandth in a step
-    assert gripped(hold, {"seen": 0, "slip": 0.0}, load=2.0, lately=2.0, weight=2.0) == 10.0
-    assert gripped(hold, {"slip": 0.0}, load=2.0, lately=2.0, weight=2.0) == pytest.approx(10.0 * np.exp(-1e-3))
+    assert (
+        gripped(hold, {"seen": 0, "slip": 0.0}, load=2.0, lately=2.0, weight=2.0)
+        == 10.0
+    )
+    assert gripped(
+        hold, {"slip": 0.0}, load=2.0, lately=2.0, weight=2.0
+    ) == pytest.approx(10.0 * np.exp(-1e-3))
 
 
 @pytest.mark.parametrize(
@@ -235,11 +344,17 @@ def test_the_grip_does_not_fall_while_a_measurement_is_absent(observer):
         ("right", lambda k: (0.0, -2e-3 - 1e-4 * (k % 2), 0.0), False),
         ("frozen", lambda k: (0.0, -2e-3, 0.0), True),
         ("a thousandth", lambda k: (0.0, -2e-5 - 1e-6 * (k % 2), 0.0), True),
-        ("blind along the load", lambda k: (2e-3 + 1e-4 * (k % 2), 0.0, 0.3 + 0.1 * (k % 2)), True),
+        (
+            "blind along the load",
+            lambda k: (2e-3 + 1e-4 * (k % 2), 0.0, 0.3 + 0.1 * (k % 2)),
+            True,
+        ),
         ("sign", lambda k: (0.0, 2e-3 + 1e-4 * (k % 2), 0.0), True),
     ],
 )
-def test_a_slip_velocity_counts_along_the_wrench_and_if_it_changes(observer, name, velocity, sticks):
+def test_a_slip_velocity_counts_along_the_wrench_and_if_it_changes(
+    observer, name, velocity, sticks
+):
     slide = SlideBy(observer, -0.02)
     for k in range(20):
         gripped(slide, {"velocity": velocity(k), "wrench": (0.0, 1.0, 0.0)})
@@ -252,31 +367,59 @@ def observer():
 
 
 @pytest.mark.parametrize("speed, place", [(0.0, 0.0), (0.02, 0.004), (0.005, 0.006)])
-def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(observer, speed, place):
-    slide, delay, top = SlideBy(observer, -0.02), 0.02, 9.81
+def test_the_grip_of_a_slip_is_what_balances_less_what_accelerates(
+    observer, speed, place
+):
+    slide = SlideBy(observer, -0.02)
+    delay = 0.02
+    top = 9.81
     wished, wished_speed, push = grips.trapezoid.py_func(np, 0.5 + delay, 0.02, 2.0)
     a = push + 8.0 * (wished_speed - speed) + 16.0 * (wished - place - speed * delay)
     assert abs(a) < 0.25 * top
-    state = {"balance": 4.0, "began": 0.499, "slid": (0.0, -place, 0.0), "velocity": (0.0, -speed, 0.0)}
+    state = {
+        "balance": 4.0,
+        "began": 0.499,
+        "slid": (0.0, -place, 0.0),
+        "velocity": (0.0, -speed, 0.0),
+    }
     assert gripped(slide, {}, **state) == pytest.approx(4.0 * (1.0 - a / top))
-    follows = 20.0 * (speed - wished_speed - 2.0 * (wished - place - speed * delay)) * 1e-3
+    follows = (
+        20.0 * (speed - wished_speed - 2.0 * (wished - place - speed * delay)) * 1e-3
+    )
     assert np.log(slide.state["balance"][0] / 4.0) == pytest.approx(follows)
 
 
 @pytest.mark.parametrize(
     "kind, goal, near, dips",
-    [(SlideBy, 0.02, 5e-4, False), (SlideBy, 0.02, 2e-3, True), (TurnBy, 0.8, 0.015, False), (TurnBy, 0.8, 0.05, True)],
+    [
+        (SlideBy, 0.02, 5e-4, False),
+        (SlideBy, 0.02, 2e-3, True),
+        (TurnBy, 0.8, 0.015, False),
+        (TurnBy, 0.8, 0.05, True),
+    ],
 )
-def test_a_part_that_sticks_near_its_goal_is_left_or_dips(observer, kind, goal, near, dips):
-    slips, slid = kind(observer, -goal), np.zeros(3)
+def test_a_part_that_sticks_near_its_goal_is_left_or_dips(
+    observer, kind, goal, near, dips
+):
+    slips = kind(observer, -goal)
+    slid = np.zeros(3)
     slid[kind.axis] = near - goal
-    gripped(slips, {"slip": 0.0}, balance=4.0, began=0.5, since=0.2, caught=1.0, slid=tuple(slid))
+    gripped(
+        slips,
+        {"slip": 0.0},
+        balance=4.0,
+        began=0.5,
+        since=0.2,
+        caught=1.0,
+        slid=tuple(slid),
+    )
     assert (slips.state["dipped"] == 0.0).tolist() == [dips]
 
 
 @pytest.mark.parametrize("torque, falls", [(0.02, True), (2e-4, False)])
 def test_a_hinge_releases_what_does_not_hang_yet(observer, torque, falls):
-    hinge, sample = Hinge(observer), {"slip": 0.0, "velocity": 0.0, "wrench": (0.0, 1.0, torque)}
+    hinge = Hinge(observer)
+    sample = {"slip": 0.0, "velocity": 0.0, "wrench": (0.0, 1.0, torque)}
     first = gripped(hinge, sample, found=1.0, force=1.0, torque=torque, since=0.2)
     for _ in range(100):
         hinge._grip(hinge.state, found(**sample), *hinge._settings)

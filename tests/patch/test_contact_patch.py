@@ -23,7 +23,9 @@ CELL = 0.02 / 21
 
 def soft(**changes) -> pf.SoftFinger:
     """The soft finger of the published runs with changing pressure."""
-    return pf.SoftFinger(**{"c": 6 * CELL, "n": 1 / 3, "k": 2.0, "radius_max": 0.01, **changes})
+    return pf.SoftFinger(
+        **{"c": 6 * CELL, "n": 1 / 3, "k": 2.0, "radius_max": 0.01, **changes}
+    )
 
 
 @pytest.mark.parametrize(
@@ -38,7 +40,9 @@ def soft(**changes) -> pf.SoftFinger:
         ("NonConvex2", 84, (2.619048, -0.238095), 6.57142057, 5.083144e-5),
     ],
 )
-def test_published_patches_to_every_printed_digit(name, cells, centre, radius, second_moment):
+def test_published_patches_to_every_printed_digit(
+    name, cells, centre, radius, second_moment
+):
     patch = PUBLISHED_PATCHES[name]()
     assert patch.name == name and patch.cells == cells
     # Half a unit of the last printed digit.
@@ -50,19 +54,27 @@ def test_published_patches_to_every_printed_digit(name, cells, centre, radius, s
 
 @pytest.mark.parametrize("name", PUBLISHED_PATCHES)
 def test_published_patches_scale_with_the_width(name):
-    small, large = PUBLISHED_PATCHES[name](), PUBLISHED_PATCHES[name](width=0.05)
-    assert large.contact_radius() == pytest.approx(2.5 * small.contact_radius(), rel=ROUNDING)
+    small = PUBLISHED_PATCHES[name]()
+    large = PUBLISHED_PATCHES[name](width=0.05)
+    assert large.contact_radius() == pytest.approx(
+        2.5 * small.contact_radius(), rel=ROUNDING
+    )
     assert large.area() == pytest.approx(6.25 * small.area(), rel=ROUNDING)
 
 
 @pytest.mark.parametrize("name", ["Square", "NonConvex1", "NonConvex2"])
 def test_published_blocks_keep_their_shape_on_a_finer_grid(name):
-    coarse, fine = PUBLISHED_PATCHES[name](), PUBLISHED_PATCHES[name](cells=63)
+    coarse = PUBLISHED_PATCHES[name]()
+    fine = PUBLISHED_PATCHES[name](cells=63)
     assert fine.cells == 9 * coarse.cells
-    assert fine.centre_of_pressure() == pytest.approx(coarse.centre_of_pressure(), abs=1e-16)
+    assert fine.centre_of_pressure() == pytest.approx(
+        coarse.centre_of_pressure(), abs=1e-16
+    )
     # Nine point masses at distance 0 and cell/3 about a cell's centre: mean square 2 (2/3) (cell/3)^2.
     gain = 4 / 3 * (CELL / 3) ** 2
-    assert fine.second_moment() == pytest.approx(coarse.second_moment() + gain, rel=ROUNDING)
+    assert fine.second_moment() == pytest.approx(
+        coarse.second_moment() + gain, rel=ROUNDING
+    )
 
 
 def test_published_soft_finger():
@@ -78,9 +90,13 @@ def test_published_soft_finger():
 
 PATCHES = {
     **PUBLISHED_PATCHES,
-    "disc": lambda: pf.ContactPatch.disc(0.01, 7, pressure=LinearGradient((20.0, -30.0))),
+    "disc": lambda: pf.ContactPatch.disc(
+        0.01, 7, pressure=LinearGradient((20.0, -30.0))
+    ),
     "soft": lambda: pf.ContactPatch.rectangle(0.02, cells=9, pressure=soft()),
-    "soft, k of the load": lambda: pf.ContactPatch.disc(0.01, 8, pressure=soft(k=None, k_per_newton=2.0)),
+    "soft, k of the load": lambda: pf.ContactPatch.disc(
+        0.01, 8, pressure=soft(k=None, k_per_newton=2.0)
+    ),
     "points": lambda: pf.ContactPatch.points([(0, 0.1), (0.3, 1 / 3)], [0.1, 0.7]),
 }
 
@@ -95,9 +111,13 @@ def test_weights_are_shares(make):
         weights = patch.weights(load)
         assert (weights >= 0.0).all()
         assert weights.sum() == pytest.approx(1.0, rel=ROUNDING)
-        assert (patch.pressure_values(load) * patch.areas).sum() == pytest.approx(load, rel=ROUNDING)
+        assert (patch.pressure_values(load) * patch.areas).sum() == pytest.approx(
+            load, rel=ROUNDING
+        )
         # r is a mean distance, <rho^2> a mean square one.
-        assert patch.contact_radius(load) ** 2 <= patch.second_moment(load) * (1 + ROUNDING)
+        assert patch.contact_radius(load) ** 2 <= patch.second_moment(load) * (
+            1 + ROUNDING
+        )
 
     check()
 
@@ -105,9 +125,13 @@ def test_weights_are_shares(make):
 @pytest.mark.parametrize("make", PATCHES.values(), ids=PATCHES.keys())
 def test_plain_data_round_trips_to_the_last_bit(make):
     patch = make()
-    again = pf.ContactPatch.from_dict(json.loads(json.dumps(patch.to_dict(), allow_nan=False)))
+    again = pf.ContactPatch.from_dict(
+        json.loads(json.dumps(patch.to_dict(), allow_nan=False))
+    )
     assert (again.name, again.grid) == (patch.name, patch.grid)
-    assert np.array_equal(again.positions, patch.positions) and np.array_equal(again.areas, patch.areas)
+    assert np.array_equal(again.positions, patch.positions) and np.array_equal(
+        again.areas, patch.areas
+    )
     for load in (0.7, 3.0):
         assert np.array_equal(again.weights(load), patch.weights(load))
     assert again.to_dict() == patch.to_dict()
@@ -116,17 +140,25 @@ def test_plain_data_round_trips_to_the_last_bit(make):
 @pytest.mark.filterwarnings("ignore:patch 'points' is .* m wide")
 @settings(deadline=None, max_examples=25)
 @given(
-    st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 10)), min_size=1, max_size=12),
+    st.lists(
+        st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 10)),
+        min_size=1,
+        max_size=12,
+    ),
     st.floats(-math.pi, math.pi),
     st.floats(-3, 3),
 )
 def test_moving_the_points_moves_the_centre_and_nothing_else(points, angle, shift):
     points = np.array(points)
-    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    turn = np.array(
+        [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    )
     patch = pf.ContactPatch.points(points[:, :2], points[:, 2])
     moved = pf.ContactPatch.points(points[:, :2] @ turn.T + shift, points[:, 2])
     # Rounding of coordinates of size 5, squared in <rho^2>.
-    assert moved.centre_of_pressure() == pytest.approx(turn @ patch.centre_of_pressure() + shift, abs=1e-14)
+    assert moved.centre_of_pressure() == pytest.approx(
+        turn @ patch.centre_of_pressure() + shift, abs=1e-14
+    )
     assert moved.contact_radius() == pytest.approx(patch.contact_radius(), abs=1e-14)
     assert moved.second_moment() == pytest.approx(patch.second_moment(), abs=1e-14)
 
@@ -149,21 +181,34 @@ def test_arrays_of_the_caller_are_copied():
 
 
 def test_replace_and_pickle():
-    patch = dataclasses.replace(pf.ContactPatch.rectangle(0.02), pressure=soft(), name="finger")
+    patch = dataclasses.replace(
+        pf.ContactPatch.rectangle(0.02), pressure=soft(), name="finger"
+    )
     assert (patch.name, patch.cells, patch.depends_on_load) == ("finger", 349, True)
-    assert np.array_equal(pickle.loads(pickle.dumps(patch)).weights(1.0), patch.weights(1.0))
-    assert repr(patch) == "ContactPatch('finger', 349 cells of 21 x 21, SoftFinger pressure)"
+    assert np.array_equal(
+        pickle.loads(pickle.dumps(patch)).weights(1.0), patch.weights(1.0)
+    )
+    assert (
+        repr(patch)
+        == "ContactPatch('finger', 349 cells of 21 x 21, SoftFinger pressure)"
+    )
 
 
 def test_refined_patches_keep_their_load_and_come_closer_to_the_continuum():
-    square, line = pf.ContactPatch.rectangle(0.02, cells=7), pf.ContactPatch.line(0.02, 7)
+    square = pf.ContactPatch.rectangle(0.02, cells=7)
+    line = pf.ContactPatch.line(0.02, 7)
     exact = {"square": 0.02**2 / 6, "line": 0.02**2 / 12}
     for name, patch in {"square": square, "line": line}.items():
         fine = patch.refined(3)
         assert fine.cells == patch.cells * (9 if name == "square" else 3)
         assert fine.area() == pytest.approx(patch.area(), rel=1e-12)
-        error = [exact[name] - p.tile_weights() @ (p.positions**2).sum(1) for p in (patch, fine)]
-        assert error[0] / error[1] == pytest.approx(9.0, rel=1e-6)  # the midpoint rule is of second order
+        error = [
+            exact[name] - p.tile_weights() @ (p.positions**2).sum(1)
+            for p in (patch, fine)
+        ]
+        assert error[0] / error[1] == pytest.approx(
+            9.0, rel=1e-6
+        )  # the midpoint rule is of second order
         assert fine.second_moment() == pytest.approx(exact[name], rel=1e-12)
     assert (line.refined(3).positions[:, 0] == 0.0).all()
 
@@ -171,7 +216,11 @@ def test_refined_patches_keep_their_load_and_come_closer_to_the_continuum():
 def test_refined_maps_repeat_their_pressures_and_points_stay_points():
     patch = pf.ContactPatch.from_pressure([[1.0, 0.0], [2.0, 5.0]], 1e-3)
     fine = patch.refined(2)
-    np.testing.assert_allclose(fine.weights().reshape(3, 4).sum(axis=1), patch.weights(), rtol=1e-14)
-    np.testing.assert_allclose(fine.centre_of_pressure(), patch.centre_of_pressure(), atol=1e-18)
+    np.testing.assert_allclose(
+        fine.weights().reshape(3, 4).sum(axis=1), patch.weights(), rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        fine.centre_of_pressure(), patch.centre_of_pressure(), atol=1e-18
+    )
     feet = pf.ContactPatch.points([[0.0, 0.0], [0.1, 0.0]])
     assert feet.refined(4) is feet

@@ -16,7 +16,9 @@ from planarfriction.patch import PUBLISHED_PATCHES
 DISC = pf.ContactPatch.disc(0.01)
 L_SHAPE = np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]) * 0.01
 FINGER = pf.ContactPatch.rectangle(
-    0.02, cells=21, pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k_per_newton=2.0, radius_max=0.01)
+    0.02,
+    cells=21,
+    pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k_per_newton=2.0, radius_max=0.01),
 )
 SHAPES = {
     "disc": DISC,
@@ -25,10 +27,16 @@ SHAPES = {
     "L": pf.ContactPatch.polygon(L_SHAPE),
     "line": pf.ContactPatch.line(0.02, 40, profile=lambda y: 1.0 + 60.0 * y),
     "T": PUBLISHED_PATCHES["NonConvex2"](),
-    "peak": pf.ContactPatch.disc(0.01, pressure=lambda x, y: np.exp(-((x - 0.008) ** 2 + y**2) / 1.8e-5)),
+    "peak": pf.ContactPatch.disc(
+        0.01, pressure=lambda x, y: np.exp(-((x - 0.008) ** 2 + y**2) / 1.8e-5)
+    ),
     "bar": pf.ContactPatch.rectangle(0.03, 0.001, cells=(61, 3)),
-    "points": pf.ContactPatch.points(np.random.default_rng(2).normal(size=(60, 2)) * 0.01),
-    "parallelogram": pf.ContactPatch.polygon(np.array([(0, 0), (2, 0), (2.6, 1), (0.6, 1)]) * 0.01),
+    "points": pf.ContactPatch.points(
+        np.random.default_rng(2).normal(size=(60, 2)) * 0.01
+    ),
+    "parallelogram": pf.ContactPatch.polygon(
+        np.array([(0, 0), (2, 0), (2.6, 1), (0.6, 1)]) * 0.01
+    ),
 }
 EXACT = 1e-13
 """Rounding of sums over a few hundred cells."""
@@ -45,8 +53,13 @@ def kept(discs: pf.ContactPatch, patch: pf.ContactPatch) -> None:
     centre = w @ patch.positions
     second = w @ (((patch.positions - centre) ** 2).sum(axis=1) + own(patch))
     size = np.sqrt(second)
-    assert discs.weights().sum() == pytest.approx(1.0, abs=EXACT) and (discs.weights() > 0.0).all()
-    assert discs.centre_of_pressure() == pytest.approx(centre, abs=EXACT * max(size, np.abs(patch.positions).max()))
+    assert (
+        discs.weights().sum() == pytest.approx(1.0, abs=EXACT)
+        and (discs.weights() > 0.0).all()
+    )
+    assert discs.centre_of_pressure() == pytest.approx(
+        centre, abs=EXACT * max(size, np.abs(patch.positions).max())
+    )
     assert discs.second_moment() == pytest.approx(second, rel=EXACT)
     assert discs.areas.sum() == pytest.approx(patch.areas.sum(), rel=EXACT)
 
@@ -57,12 +70,19 @@ def rows(patch: pf.ContactPatch) -> np.ndarray:
     return numbers[np.lexsort(np.round(numbers[:, :2], 3).T)]
 
 
-def wrench_error(discs: pf.ContactPatch, patch: pf.ContactPatch, load: float | None = None) -> float:
+def wrench_error(
+    discs: pf.ContactPatch, patch: pf.ContactPatch, load: float | None = None
+) -> float:
     """Largest error of the force over `mu f_N` while both slide about the same points of the patch."""
     rng = np.random.default_rng(0)
-    centres = patch.positions[rng.integers(patch.cells, size=300)] + 1e-4 * rng.normal(size=(300, 2))
+    centres = patch.positions[rng.integers(patch.cells, size=300)] + 1e-4 * rng.normal(
+        size=(300, 2)
+    )
     twists = np.column_stack([centres[:, 1], -centres[:, 0], np.ones(300)])
-    one, other = (pf.LimitSurfaceCells(each, normal_force=load).wrench(twists) for each in (discs, patch))
+    one, other = (
+        pf.LimitSurfaceCells(each, normal_force=load).wrench(twists)
+        for each in (discs, patch)
+    )
     return float(np.sqrt(((one - other)[:, :2] ** 2).sum(axis=1).mean()))
 
 
@@ -81,13 +101,20 @@ def test_discs_keep_load_centre_and_second_moment(name, n):
 def test_shapes_by_name_keep_the_second_moment_of_their_points():
     """Points have shares with which their second moments are those of the areas, and so have discs."""
     for name in ("disc", "square", "L", "slanted"):
-        assert SHAPES[name].discs(24).second_moment() == pytest.approx(SHAPES[name].second_moment(), rel=EXACT)
+        assert SHAPES[name].discs(24).second_moment() == pytest.approx(
+            SHAPES[name].second_moment(), rel=EXACT
+        )
 
 
 def test_each_cell_is_the_disc_of_its_own_second_moment():
-    square, line = SHAPES["square"].discs(), SHAPES["line"].discs()
-    assert square.radii == pytest.approx(0.02 / 21 / np.sqrt(3.0), rel=1e-14)  # a^2/2 = h^2/6
-    assert line.radii == pytest.approx(0.02 / 40 / np.sqrt(6.0), rel=1e-14)  # a^2/2 = h^2/12
+    square = SHAPES["square"].discs()
+    line = SHAPES["line"].discs()
+    assert square.radii == pytest.approx(
+        0.02 / 21 / np.sqrt(3.0), rel=1e-14
+    )  # a^2/2 = h^2/6
+    assert line.radii == pytest.approx(
+        0.02 / 40 / np.sqrt(6.0), rel=1e-14
+    )  # a^2/2 = h^2/12
     assert SHAPES["points"].discs() is SHAPES["points"]
     cut = DISC.discs()
     assert cut.radii == pytest.approx(np.sqrt(DISC.areas / 3.0), rel=1e-14)
@@ -121,7 +148,9 @@ def test_discs_of_a_symmetric_patch_are_symmetric(n):
         discs = patch.discs(n)
         offset = discs.positions - discs.centre_of_pressure()
         for flip in flips:
-            image = np.hypot(*(offset[:, None] * flip - offset).transpose(2, 0, 1)).argmin(axis=1)
+            image = np.hypot(
+                *(offset[:, None] * flip - offset).transpose(2, 0, 1)
+            ).argmin(axis=1)
             assert offset[image] == pytest.approx(offset * flip, abs=1e-12)
             assert discs.weights()[image] == pytest.approx(discs.weights(), rel=EXACT)
             assert discs.radii[image] == pytest.approx(discs.radii, rel=EXACT)
@@ -143,10 +172,18 @@ def test_the_order_of_cells_does_not_matter():
         order = np.random.default_rng(1).permutation(patch.cells)
         pressure = patch.tile_weights() / patch.areas
         mixed, same = (
-            pf.ContactPatch(patch.positions[each], patch.areas[each], pressure[each], None, cell_size=patch.cell_size)
+            pf.ContactPatch(
+                patch.positions[each],
+                patch.areas[each],
+                pressure[each],
+                None,
+                cell_size=patch.cell_size,
+            )
             for each in (order, slice(None))
         )
-        assert rows(mixed.discs(17)) == pytest.approx(rows(same.discs(17)), abs=1e-5), name
+        assert rows(mixed.discs(17)) == pytest.approx(rows(same.discs(17)), abs=1e-5), (
+            name
+        )
 
 
 @pytest.mark.parametrize("name", ["slanted", "L", "line", "T", "points"])
@@ -159,8 +196,13 @@ def test_discs_move_turn_and_grow_with_the_patch(name, angle):
         2.0 * patch.positions @ turn.T + [0.05, -0.02], 4.0 * patch.areas, patch.weights() / patch.areas,
         radii=2.0 * patch.radii,
     )  # fmt: skip
-    few, other = patch.discs(16), moved.discs(16)
-    back = dataclasses.replace(other, positions=0.5 * (other.positions - [0.05, -0.02]) @ turn, radii=0.5 * other.radii)
+    few = patch.discs(16)
+    other = moved.discs(16)
+    back = dataclasses.replace(
+        other,
+        positions=0.5 * (other.positions - [0.05, -0.02]) @ turn,
+        radii=0.5 * other.radii,
+    )
     assert rows(back) == pytest.approx(rows(few), abs=1e-4)
 
 
@@ -178,7 +220,11 @@ def test_errors_of_friction_fall_with_the_number_of_discs(name):
 
 def test_kinds_of_friction_never_share_a_disc():
     left = DISC.positions[:, 0] < 0.0
-    metric = np.where(left[:, None, None], pf.friction_metric(0.0, 1.0, 0.5), pf.friction_metric(0.3, 0.7, 1.0))
+    metric = np.where(
+        left[:, None, None],
+        pf.friction_metric(0.0, 1.0, 0.5),
+        pf.friction_metric(0.3, 0.7, 1.0),
+    )
     patch = DISC.with_friction_metric(metric)
     for n in (1, 2, 9, 20):
         few = patch.discs(n)
@@ -188,17 +234,28 @@ def test_kinds_of_friction_never_share_a_disc():
             share = DISC.tile_weights()[cells].sum()
             assert few.weights()[side].sum() == pytest.approx(share, rel=EXACT)
             centre = DISC.tile_weights()[cells] @ DISC.positions[cells]
-            assert few.weights()[side] @ few.positions[side] == pytest.approx(centre, abs=EXACT * 0.01)
-        assert few.second_moment() == pytest.approx(patch.discs().second_moment(), rel=EXACT)
-    leaning = DISC.with_friction_metric(None, np.where(left[:, None], 0.1, -0.1) * np.ones(2))
-    assert set(map(tuple, leaning.discs(1).asymmetry.tolist())) == {(0.1, 0.1), (-0.1, -0.1)}
+            assert few.weights()[side] @ few.positions[side] == pytest.approx(
+                centre, abs=EXACT * 0.01
+            )
+        assert few.second_moment() == pytest.approx(
+            patch.discs().second_moment(), rel=EXACT
+        )
+    leaning = DISC.with_friction_metric(
+        None, np.where(left[:, None], 0.1, -0.1) * np.ones(2)
+    )
+    assert set(map(tuple, leaning.discs(1).asymmetry.tolist())) == {
+        (0.1, 0.1),
+        (-0.1, -0.1),
+    }
 
 
 def test_one_metric_for_all_cells_stays_one():
     metric = pf.friction_metric(0.4, 2.0, 0.5)
     few = DISC.with_friction_metric(metric, (0.1, 0.0)).discs(10)
     assert few.metric == pytest.approx(metric) and few.asymmetry.tolist() == [0.1, 0.0]
-    assert few.second_moment() == pytest.approx(DISC.discs().with_friction_metric(metric).second_moment(), rel=EXACT)
+    assert few.second_moment() == pytest.approx(
+        DISC.discs().with_friction_metric(metric).second_moment(), rel=EXACT
+    )
 
 
 # ---------------------------------------------------------------------- loads and moments
@@ -206,15 +263,23 @@ def test_one_metric_for_all_cells_stays_one():
 
 @pytest.mark.parametrize("load", [0.0, 0.3, 0.77, 1.0, 2.4, 8.0, 100.0])
 def test_shares_follow_the_load(load):
-    few, whole = FINGER.discs(24), FINGER.discs()
-    shares, weights = few.weights(load), FINGER.weights(load)
+    few = FINGER.discs(24)
+    whole = FINGER.discs()
+    shares = few.weights(load)
+    weights = FINGER.weights(load)
     assert few.cells <= 48 and (shares >= 0.0).all()
     assert shares.sum() == pytest.approx(weights.sum(), rel=EXACT)
     assert few.weights([load, 1.0])[0] == pytest.approx(shares, rel=EXACT)
     if load >= 1.0:  # discs are large for the smallest contacts
-        assert few.centre_of_pressure(load) == pytest.approx(FINGER.centre_of_pressure(load), abs=1e-9 * 0.01)
-        assert few.second_moment(load) == pytest.approx(whole.second_moment(load), rel=1e-9)
-        assert few.contact_radius(load) == pytest.approx(whole.contact_radius(load), rel=1e-9)
+        assert few.centre_of_pressure(load) == pytest.approx(
+            FINGER.centre_of_pressure(load), abs=1e-9 * 0.01
+        )
+        assert few.second_moment(load) == pytest.approx(
+            whole.second_moment(load), rel=1e-9
+        )
+        assert few.contact_radius(load) == pytest.approx(
+            whole.contact_radius(load), rel=1e-9
+        )
 
 
 def test_a_patch_that_depends_on_its_load_keeps_its_discs_in_files():
@@ -225,22 +290,36 @@ def test_a_patch_that_depends_on_its_load_keeps_its_discs_in_files():
 
 
 def test_shares_change_without_jumps():
-    few, loads = FINGER.discs(24), np.linspace(0.8, 1.2, 4001)
-    whole, moved = (np.abs(np.diff(patch.weights(loads), axis=0)).sum(axis=1) for patch in (FINGER, few))
-    assert moved.max() < 3.0 * whole.max()  # a cell that comes in moves its whole share at once in both
+    few = FINGER.discs(24)
+    loads = np.linspace(0.8, 1.2, 4001)
+    whole, moved = (
+        np.abs(np.diff(patch.weights(loads), axis=0)).sum(axis=1)
+        for patch in (FINGER, few)
+    )
+    assert (
+        moved.max() < 3.0 * whole.max()
+    )  # a cell that comes in moves its whole share at once in both
 
 
 @pytest.mark.parametrize("loads", [(1.0, 2.0), (1e7, 2e7)])
 def test_maps_at_several_loads(loads):
     values = np.random.default_rng(0).random((12, 12))
-    patch = pf.ContactPatch.from_pressure({load: values**k for k, load in enumerate(loads, 1)}, 1e-3)
+    patch = pf.ContactPatch.from_pressure(
+        {load: values**k for k, load in enumerate(loads, 1)}, 1e-3
+    )
     few = patch.discs(20)
     assert few.cells <= 40
     for load in loads:
         whole = patch.discs()
-        assert few.centre_of_pressure(load) == pytest.approx(whole.centre_of_pressure(load), abs=1e-9 * 0.01)
-        assert few.second_moment(load) == pytest.approx(whole.second_moment(load), rel=1e-9)
-        assert few.contact_radius(load) == pytest.approx(whole.contact_radius(load), rel=1e-9)
+        assert few.centre_of_pressure(load) == pytest.approx(
+            whole.centre_of_pressure(load), abs=1e-9 * 0.01
+        )
+        assert few.second_moment(load) == pytest.approx(
+            whole.second_moment(load), rel=1e-9
+        )
+        assert few.contact_radius(load) == pytest.approx(
+            whole.contact_radius(load), rel=1e-9
+        )
 
 
 def test_pressure_that_follows_moments_tilts_the_shares_of_discs():
@@ -253,7 +332,8 @@ def test_pressure_that_follows_moments_tilts_the_shares_of_discs():
 
 
 def test_discs_are_chosen_once_for_equal_patches_and_anew_for_others():
-    few, again = DISC.discs(24), pf.ContactPatch.disc(0.01)
+    few = DISC.discs(24)
+    again = pf.ContactPatch.disc(0.01)
     assert again.discs(24) is few
     others = [
         pf.ContactPatch.disc(np.nextafter(0.01, 1.0)),
@@ -277,7 +357,10 @@ def test_cells_in_one_place_are_one_disc():
     [
         (lambda: DISC.discs(0), "n must be an integer >= 1, got 0"),
         (lambda: DISC.discs(2.5), "n must be an integer >= 1, got 2.5"),
-        (lambda: DISC.compressed(5, cells=40), r"compressed must be replaced by discs\(n\)"),
+        (
+            lambda: DISC.compressed(5, cells=40),
+            r"compressed must be replaced by discs\(n\)",
+        ),
     ],
 )
 def test_wrong_calls_are_one_line(call, message):

@@ -26,55 +26,84 @@ def test_the_force_on_a_line_errs_by_the_loads_on_both_sides(cells):
     line = dataclasses.replace(pf.ContactPatch.line(0.02, cells), radii=None)
     near = line.positions[np.abs(line.positions[:, 1]) < 0.02 / 4, 1]
     turns = np.concatenate([near - 0.01 * 0.02 / cells, near + 0.01 * 0.02 / cells])
-    sides = np.sign(line.positions[:, 1] - turns[:, None]) @ line.weights() + 2.0 * turns / 0.02
+    sides = (
+        np.sign(line.positions[:, 1] - turns[:, None]) @ line.weights()
+        + 2.0 * turns / 0.02
+    )
     assert line.grid_error().force == pytest.approx(np.abs(sides).max(), rel=1e-6)
 
 
 def test_a_spin_of_a_square_shows_what_the_points_miss():
     """The largest error of the torque is no less than that of the spin about the middle: `r_cells/r - 1`."""
     patch = pf.ContactPatch.rectangle(0.02, cells=9)
-    missing = abs(1.0 - patch.contact_radius() / pf.LimitSurfaceExact(patch).contact_radius)
+    missing = abs(
+        1.0 - patch.contact_radius() / pf.LimitSurfaceExact(patch).contact_radius
+    )
     error = patch.grid_error()
     assert error.torque > 0.9 * missing > 0.0
     spin = np.array([0.0, 0.0, 1.0])
     surfaces = pf.LimitSurfaceExact(patch), pf.LimitSurfaceCells(patch)
-    exact, cells = (float(spin @ each.twist(-spin) / each.dissipation(each.twist(-spin))) for each in surfaces)
-    assert error.breakaway >= 0.8 * abs(cells / exact - 1.0) > 0.0  # no direction is that of a spin alone
+    exact, cells = (
+        float(spin @ each.twist(-spin) / each.dissipation(each.twist(-spin)))
+        for each in surfaces
+    )
+    assert (
+        error.breakaway >= 0.8 * abs(cells / exact - 1.0) > 0.0
+    )  # no direction is that of a spin alone
 
 
 @pytest.mark.parametrize(
     "patch",
     [
         pf.ContactPatch.disc(0.01, 9),
-        pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.LinearGradient((60.0, 30.0))),
+        pf.ContactPatch.rectangle(
+            0.02, cells=7, pressure=pf.LinearGradient((60.0, 30.0))
+        ),
         PUBLISHED_PATCHES["NonConvex1"](),
-        pf.ContactPatch.rectangle(0.02, 0.01, 9).with_friction_metric(pf.friction_metric(0.3, 0.5, 1.0)),
+        pf.ContactPatch.rectangle(0.02, 0.01, 9).with_friction_metric(
+            pf.friction_metric(0.3, 0.5, 1.0)
+        ),
     ],
     ids=["disc", "gradient", "pads", "brushed"],
 )
 def test_finer_cells_have_smaller_errors(patch):
     """All fall with the area of a cell, to a ninth; rims and pressure laws leave up to a fifth."""
-    coarse, fine = patch.grid_error(), patch.grid_error(refined=3)
+    coarse = patch.grid_error()
+    fine = patch.grid_error(refined=3)
     assert fine.cells == 9 * coarse.cells
     for name in ("force", "torque", "breakaway"):
         assert getattr(fine, name) < 0.2 * getattr(coarse, name)
 
 
 def test_errors_of_cells_as_discs_stand_beside_those_of_points():
-    for patch in (pf.ContactPatch.disc(0.01, 9), dataclasses.replace(pf.ContactPatch.line(0.02, 9), radii=None)):
+    for patch in (
+        pf.ContactPatch.disc(0.01, 9),
+        dataclasses.replace(pf.ContactPatch.line(0.02, 9), radii=None),
+    ):
         error = patch.grid_error()
-        assert error.as_discs == patch.discs().grid_error() and error.as_discs.as_discs is None
+        assert (
+            error.as_discs == patch.discs().grid_error()
+            and error.as_discs.as_discs is None
+        )
         for name in ("force", "torque", "breakaway"):
             assert getattr(error.as_discs, name) < 0.9 * getattr(error, name)
         assert str(error).endswith(f"; as discs {error.as_discs}".partition(" (")[0])
-    coarse, fine = patch.grid_error(), patch.grid_error(refined=3)
-    assert fine.as_discs.cells == 27 and fine.as_discs.force < 0.5 * coarse.as_discs.force
-    assert fine.as_discs.torque == pytest.approx(patch.refined(3).discs().grid_error().torque, rel=1e-6)
+    coarse = patch.grid_error()
+    fine = patch.grid_error(refined=3)
+    assert (
+        fine.as_discs.cells == 27 and fine.as_discs.force < 0.5 * coarse.as_discs.force
+    )
+    assert fine.as_discs.torque == pytest.approx(
+        patch.refined(3).discs().grid_error().torque, rel=1e-6
+    )
 
 
 def test_a_shape_that_follows_its_load_is_compared_at_that_load():
-    patch = pf.ContactPatch.disc(0.01, 15, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
-    small, large = patch.grid_error(1.0), patch.grid_error(8.0)
+    patch = pf.ContactPatch.disc(
+        0.01, 15, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0)
+    )
+    small = patch.grid_error(1.0)
+    large = patch.grid_error(8.0)
     assert small.force > large.force  # fewer cells carry the smaller load
     with pytest.raises(InvalidValueError, match="normal_force must be given"):
         patch.grid_error()

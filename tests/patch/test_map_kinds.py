@@ -43,18 +43,33 @@ def csv(values, head=""):
 
 def numbered(name, count, first=""):
     """Return a header with numbered names."""
-    return ",".join([*([first] if first else []), *(f"{name}{i}" for i in range(count))]) + "\n"
+    return (
+        ",".join([*([first] if first else []), *(f"{name}{i}" for i in range(count))])
+        + "\n"
+    )
 
 
 def saved(kind, values):
     """Return the bytes of a file of an array."""
     file = io.BytesIO()
-    {"npy": np.save, "npz": np.savez_compressed, "mat": lambda file, p: savemat(file, {"p": p})}[kind](file, values)
+    {
+        "npy": np.save,
+        "npz": np.savez_compressed,
+        "mat": lambda file, p: savemat(file, {"p": p}),
+    }[kind](file, values)
     return file.getvalue()
 
 
-LABELS, LIST, SHAPE = "labels (index = true)", "make it a table with a row for each y", "frame_shape"
-MANY, DIGITS, CELLS = "write thousands without", "write the digits 0 to 9", "part cells by commas"
+LABELS, LIST, SHAPE = (
+    "labels (index = true)",
+    "make it a table with a row for each y",
+    "frame_shape",
+)
+MANY, DIGITS, CELLS = (
+    "write thousands without",
+    "write the digits 0 to 9",
+    "part cells by commas",
+)
 FORMS = {  # what the file is: its kind, its content, options, and what it gives
     "commas": ("csv", ROWS, {}, MAP),
     "semicolons": ("csv", ROWS.replace(",", ";"), {}, MAP),
@@ -70,10 +85,25 @@ FORMS = {  # what the file is: its kind, its content, options, and what it gives
     "UTF-8 with its mark": ("csv", ROWS.encode("utf-8-sig"), {}, MAP),
     "UTF-16": ("csv", ROWS.encode("utf-16"), {}, MAP),
     "UTF-16, other order": ("csv", b"\xfe\xff" + ROWS.encode("utf-16-be"), {}, MAP),
-    "UTF-16 without its mark": ("csv", ROWS.encode("utf-16-le"), {}, "save it as UTF-8"),
-    "letters of Latin-1": ("csv", "# \xb5bar\n".encode("latin-1") + ROWS.encode(), {}, "save it as UTF-8"),
+    "UTF-16 without its mark": (
+        "csv",
+        ROWS.encode("utf-16-le"),
+        {},
+        "save it as UTF-8",
+    ),
+    "letters of Latin-1": (
+        "csv",
+        "# \xb5bar\n".encode("latin-1") + ROWS.encode(),
+        {},
+        "save it as UTF-8",
+    ),
     "commas at line ends": ("csv", ROWS.replace("\n", ",\n"), {}, MAP),
-    "semicolons at line ends": ("csv", ROWS.replace(",", ";").replace("\n", ";\n"), {}, MAP),
+    "semicolons at line ends": (
+        "csv",
+        ROWS.replace(",", ";").replace("\n", ";\n"),
+        {},
+        MAP,
+    ),
     "commas at some line ends": ("csv", ROWS.replace("5\n", "5,\n"), {}, MAP),
     "sep= of Excel": ("csv", "sep=;\n" + ROWS.replace(",", ";"), {}, MAP),
     "spaces between": ("csv", ROWS.replace(",", " "), {}, CELLS),
@@ -93,40 +123,125 @@ FORMS = {  # what the file is: its kind, its content, options, and what it gives
     "numbers beside": ("csv", "0,5\n1,6\n2,7\n", {}, LABELS),
     "numbers above": ("csv", "0,1,2\n5,6,7\n", {}, "labels (header = true)"),
     "a column of time": ("csv", csv(np.column_stack([TIME, FRAMES])), {}, LABELS),
-    "a column of time, a ramp": ("csv", csv(np.outer(TIME, [1.0, *PAD.ravel()])), {}, LABELS),
-    "time that does not begin at 0": ("csv", csv(np.column_stack([17.3 + TIME, FRAMES])), {}, LABELS),
-    "time of an uneven clock": ("csv", csv(np.column_stack([TIME + 3e-4 * NOISE[:, 0], FRAMES])), {}, LABELS),
-    "time with its name": ("csv", csv(np.c_[TIME, FRAMES], numbered("p", 48, "Time [s]")), {}, SHAPE),
-    "time and the shape": ("csv", csv(np.c_[TIME, FRAMES]), {"frame_shape": (6, 8), "frame": 7}, FRAMES[7]),
-    "time that is no pressure": ("csv", csv(np.c_[TIME[:9], PAD.ravel()[:9]]), {"index": True}, PAD.ravel()[:9]),
-    "heights beside": ("csv", csv(np.column_stack([2.5 - 0.5 * np.arange(6), PAD])), {}, LABELS),
-    "heights beside, told": ("csv", csv(np.column_stack([2.5 - 0.5 * np.arange(6), PAD])), {"index": True}, PAD),
+    "a column of time, a ramp": (
+        "csv",
+        csv(np.outer(TIME, [1.0, *PAD.ravel()])),
+        {},
+        LABELS,
+    ),
+    "time that does not begin at 0": (
+        "csv",
+        csv(np.column_stack([17.3 + TIME, FRAMES])),
+        {},
+        LABELS,
+    ),
+    "time of an uneven clock": (
+        "csv",
+        csv(np.column_stack([TIME + 3e-4 * NOISE[:, 0], FRAMES])),
+        {},
+        LABELS,
+    ),
+    "time with its name": (
+        "csv",
+        csv(np.c_[TIME, FRAMES], numbered("p", 48, "Time [s]")),
+        {},
+        SHAPE,
+    ),
+    "time and the shape": (
+        "csv",
+        csv(np.c_[TIME, FRAMES]),
+        {"frame_shape": (6, 8), "frame": 7},
+        FRAMES[7],
+    ),
+    "time that is no pressure": (
+        "csv",
+        csv(np.c_[TIME[:9], PAD.ravel()[:9]]),
+        {"index": True},
+        PAD.ravel()[:9],
+    ),
+    "heights beside": (
+        "csv",
+        csv(np.column_stack([2.5 - 0.5 * np.arange(6), PAD])),
+        {},
+        LABELS,
+    ),
+    "heights beside, told": (
+        "csv",
+        csv(np.column_stack([2.5 - 0.5 * np.arange(6), PAD])),
+        {"index": True},
+        PAD,
+    ),
     "frames in rows": ("csv", csv(FRAMES), {}, SHAPE),
     "frames in rows, named": ("csv", csv(FRAMES, numbered("taxel", 48)), {}, SHAPE),
-    "frames in rows and the shape": ("csv", csv(FRAMES), {"frame_shape": (6, 8), "frame": 7}, FRAMES[7]),
+    "frames in rows and the shape": (
+        "csv",
+        csv(FRAMES),
+        {"frame_shape": (6, 8), "frame": 7},
+        FRAMES[7],
+    ),
     "frames in an array": ("npy", saved("npy", FRAMES), {}, SHAPE),
     "time in an array": ("npz", saved("npz", np.c_[TIME, FRAMES]), {}, LABELS),
-    "time in an array, told": ("mat", saved("mat", np.c_[TIME[:6], PAD]), {"index": True}, PAD),
+    "time in an array, told": (
+        "mat",
+        saved("mat", np.c_[TIME[:6], PAD]),
+        {"index": True},
+        PAD,
+    ),
     "a list": ("csv", csv(PLACES), {}, LIST),
     "a list with names": ("csv", csv(PLACES[:5], "x [mm],y [mm],kPa\n"), {}, LIST),
-    "a list with numbers": ("csv", csv(np.c_[np.arange(48), PLACES], ",X,Y,p\n"), {}, LIST),
+    "a list with numbers": (
+        "csv",
+        csv(np.c_[np.arange(48), PLACES], ",X,Y,p\n"),
+        {},
+        LIST,
+    ),
     "a list of what is loaded": ("csv", csv(PLACES[PLACES[:, 2] > 0.0]), {}, LIST),
-    "a list by columns": ("csv", csv(PLACES.reshape(6, 8, 3).swapaxes(0, 1).reshape(48, 3)), {}, LIST),
+    "a list by columns": (
+        "csv",
+        csv(PLACES.reshape(6, 8, 3).swapaxes(0, 1).reshape(48, 3)),
+        {},
+        LIST,
+    ),
     "a list, pressures first": ("csv", csv(PLACES[:, [2, 0, 1]]), {}, LIST),
     "a list in an array": ("npy", saved("npy", PLACES), {}, LIST),
     "an offset": ("csv", csv(OFFSET), {}, "its rim is flat at 100"),
-    "an offset in an array": ("npy", saved("npy", OFFSET), {}, "leave out such cells by threshold"),
-    "an offset, told": ("csv", csv(np.round(OFFSET)), {"threshold": 0.5}, np.where(PAD > 1.5, np.round(OFFSET), 0.0)),
+    "an offset in an array": (
+        "npy",
+        saved("npy", OFFSET),
+        {},
+        "leave out such cells by threshold",
+    ),
+    "an offset, told": (
+        "csv",
+        csv(np.round(OFFSET)),
+        {"threshold": 0.5},
+        np.where(PAD > 1.5, np.round(OFFSET), 0.0),
+    ),
     "a log": ("log", csv(LOG, "time,fx\n"), {}, LOG),
-    "a log with units below": ("log", csv(LOG, "time,fx\ns,N\n"), {"names": ("time [s]", "fx [N]")}, LOG),
+    "a log with units below": (
+        "log",
+        csv(LOG, "time,fx\ns,N\n"),
+        {"names": ("time [s]", "fx [N]")},
+        LOG,
+    ),
     "a log in UTF-16": ("log", csv(LOG, "time,fx\n").encode("utf-16"), {}, LOG),
-    "a log, commas at its line ends": ("log", csv(LOG, "time,fx\n").replace("\n", ",\n"), {}, LOG),
+    "a log, commas at its line ends": (
+        "log",
+        csv(LOG, "time,fx\n").replace("\n", ",\n"),
+        {},
+        LOG,
+    ),
     "a log, commas below its header": ("log", "time,fx\n0,1.5,\n.1,2.5,\n", {}, LOG),
     "a log, a comma in its header": ("log", "time,fx,\n0,1.5\n.1,2.5\n", {}, LOG),
     "a log, sep=": ("log", "sep=;\ntime;fx\n0;1,5\n,1;2,5\n", {}, LOG),
     "a log, underscores": ("log", "time,fx\n0,1_000\n", {}, MANY),
     "a log, numbers beyond all": ("log", "time,fx\n0,1e308\n", {}, "beyond 1e+50"),
-    "a log, spaces between": ("log", "time,fx\n0 1\n", {}, "line 2 has 1 columns, the header has 2"),
+    "a log, spaces between": (
+        "log",
+        "time,fx\n0 1\n",
+        {},
+        "line 2 has 1 columns, the header has 2",
+    ),
 }
 """What the file is: its kind, content and options, and the values that it gives or words of what it is told."""
 
@@ -139,14 +254,24 @@ def test_forms_of_files(tmp_path, form):
     if isinstance(given, str):
         with pytest.raises((FileError, UserWarning)) as caught:  # warnings are errors
             read(kind, path, **options)
-        assert given in str(caught.value) and "\n" not in str(caught.value) and "file." in str(caught.value)
+        assert (
+            given in str(caught.value)
+            and "\n" not in str(caught.value)
+            and "file." in str(caught.value)
+        )
     else:
         found = read(kind, path, **options)
-        np.testing.assert_allclose(found, given.reshape(found.shape), rtol=1e-8)  # nine digits are written
+        np.testing.assert_allclose(
+            found, given.reshape(found.shape), rtol=1e-8
+        )  # nine digits are written
 
 
 def read(kind, path, names=("time", "fx"), **options):
-    return Table(path).numbers(names) if kind == "log" else pf.patch.read_pressure_map(path, **options)
+    return (
+        Table(path).numbers(names)
+        if kind == "log"
+        else pf.patch.read_pressure_map(path, **options)
+    )
 
 
 # ---------------------------------------------------------------------- maps that are none of these
@@ -158,7 +283,9 @@ MAPS = {
     "a uniform pad": np.ones((6, 8)),
     "a noisy uniform pad": 1.0 + 0.05 * NOISE[:6, :8],
     "a gradient along x and y": 10.0 + X + 2.0 * Y,
-    "a column that rises": np.array([[1, 5, 5], [2, 4, 6], [4, 4, 5], [9, 6, 6], [9.5, 5, 4]]),
+    "a column that rises": np.array(
+        [[1, 5, 5], [2, 4, 6], [4, 4, 5], [9, 6, 6], [9.5, 5, 4]]
+    ),
     "discs": ROUND[1],
     "a smooth pad": PAD,
     "a pad that ends outside": PAD + 0.2 * X,
@@ -175,7 +302,10 @@ MAPS = {
 @pytest.mark.parametrize("name", MAPS)
 def test_maps_are_taken_without_a_question(tmp_path, name):
     given = np.asarray(MAPS[name], float)
-    for kind, content in {"csv": csv(given).encode(), "npy": saved("npy", given)}.items():
+    for kind, content in {
+        "csv": csv(given).encode(),
+        "npy": saved("npy", given),
+    }.items():
         (tmp_path / f"map.{kind}").write_bytes(content)
         found = pf.patch.read_pressure_map(tmp_path / f"map.{kind}")
         np.testing.assert_allclose(found, given, rtol=1e-8)

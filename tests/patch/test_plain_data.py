@@ -21,7 +21,11 @@ def maps(random: np.random.Generator, count: int) -> list[np.ndarray]:
     empty = random.random((4, 7)) < random.random()
     empty[2, 3] = False
     scales = 10.0 ** random.uniform(-300.0, 300.0, count)
-    return [scale * np.where(empty & (random.random((4, 7)) < 0.9), 0.0, random.random((4, 7))) for scale in scales]
+    return [
+        scale
+        * np.where(empty & (random.random((4, 7)) < 0.9), 0.0, random.random((4, 7)))
+        for scale in scales
+    ]
 
 
 def patches(seed: int) -> list[pf.ContactPatch]:
@@ -29,24 +33,40 @@ def patches(seed: int) -> list[pf.ContactPatch]:
     random = np.random.default_rng(seed)
     sizes = random.uniform(1e-3, 0.1, 2)
     loads = np.cumsum(random.uniform(0.1, 2.0, 3))
-    star = random.uniform(0.005, 0.02, 7)[:, None] * [(np.cos(a), np.sin(a)) for a in np.arange(7.0) * 0.9]
+    star = random.uniform(0.005, 0.02, 7)[:, None] * [
+        (np.cos(a), np.sin(a)) for a in np.arange(7.0) * 0.9
+    ]
     lean = random.uniform(-0.5, 0.5, 2)
-    grains = np.array([pf.friction_metric(*numbers) for numbers in random.uniform(0.5, 1.5, (12, 3))])
-    over_load = pf.ContactPatch.from_pressure(maps(random, 3), tuple(sizes), loads=loads)
+    grains = np.array(
+        [pf.friction_metric(*numbers) for numbers in random.uniform(0.5, 1.5, (12, 3))]
+    )
+    over_load = pf.ContactPatch.from_pressure(
+        maps(random, 3), tuple(sizes), loads=loads
+    )
     grid = pf.ContactPatch.rectangle(*sizes, (4, 3), pressure=random.random(12) + 0.1)
-    soft = pf.SoftFinger(c=sizes[0], n=random.uniform(0.1, 0.5), k_per_newton=random.uniform(0.5, 3.0))
+    soft = pf.SoftFinger(
+        c=sizes[0], n=random.uniform(0.1, 0.5), k_per_newton=random.uniform(0.5, 3.0)
+    )
     return [
         over_load,
         over_load.refined(2),
-        over_load.with_friction_metric(pf.friction_metric(*random.uniform(0.5, 1.5, 3)), lean),
+        over_load.with_friction_metric(
+            pf.friction_metric(*random.uniform(0.5, 1.5, 3)), lean
+        ),
         pf.ContactPatch.from_pressure(maps(random, 1)[0], sizes[0]),
         pf.ContactPatch.from_pressure(maps(random, 1), sizes[0], loads=[1.0]),
         pf.ContactPatch.disc(sizes[0], 9, pressure=soft),
-        pf.ContactPatch.disc(sizes[0], 21, pressure=pf.LinearGradient(random.uniform(-0.6, 0.6, 2) / sizes[0])),
+        pf.ContactPatch.disc(
+            sizes[0],
+            21,
+            pressure=pf.LinearGradient(random.uniform(-0.6, 0.6, 2) / sizes[0]),
+        ),
         pf.ContactPatch.ring(*np.sort(sizes), 11),
         pf.ContactPatch.polygon(star, 9),
         pf.ContactPatch.line(sizes[0], 8, profile=lambda y: 1.0 + abs(y)),
-        pf.ContactPatch.points(random.normal(0.0, 0.05, (5, 2)), random.random(5) + 0.01),
+        pf.ContactPatch.points(
+            random.normal(0.0, 0.05, (5, 2)), random.random(5) + 0.01
+        ),
         grid.with_friction_metric(grains, random.uniform(-0.5, 0.5, (12, 2))),
         grid.with_friction_metric(None, lean),
         dataclasses.replace(grid, radii=random.choice([0.0, 0.3, 1.0], 12) * sizes[0]),
@@ -57,8 +77,18 @@ def numbers(patch: pf.ContactPatch) -> list[np.ndarray]:
     """All that models and surfaces take from a patch."""
     load = 1.05 if patch.depends_on_load else None
     return [
-        *(patch.weights(load), patch.positions, patch.areas, patch.cell_extents(), patch.levers(), patch.asymmetries()),
-        *(patch.centre_of_pressure(load), np.array([patch.contact_radius(load), patch.second_moment(load)])),
+        *(
+            patch.weights(load),
+            patch.positions,
+            patch.areas,
+            patch.cell_extents(),
+            patch.levers(),
+            patch.asymmetries(),
+        ),
+        *(
+            patch.centre_of_pressure(load),
+            np.array([patch.contact_radius(load), patch.second_moment(load)]),
+        ),
     ]
 
 
@@ -78,10 +108,24 @@ def test_patches(seed):
 def test_scenes_and_their_digests(seed):
     random = np.random.default_rng(seed)
     patch = patches(seed)[seed % 14]
-    law = pf.LuGre(*(random.uniform(0.5, 1.0) * np.array([1.0, 1.3, 1e-3, 2.0, 1e6, 8e2, 0.2])))
-    force = pf.Signal(np.cumsum(random.random(6)), random.normal(size=(6, 3)), random.choice(["previous", "linear"]))
-    body = pf.Body(random.random() + 0.1, random.random() + 0.1, random.normal(size=2), random.normal())
-    contact = pf.Contact(pf.DistributedModel(patch, law), pf.Signal.sine(2.0, random.random(), 3.0, t_end=0.3))
+    law = pf.LuGre(
+        *(random.uniform(0.5, 1.0) * np.array([1.0, 1.3, 1e-3, 2.0, 1e6, 8e2, 0.2]))
+    )
+    force = pf.Signal(
+        np.cumsum(random.random(6)),
+        random.normal(size=(6, 3)),
+        random.choice(["previous", "linear"]),
+    )
+    body = pf.Body(
+        random.random() + 0.1,
+        random.random() + 0.1,
+        random.normal(size=2),
+        random.normal(),
+    )
+    contact = pf.Contact(
+        pf.DistributedModel(patch, law),
+        pf.Signal.sine(2.0, random.random(), 3.0, t_end=0.3),
+    )
     scene = pf.Scene(body, [contact], t_end=random.random() + 0.1, force=force)
     again = pf.Scene.from_dict(json.loads(scene.to_json()))
     assert again.to_json() == scene.to_json() and again.digest() == scene.digest()

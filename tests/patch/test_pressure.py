@@ -19,15 +19,22 @@ CELL = 0.02 / 21
 
 def soft(**changes) -> pf.SoftFinger:
     """The soft finger of the published runs with changing pressure."""
-    return pf.SoftFinger(**{"c": 6 * CELL, "n": 1 / 3, "k": 2.0, "radius_max": 0.01, **changes})
+    return pf.SoftFinger(
+        **{"c": 6 * CELL, "n": 1 / 3, "k": 2.0, "radius_max": 0.01, **changes}
+    )
 
 
 def test_linear_gradient_moves_the_centre_of_pressure():
     # p = 1 + gx x + gy y on a centred shape: CoP = (gx <x^2>, gy <y^2>).
-    gx, gy, (a, b) = 30.0, -50.0, (0.03, 0.02)
+    gx = 30.0
+    gy = -50.0
+    (a, b) = (0.03, 0.02)
     patch = pf.ContactPatch.rectangle(a, b, (30, 20), pressure=LinearGradient((gx, gy)))
-    second_x, second_y = a**2 / 12 * (1 - 1 / 900), b**2 / 12 * (1 - 1 / 400)
-    assert patch.centre_of_pressure() == pytest.approx((gx * second_x, gy * second_y), rel=1e-12)
+    second_x = a**2 / 12 * (1 - 1 / 900)
+    second_y = b**2 / 12 * (1 - 1 / 400)
+    assert patch.centre_of_pressure() == pytest.approx(
+        (gx * second_x, gy * second_y), rel=1e-12
+    )
     assert not patch.depends_on_load
     # A cut cell's centroid carries the mean of a linear pressure: the total is that of the true disc.
     disc = pf.ContactPatch.disc(0.01, 9, pressure=LinearGradient((gx, gy)))
@@ -38,14 +45,21 @@ def test_linear_gradient_moves_the_centre_of_pressure():
 
 def test_a_steep_gradient_errs_by_the_moment_within_cells():
     """The continuous pressure `1 + g x` has its centre at `g w^2/12`, cells of one pressure at `g (w^2 - h^2)/12`."""
-    width, steep = 0.02, 1.9 / 0.02  # 1 to 39
+    width = 0.02
+    steep = 1.9 / 0.02  # 1 to 39
     for cells, parts in ((21, 1), (21, 2), (5, 3)):
-        patch = pf.ContactPatch.rectangle(width, cells=cells, pressure=LinearGradient((steep, 0.0))).refined(parts)
+        patch = pf.ContactPatch.rectangle(
+            width, cells=cells, pressure=LinearGradient((steep, 0.0))
+        ).refined(parts)
         short = steep * width**2 / 12.0 - patch.centre_of_pressure()[0]
-        assert short == pytest.approx(steep * (width / cells / parts) ** 2 / 12.0, rel=1e-9)
+        assert short == pytest.approx(
+            steep * (width / cells / parts) ** 2 / 12.0, rel=1e-9
+        )
     steps = np.tile(np.arange(1.0, 40.0, 1.9), (21, 1))
     mapped = pf.ContactPatch.from_pressure(steps, width=width)
-    assert mapped.refined(4).centre_of_pressure() == pytest.approx(mapped.centre_of_pressure(), rel=1e-12)
+    assert mapped.refined(4).centre_of_pressure() == pytest.approx(
+        mapped.centre_of_pressure(), rel=1e-12
+    )
 
 
 def test_any_function_of_two_numbers_is_a_pressure():
@@ -55,11 +69,15 @@ def test_any_function_of_two_numbers_is_a_pressure():
     patch = pf.ContactPatch.rectangle(0.02, cells=10, pressure=one_sided)
     assert patch.cells == 50 and (patch.positions[:, 1] > 0).all()
     x = patch.positions[:, 0]
-    assert patch.weights() == pytest.approx(np.exp(x / 0.01) / np.exp(x / 0.01).sum(), rel=1e-14)
+    assert patch.weights() == pytest.approx(
+        np.exp(x / 0.01) / np.exp(x / 0.01).sum(), rel=1e-14
+    )
 
 
 def test_fixed_soft_finger_drops_what_it_never_loads():
-    patch = pf.ContactPatch.rectangle(0.02, cells=21, pressure=pf.SoftFinger(c=0.005, k=2.0))
+    patch = pf.ContactPatch.rectangle(
+        0.02, cells=21, pressure=pf.SoftFinger(c=0.005, k=2.0)
+    )
     assert not patch.depends_on_load
     distance = np.hypot(*patch.positions.T)
     assert (distance < 0.005).all()
@@ -70,11 +88,16 @@ def test_fixed_soft_finger_drops_what_it_never_loads():
 
 
 def test_the_profile_itself_may_follow_the_load():
-    patch = pf.ContactPatch.rectangle(0.02, cells=21, pressure=soft(k=None, k_per_newton=2.0))
+    patch = pf.ContactPatch.rectangle(
+        0.02, cells=21, pressure=soft(k=None, k_per_newton=2.0)
+    )
     load = 1.73
-    radius, k = 6 * CELL * load ** (1 / 3), 2.0 * load
+    radius = 6 * CELL * load ** (1 / 3)
+    k = 2.0 * load
     distance = np.hypot(*patch.positions.T)
-    profile = np.where(distance < radius, np.abs(1 - (distance / radius) ** k), 0.0) ** (1 / k)
+    profile = np.where(
+        distance < radius, np.abs(1 - (distance / radius) ** k), 0.0
+    ) ** (1 / k)
     assert patch.weights(load) == pytest.approx(profile / profile.sum(), rel=1e-11)
     # At small loads the profile is a needle that underflows: all of it is then on the centre cell.
     assert patch.weights(1e-9).max() == 1.0
@@ -85,13 +108,17 @@ def test_the_profile_itself_may_follow_the_load():
 def test_nearest_cells_share_the_load_of_a_tiny_contact(cells, sharing):
     patch = pf.ContactPatch.rectangle(0.02, cells=cells, pressure=soft())
     weights = patch.weights(1e-9)
-    assert np.sort(weights)[-sharing:] == pytest.approx([1 / sharing] * sharing, rel=1e-15)
+    assert np.sort(weights)[-sharing:] == pytest.approx(
+        [1 / sharing] * sharing, rel=1e-15
+    )
     assert (weights > 0).sum() == sharing
 
 
 def test_cells_exactly_on_the_rim_share_the_load_if_no_other_is_inside():
     law = pf.SoftFinger(c=0.5, k=2.0)
-    patch = dataclasses.replace(pf.ContactPatch.points([(0.5, 0.0), (0.0, -0.5), (1.0, 0.0)]), pressure=law)
+    patch = dataclasses.replace(
+        pf.ContactPatch.points([(0.5, 0.0), (0.0, -0.5), (1.0, 0.0)]), pressure=law
+    )
     assert patch.weights().tolist() == [0.5, 0.5]
 
 
@@ -114,7 +141,9 @@ def test_area_counts_the_cells_under_load():
 def test_normal_forces_lead_the_shape():
     loads = np.array([[0.0, 0.3, 1.0], [2.0, 5.0, 50.0]])
     for patch in (
-        pf.ContactPatch.rectangle(0.02, cells=21, pressure=soft(k=None, k_per_newton=2.0)),
+        pf.ContactPatch.rectangle(
+            0.02, cells=21, pressure=soft(k=None, k_per_newton=2.0)
+        ),
         pf.ContactPatch.line(0.02, 5, profile=[1, 2, 3, 4, 5]),
     ):
         together = (
@@ -144,11 +173,16 @@ def test_normal_forces_lead_the_shape():
 
 def test_moments():
     patch = PUBLISHED_PATCHES["NonConvex2"]()
-    central, raw = patch.moments(3), patch.moments(3, about=(0.0, 0.0))
+    central = patch.moments(3)
+    raw = patch.moments(3, about=(0.0, 0.0))
     assert central.shape == (4, 4)
     assert central[0, 0] == pytest.approx(1.0) and raw[0, 0] == pytest.approx(1.0)
-    assert (raw[1, 0], raw[0, 1]) == pytest.approx(tuple(patch.centre_of_pressure()), rel=ROUNDING)
+    assert (raw[1, 0], raw[0, 1]) == pytest.approx(
+        tuple(patch.centre_of_pressure()), rel=ROUNDING
+    )
     assert (central[1, 0], central[0, 1]) == pytest.approx((0, 0), abs=1e-17)
-    assert central[2, 0] + central[0, 2] == pytest.approx(patch.second_moment(), rel=ROUNDING)
+    assert central[2, 0] + central[0, 2] == pytest.approx(
+        patch.second_moment(), rel=ROUNDING
+    )
     assert central[2, 0] == pytest.approx(raw[2, 0] - raw[1, 0] ** 2, rel=1e-11)
     assert central[3, 1] == 0.0 and raw[2, 2] == 0.0

@@ -21,7 +21,9 @@ MAP = np.array([[0, 0, 0, 9], [0, 0, 0, 0], [1, 0, 0, 0]])
 
 def test_row_0_is_the_top_and_column_0_the_left():
     patch = pf.ContactPatch.from_pressure(MAP, 0.001)
-    assert patch.positions == pytest.approx(np.array([[0.0015, 0.001], [-0.0015, -0.001]]))
+    assert patch.positions == pytest.approx(
+        np.array([[0.0015, 0.001], [-0.0015, -0.001]])
+    )
     assert patch.weights() == pytest.approx([0.9, 0.1], rel=ROUNDING)
     assert patch.centre_of_pressure() == pytest.approx((0.0012, 0.0008))
     assert (patch.grid.columns, patch.grid.rows) == (4, 3)
@@ -37,13 +39,17 @@ def test_cells_may_be_oblong():
 @settings(deadline=None, max_examples=25)
 @given(
     hnp.arrays(
-        float, hnp.array_shapes(min_dims=2, max_dims=2, max_side=8), elements=st.floats(0, 100, width=32)
+        float,
+        hnp.array_shapes(min_dims=2, max_dims=2, max_side=8),
+        elements=st.floats(0, 100, width=32),
     ).filter(np.any)
 )
 def test_any_map_comes_back(values):
     patch = pf.ContactPatch.from_pressure(values, 0.001)
     again = np.zeros_like(values)
-    again[patch.grid.locate(patch.positions)] = patch.pressure_values(values.sum() * 1e-6)
+    again[patch.grid.locate(patch.positions)] = patch.pressure_values(
+        values.sum() * 1e-6
+    )
     # A map in pascals and its own total load: the same pascals (weights below 1e-300 of the peak may be lost).
     assert again == pytest.approx(values, rel=1e-12, abs=1e-290)
 
@@ -53,18 +59,28 @@ def test_any_map_comes_back(values):
 def test_flipping_a_map_mirrors_the_centre(values):
     x, y = pf.ContactPatch.from_pressure(values, 0.001).centre_of_pressure()
     # Coordinates of a few millimetres, rounded.
-    assert pf.ContactPatch.from_pressure(values[::-1], 0.001).centre_of_pressure() == pytest.approx((x, -y), abs=1e-17)
-    assert pf.ContactPatch.from_pressure(values[:, ::-1], 0.001).centre_of_pressure() == pytest.approx(
-        (-x, y), abs=1e-17
-    )
+    assert pf.ContactPatch.from_pressure(
+        values[::-1], 0.001
+    ).centre_of_pressure() == pytest.approx((x, -y), abs=1e-17)
+    assert pf.ContactPatch.from_pressure(
+        values[:, ::-1], 0.001
+    ).centre_of_pressure() == pytest.approx((-x, y), abs=1e-17)
 
 
 def write_csv(path, values):
-    path.write_text("# kPa\n" + "\n".join(",".join(str(value) for value in row) for row in values) + "\n\n")
+    path.write_text(
+        "# kPa\n"
+        + "\n".join(",".join(str(value) for value in row) for row in values)
+        + "\n\n"
+    )
 
 
 def write_image(path, values, mode="L"):
-    Image.fromarray(np.asarray(values, dtype={"L": np.uint8, "I;16": np.uint16, "F": np.float32}[mode])).save(path)
+    Image.fromarray(
+        np.asarray(
+            values, dtype={"L": np.uint8, "I;16": np.uint16, "F": np.float32}[mode]
+        )
+    ).save(path)
 
 
 @pytest.mark.parametrize(
@@ -76,14 +92,29 @@ def write_image(path, values, mode="L"):
         ("PAD.PNG", write_image),
         ("pad.bmp", write_image),
         ("pad.pgm", write_image),
-        ("sixteen bits.png", lambda path, values: write_image(path, 7000 * values, "I;16")),
+        (
+            "sixteen bits.png",
+            lambda path, values: write_image(path, 7000 * values, "I;16"),
+        ),
         ("floats.tiff", lambda path, values: write_image(path, values / 64, "F")),
-        ("palette.png", lambda path, values: Image.fromarray(values.astype(np.uint8)).convert("P").save(path)),
+        (
+            "palette.png",
+            lambda path, values: (
+                Image.fromarray(values.astype(np.uint8)).convert("P").save(path)
+            ),
+        ),
         (
             "grey in colours.png",
-            lambda path, values: Image.fromarray(values.astype(np.uint8)).convert("RGB").save(path),
+            lambda path, values: (
+                Image.fromarray(values.astype(np.uint8)).convert("RGB").save(path)
+            ),
         ),
-        ("opaque.png", lambda path, values: Image.fromarray(values.astype(np.uint8)).convert("LA").save(path)),
+        (
+            "opaque.png",
+            lambda path, values: (
+                Image.fromarray(values.astype(np.uint8)).convert("LA").save(path)
+            ),
+        ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -97,7 +128,9 @@ def test_every_kind_of_file_gives_the_same_patch(tmp_path, file, write):
         assert patch.centre_of_pressure() == pytest.approx((0.0012, 0.0008))
 
 
-@pytest.mark.parametrize("text", ["0,5;1\n1,5;0\n", "0.5;1\n1.5;0\n", "0.5\t1\n1.5\t0\n"])
+@pytest.mark.parametrize(
+    "text", ["0,5;1\n1,5;0\n", "0.5;1\n1.5;0\n", "0.5\t1\n1.5\t0\n"]
+)
 def test_cells_between_semicolons_and_tabs(tmp_path, text):
     (tmp_path / "pad.csv").write_text(text)
     patch = pf.ContactPatch.from_pressure(tmp_path / "pad.csv", 0.001)
@@ -105,14 +138,22 @@ def test_cells_between_semicolons_and_tabs(tmp_path, text):
 
 
 def test_black_and_white_image_is_a_mask(tmp_path):
-    Image.fromarray((MAP > 0).astype(np.uint8) * 255).convert("1").save(tmp_path / "mask.png")
-    assert pf.ContactPatch.from_pressure(tmp_path / "mask.png", 0.001).weights().tolist() == [0.5, 0.5]
+    Image.fromarray((MAP > 0).astype(np.uint8) * 255).convert("1").save(
+        tmp_path / "mask.png"
+    )
+    assert pf.ContactPatch.from_pressure(
+        tmp_path / "mask.png", 0.001
+    ).weights().tolist() == [0.5, 0.5]
 
 
 @pytest.mark.parametrize(
     ("values", "cell_size", "message"),
     [
-        ([[1, 2], [3, -4]], 0.001, r"pressure must be >= 0, got -4.0 at index \(1, 1\)"),
+        (
+            [[1, 2], [3, -4]],
+            0.001,
+            r"pressure must be >= 0, got -4.0 at index \(1, 1\)",
+        ),
         ([[1, np.nan]], 0.001, r"pressure must be finite, got nan at index \(0, 1\)"),
         ([[0, 0]], 0.001, "pressure must have a total > 0"),
         ([1, 2], 0.001, r"pressure must have shape \[any, any\], got shape \[2\]"),
@@ -141,7 +182,11 @@ def test_broken_arrays(values, cell_size, message):
         ("pad.npy", "", "not a readable .npy file"),
         ("pad.png", "1,2\n3,4\n", "not a readable .png file"),
         ("pad.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a readable .png file"),
-        ("pad.txt", "1,2\n3,4\n", "unknown kind '.txt', use .csv, .npy, .npz, .mat, .asf or a grey image"),
+        (
+            "pad.txt",
+            "1,2\n3,4\n",
+            "unknown kind '.txt', use .csv, .npy, .npz, .mat, .asf or a grey image",
+        ),
         ("pad", "1,2\n3,4\n", "unknown kind ''"),
     ],
 )
@@ -156,14 +201,20 @@ def test_broken_files(tmp_path, file, content, message):
 
 def test_missing_file_and_folder(tmp_path):
     (tmp_path / "folder.csv").mkdir()
-    for name, reason in (("missing.csv", "no such file"), ("folder.csv", "is a folder")):
+    for name, reason in (
+        ("missing.csv", "no such file"),
+        ("folder.csv", "is a folder"),
+    ):
         with pytest.raises(FileError, match=reason):
             pf.ContactPatch.from_pressure(tmp_path / name, 0.001)
 
 
 def test_negative_pressures_in_a_file_name_the_file(tmp_path):
     (tmp_path / "pad.csv").write_text("1,-2\n")
-    with pytest.raises(InvalidValueError, match=r"pressure map .*pad.csv must be >= 0, got -2.0 at index \(0, 1\)"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"pressure map .*pad.csv must be >= 0, got -2.0 at index \(0, 1\)",
+    ):
         pf.ContactPatch.from_pressure(tmp_path / "pad.csv", 0.001)
 
 
@@ -193,7 +244,9 @@ def test_colours_and_transparency_are_refused(tmp_path):
 
 
 def test_numbers_beyond_floats_in_a_file_are_refused_without_a_warning(tmp_path):
-    np.save(tmp_path / "map.npy", np.array([[1.0, 1.0], [1.0, np.longdouble("1e4000")]]))
+    np.save(
+        tmp_path / "map.npy", np.array([[1.0, 1.0], [1.0, np.longdouble("1e4000")]])
+    )
     with pytest.raises((FileError, InvalidValueError), match="inf"):
         pf.ContactPatch.from_pressure(tmp_path / "map.npy", 0.001)
 
@@ -201,16 +254,21 @@ def test_numbers_beyond_floats_in_a_file_are_refused_without_a_warning(tmp_path)
 def test_pixels_that_are_no_numbers_are_refused_without_a_warning(tmp_path):
     """Signalling NaNs, of which floating-point units warn when they become numbers of another size."""
     Image.fromarray(np.ones((4, 4), np.float32)).save(tmp_path / "map.tif")
-    ones, signalling = np.ones(4, "<f4").tobytes(), np.array([0x7FA00000], "<u4").tobytes()
+    ones = np.ones(4, "<f4").tobytes()
+    signalling = np.array([0x7FA00000], "<u4").tobytes()
     content = (tmp_path / "map.tif").read_bytes()
     (tmp_path / "map.tif").write_bytes(content.replace(ones, signalling + ones[4:], 1))
-    with pytest.raises(InvalidValueError, match=r"must be finite, got nan at index \(0, 0\)"):
+    with pytest.raises(
+        InvalidValueError, match=r"must be finite, got nan at index \(0, 0\)"
+    ):
         pf.ContactPatch.from_pressure(tmp_path / "map.tif", 0.001)
 
 
 # ---------------------------------------------------------------------- files as others write them
 
-PRESSURES = np.array([[0.5, 1.25, 2.5], [3.5, 4.0, 5.25], [6.5, 0.75, 8.0], [9.0, 1.5, 2.0]])
+PRESSURES = np.array(
+    [[0.5, 1.25, 2.5], [3.5, 4.0, 5.25], [6.5, 0.75, 8.0], [9.0, 1.5, 2.0]]
+)
 
 
 def read(path, **options):
@@ -237,18 +295,26 @@ def test_labels_of_pandas_are_no_pressures(tmp_path, writing, options):
     pandas.DataFrame(PRESSURES).to_csv(path, **writing)
     np.testing.assert_array_equal(read(path, **options), PRESSURES)
     patch = pf.ContactPatch.from_pressure(path, 1e-3, **options)
-    assert patch.contact_radius() == pf.ContactPatch.from_pressure(PRESSURES, 1e-3).contact_radius()
+    assert (
+        patch.contact_radius()
+        == pf.ContactPatch.from_pressure(PRESSURES, 1e-3).contact_radius()
+    )
 
 
 def test_labels_that_may_be_pressures_are_asked_about(tmp_path):
     path = tmp_path / "pad.csv"
     path.write_text("0,1,2\n5,6,7\n")
-    with pytest.raises(FileError, match=r"first row is 0, 1, 2: labels \(header = true\) or pressures \(header = fal"):
+    with pytest.raises(
+        FileError,
+        match=r"first row is 0, 1, 2: labels \(header = true\) or pressures \(header = fal",
+    ):
         read(path)
     assert read(path, header=True).tolist() == [[5, 6, 7]]
     assert read(path, header=False).tolist() == [[0, 1, 2], [5, 6, 7]]
     path.write_text("0,5\n1,6\n2,7\n3,8\n")
-    with pytest.raises(FileError, match=r"first column is 0, 1, 2, \.\.\.: labels \(index = true\)"):
+    with pytest.raises(
+        FileError, match=r"first column is 0, 1, 2, \.\.\.: labels \(index = true\)"
+    ):
         read(path)
     assert read(path, index=False).shape == (4, 2)
 
@@ -256,11 +322,16 @@ def test_labels_that_may_be_pressures_are_asked_about(tmp_path):
 def test_frames_are_chosen_and_never_stacked(tmp_path):
     import pandas
 
-    frames, names = [PRESSURES, 2.0 * PRESSURES, 3.0 * PRESSURES[:, ::-1]], []
+    frames = [PRESSURES, 2.0 * PRESSURES, 3.0 * PRESSURES[:, ::-1]]
+    names = []
     tables = [pandas.DataFrame(each).to_csv() for each in frames]
     for name, text in {
-        "blank.csv": "\n".join("".join(",".join(map(str, row)) + "\n" for row in each) for each in frames),
-        "remark.csv": "".join(f"# frame {i}\n{pandas.DataFrame(f).to_csv()}" for i, f in enumerate(frames)),
+        "blank.csv": "\n".join(
+            "".join(",".join(map(str, row)) + "\n" for row in each) for each in frames
+        ),
+        "remark.csv": "".join(
+            f"# frame {i}\n{pandas.DataFrame(f).to_csv()}" for i, f in enumerate(frames)
+        ),
         "appended.csv": "".join(tables),
     }.items():
         (tmp_path / name).write_text(text)
@@ -274,13 +345,20 @@ def test_frames_are_chosen_and_never_stacked(tmp_path):
     images[0].save(tmp_path / "pad.tif", save_all=True, append_images=images[1:])
     for name in (*names, "pad.npy", "pad.npz", "pad.mat", "pad.tif"):
         scale = 4.0 if name == "pad.tif" else 1.0
-        with pytest.raises(FrictionError, match=rf"frame must be one of the 3 frames of .*{name}, 0 to 2, got None"):
+        with pytest.raises(
+            FrictionError,
+            match=rf"frame must be one of the 3 frames of .*{name}, 0 to 2, got None",
+        ):
             read(tmp_path / name)
         with pytest.raises(FrictionError, match="got 3"):
             read(tmp_path / name, frame=3)
         for i, each in enumerate(frames):
-            np.testing.assert_array_equal(read(tmp_path / name, frame=i), scale * each, err_msg=name)
-    np.testing.assert_array_equal(pf.ContactPatch.from_pressure(np.array(frames), 1e-3, frame=1).cells, 12)
+            np.testing.assert_array_equal(
+                read(tmp_path / name, frame=i), scale * each, err_msg=name
+            )
+    np.testing.assert_array_equal(
+        pf.ContactPatch.from_pressure(np.array(frames), 1e-3, frame=1).cells, 12
+    )
 
 
 def test_blank_lines_behind_every_row_part_nothing(tmp_path):
@@ -294,19 +372,27 @@ def test_blank_lines_behind_every_row_part_nothing(tmp_path):
 
 def test_frames_in_rows_and_one_below_another_have_a_shape(tmp_path):
     frames = np.stack([PRESSURES, 2.0 * PRESSURES])
-    np.savetxt(tmp_path / "rows.csv", np.column_stack([[0.0, 0.1], frames.reshape(2, -1)]), delimiter=",")
+    np.savetxt(
+        tmp_path / "rows.csv",
+        np.column_stack([[0.0, 0.1], frames.reshape(2, -1)]),
+        delimiter=",",
+    )
     np.savetxt(tmp_path / "stacked.csv", frames.reshape(-1, 3), delimiter=",")
     for name, index in (("rows.csv", True), ("stacked.csv", None)):
         found = read(tmp_path / name, index=index, frame_shape=(4, 3), frame=1)
         np.testing.assert_array_equal(found, frames[1])
-    with pytest.raises(InvalidValueError, match="frame_shape must divide the 24 values"):
+    with pytest.raises(
+        InvalidValueError, match="frame_shape must divide the 24 values"
+    ):
         read(tmp_path / "stacked.csv", frame_shape=(5, 3))
 
 
 @pytest.mark.parametrize("name", ["pad.asf", "pad.csv"])
 def test_exports_of_tekscan(tmp_path, name):
     head = "DATA_TYPE MOVIE\nVERSION Fast Export\nROWS 2\nCOLS 3\nUNITS kPa\nASCII_DATA @@\n"
-    (tmp_path / name).write_text(head + "Frame 1\nB,1,2\nB,B,3\n\nFrame 2\nB,4,5\nB,B,6\n@@\n")
+    (tmp_path / name).write_text(
+        head + "Frame 1\nB,1,2\nB,B,3\n\nFrame 2\nB,4,5\nB,B,6\n@@\n"
+    )
     assert read(tmp_path / name, frame=1).tolist() == [[0, 4, 5], [0, 0, 6]]
     with pytest.raises(FrictionError, match="one of the 2 frames"):
         read(tmp_path / name)
@@ -319,24 +405,40 @@ def disc_image(radius=20.3, pixels=64):
 
 def test_ringing_of_jpeg_is_no_pressure_and_is_told(tmp_path):
     Image.fromarray(disc_image()).save(tmp_path / "pad.jpg", quality=75)
-    with pytest.warns(UserWarning, match=r"pad.jpg: .* of 1\d\d\d cells, up to 0.1 of the peak, count as empty"):
+    with pytest.warns(
+        UserWarning,
+        match=r"pad.jpg: .* of 1\d\d\d cells, up to 0.1 of the peak, count as empty",
+    ):
         patch = pf.ContactPatch.from_pressure(tmp_path / "pad.jpg", 1e-3)
     drawn = pf.ContactPatch.from_pressure(disc_image(), 1e-3)
     assert abs(patch.cells - drawn.cells) < 0.02 * drawn.cells
     raw = pf.ContactPatch.from_pressure(tmp_path / "pad.jpg", 1e-3, threshold=0.0)
     assert raw.cells > 1.2 * drawn.cells
-    assert pf.ContactPatch.from_pressure(tmp_path / "pad.jpg", 1e-3, threshold=0.2).cells == drawn.cells
-    assert pf.ContactPatch.from_pressure([[1.0, 9.0, 10.0]], 1e-3, threshold=0.2).cells == 2
+    assert (
+        pf.ContactPatch.from_pressure(tmp_path / "pad.jpg", 1e-3, threshold=0.2).cells
+        == drawn.cells
+    )
+    assert (
+        pf.ContactPatch.from_pressure([[1.0, 9.0, 10.0]], 1e-3, threshold=0.2).cells
+        == 2
+    )
 
 
 def test_prints_are_asked_about_and_inverted(tmp_path):
     rng = np.random.default_rng(1)
     paper = 250.0 - 0.8 * disc_image() + rng.integers(-3, 4, (64, 64))
     Image.fromarray(paper.astype(np.uint8)).save(tmp_path / "print.png")
-    with pytest.raises(FileError, match=r"ink on paper \(invert = true\) or pressure \(invert = false\)"):
+    with pytest.raises(
+        FileError,
+        match=r"ink on paper \(invert = true\) or pressure \(invert = false\)",
+    ):
         read(tmp_path / "print.png")
-    patch = pf.ContactPatch.from_pressure(tmp_path / "print.png", width=0.064, invert=True, threshold=0.1)
-    np.testing.assert_array_equal(patch.positions, pf.ContactPatch.from_pressure(disc_image(), 1e-3).positions)
+    patch = pf.ContactPatch.from_pressure(
+        tmp_path / "print.png", width=0.064, invert=True, threshold=0.1
+    )
+    np.testing.assert_array_equal(
+        patch.positions, pf.ContactPatch.from_pressure(disc_image(), 1e-3).positions
+    )
     assert read(tmp_path / "print.png", invert=False).min() > 0.0
     Image.fromarray(disc_image()).save(tmp_path / "mask.png")
     assert read(tmp_path / "mask.png").sum() == disc_image().sum(dtype=float)
@@ -346,9 +448,13 @@ def test_prints_are_asked_about_and_inverted(tmp_path):
 
 def test_width_stands_in_for_the_cell_size():
     wide = pf.ContactPatch.from_pressure(PRESSURES, width=0.006)
-    assert (wide.grid.cell_width, wide.grid.cell_height) == pytest.approx((0.002, 0.002), rel=1e-15)
+    assert (wide.grid.cell_width, wide.grid.cell_height) == pytest.approx(
+        (0.002, 0.002), rel=1e-15
+    )
     for sizes in ({}, {"cell_size": 1e-3, "width": 1e-3}):
-        with pytest.raises(InvalidValueError, match="cell_size must be given, or else the width"):
+        with pytest.raises(
+            InvalidValueError, match="cell_size must be given, or else the width"
+        ):
             pf.ContactPatch.from_pressure(PRESSURES, **sizes)
     with pytest.raises(InvalidValueError, match="width must be > 0"):
         pf.ContactPatch.from_pressure(PRESSURES, width=0.0)

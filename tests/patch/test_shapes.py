@@ -30,7 +30,9 @@ def second_moment(patch):
 
 def tile_moment(patch):
     """Second moment of the areas at the centres of the cells, which miss the spread inside them."""
-    return patch.tile_weights() @ ((patch.positions - patch.centre_of_pressure()) ** 2).sum(1)
+    return patch.tile_weights() @ (
+        (patch.positions - patch.centre_of_pressure()) ** 2
+    ).sum(1)
 
 
 def tensor(patch):
@@ -44,9 +46,12 @@ def polygon_tensor(corners):
     corners = np.array(corners)
     legs = np.stack([corners[1:-1], corners[2:]], 1) - corners[0]
     areas = np.linalg.det(legs) / 2
-    total, centre = areas.sum(), np.einsum("n,nki->i", areas, legs) / 3 / areas.sum()
+    total = areas.sum()
+    centre = np.einsum("n,nki->i", areas, legs) / 3 / areas.sum()
     sums = legs.sum(1)
-    second = np.einsum("n,nki,nkj->ij", areas, legs, legs) + np.einsum("n,ni,nj->ij", areas, sums, sums)
+    second = np.einsum("n,nki,nkj->ij", areas, legs, legs) + np.einsum(
+        "n,ni,nj->ij", areas, sums, sums
+    )
     return second / 12 / total - np.outer(centre, centre)
 
 
@@ -58,7 +63,9 @@ def test_disc_area_is_exact_on_every_grid(cells):
 
 
 @pytest.mark.parametrize(
-    ("quantity", "exact"), [(contact_radius, 2 * 0.01 / 3), (tile_moment, 0.01**2 / 2)], ids=["2R/3", "R^2/2"]
+    ("quantity", "exact"),
+    [(contact_radius, 2 * 0.01 / 3), (tile_moment, 0.01**2 / 2)],
+    ids=["2R/3", "R^2/2"],
 )
 def test_disc_converges_with_order_two(quantity, exact):
     found = orders(lambda n: pf.ContactPatch.disc(0.01, n), quantity, exact)
@@ -69,7 +76,8 @@ def test_disc_converges_with_order_two(quantity, exact):
 
 def test_areas_of_a_disc_miss_only_the_spread_inside_its_cells():
     # Areas at points miss the spread inside the cells: h^2/6 in a whole cell, less in a cut one.
-    radius, cells = 0.01, 41
+    radius = 0.01
+    cells = 41
     patch = pf.ContactPatch.disc(radius, cells)
     missing = radius**2 / 2 - tile_moment(patch)
     whole = np.isclose(patch.areas, patch.grid.cell_area, rtol=1e-9)
@@ -79,7 +87,14 @@ def test_areas_of_a_disc_miss_only_the_spread_inside_its_cells():
 
 # What is left is the shape of cut cells, which are taken for small whole ones: 1.5e-5 (disc) to 1.1e-4 (thin ring).
 CUT_CELLS = 2e-4
-HOOK = [(0.0, 0.0), (0.03, 0.004), (0.027, 0.012), (0.011, 0.009), (0.006, 0.02), (-0.002, 0.017)]
+HOOK = [
+    (0.0, 0.0),
+    (0.03, 0.004),
+    (0.027, 0.012),
+    (0.011, 0.009),
+    (0.006, 0.02),
+    (-0.002, 0.017),
+]
 
 
 @pytest.mark.parametrize(
@@ -94,7 +109,12 @@ HOOK = [(0.0, 0.0), (0.03, 0.004), (0.027, 0.012), (0.011, 0.009), (0.006, 0.02)
 )
 def test_second_moments_of_even_shapes_are_those_of_the_area(patch, exact):
     assert np.abs(tensor(patch) - exact).max() < CUT_CELLS * np.trace(exact)
-    assert np.abs(patch.weights() @ patch.positions - patch.tile_weights() @ patch.positions).max() < 1e-16
+    assert (
+        np.abs(
+            patch.weights() @ patch.positions - patch.tile_weights() @ patch.positions
+        ).max()
+        < 1e-16
+    )
     assert patch.weights() / patch.tile_weights() == pytest.approx(1.0, abs=0.1)
     assert not np.array_equal(patch.weights(), patch.tile_weights())
 
@@ -107,9 +127,16 @@ def test_one_row_of_cells_is_discs_with_the_second_moment_of_the_area():
         (pf.ContactPatch.rectangle(0.002, 0.018, (1, 9)), 0.002, 0.018),
     ):
         assert patch.has_discs and patch.point_shares is None
-        assert patch.second_moment() == pytest.approx((width**2 + height**2) / 12.0, rel=1e-14)
-        assert patch.refined(2).second_moment() == pytest.approx(patch.second_moment(), rel=1e-14)
-    assert not pf.ContactPatch.rectangle(0.02, 0.02, 1).has_discs and not pf.ContactPatch.line(0.02, 1).has_discs
+        assert patch.second_moment() == pytest.approx(
+            (width**2 + height**2) / 12.0, rel=1e-14
+        )
+        assert patch.refined(2).second_moment() == pytest.approx(
+            patch.second_moment(), rel=1e-14
+        )
+    assert (
+        not pf.ContactPatch.rectangle(0.02, 0.02, 1).has_discs
+        and not pf.ContactPatch.line(0.02, 1).has_discs
+    )
     for name in ("Line", "LineGrad", "LineGradX"):
         assert not PUBLISHED_PATCHES[name]().has_discs
 
@@ -136,30 +163,48 @@ def test_published_masks_and_other_pressures_keep_their_ratios(name):
     patch = PUBLISHED_PATCHES[name]()
     load = patch.pressure.relative(patch.positions)
     load = load / load.max() * patch.areas
-    assert np.array_equal(patch.weights(), load / load.sum()) and np.array_equal(patch.weights(), patch.tile_weights())
-    sloped = pf.ContactPatch.rectangle(0.02, cells=5, pressure=pf.LinearGradient((20.0, 0.0)))
+    assert np.array_equal(patch.weights(), load / load.sum()) and np.array_equal(
+        patch.weights(), patch.tile_weights()
+    )
+    sloped = pf.ContactPatch.rectangle(
+        0.02, cells=5, pressure=pf.LinearGradient((20.0, 0.0))
+    )
     assert np.array_equal(sloped.weights(), sloped.tile_weights())
 
 
-@pytest.mark.parametrize(("k", "ratio", "order"), [(1.0, 1 / 2, 2.0), (2.0, 3 * math.pi / 16, 1.5), (1e9, 2 / 3, 2.0)])
+@pytest.mark.parametrize(
+    ("k", "ratio", "order"),
+    [(1.0, 1 / 2, 2.0), (2.0, 3 * math.pi / 16, 1.5), (1e9, 2 / 3, 2.0)],
+)
 def test_soft_finger_contact_radius(k, ratio, order):
     # r/R = 2 (3/8) Gamma(3/k)^2 / (Gamma(2/k) Gamma(4/k)), with its values at k = 1, 2 and infinity.
     if k < 1e3:
-        closed = 2 * (3 / 8) * math.gamma(3 / k) ** 2 / (math.gamma(2 / k) * math.gamma(4 / k))
+        closed = (
+            2
+            * (3 / 8)
+            * math.gamma(3 / k) ** 2
+            / (math.gamma(2 / k) * math.gamma(4 / k))
+        )
         assert closed == pytest.approx(ratio, rel=1e-14)
     found = orders(
-        lambda n: pf.ContactPatch.disc(0.01, n, pressure=pf.SoftFinger(c=0.01, k=k)), contact_radius, 0.01 * ratio
+        lambda n: pf.ContactPatch.disc(0.01, n, pressure=pf.SoftFinger(c=0.01, k=k)),
+        contact_radius,
+        0.01 * ratio,
     )
     # At k = 2 the pressure ends like the square root of the distance to the rim: order 3/2 instead of 2.
     assert found[-1] == pytest.approx(order, abs=0.05)
 
 
 def test_soft_finger_radius_follows_the_load():
-    patch = pf.ContactPatch.disc(0.01, 161, pressure=pf.SoftFinger(c=0.004, n=1 / 3, k=2.0, radius_max=0.01))
+    patch = pf.ContactPatch.disc(
+        0.01, 161, pressure=pf.SoftFinger(c=0.004, n=1 / 3, k=2.0, radius_max=0.01)
+    )
     for load in (1.0, 3.0, 8.0, 27.0):
         radius = min(0.004 * load ** (1 / 3), 0.01)
         # Cells are 1.2e-4 m: 3 % of the smallest radius, and the error of order 3/2 above gives 0.5 % there.
-        assert patch.contact_radius(load) == pytest.approx(3 * math.pi / 16 * radius, rel=5e-3)
+        assert patch.contact_radius(load) == pytest.approx(
+            3 * math.pi / 16 * radius, rel=5e-3
+        )
     assert patch.contact_radius(27.0) == patch.contact_radius(1000.0)
 
 
@@ -175,30 +220,47 @@ def test_ring_closed_forms(inner):
     # A thin ring's cells are cut in many ways: the order wanders about 2.
     assert orders(ring, contact_radius, radius)[-1] == pytest.approx(2, abs=0.15)
     # Cells weigh what gives whole cells their own second moment; that of cut ones leaves an order more.
-    assert orders(ring, second_moment, (outer**2 + inner**2) / 2)[-1] == pytest.approx(3, abs=0.15)
+    assert orders(ring, second_moment, (outer**2 + inner**2) / 2)[-1] == pytest.approx(
+        3, abs=0.15
+    )
 
 
 def test_rectangle_closed_forms():
-    a, b, columns, rows = 0.03, 0.01, 12, 5
+    a = 0.03
+    b = 0.01
+    columns = 12
+    rows = 5
     patch = pf.ContactPatch.rectangle(a, b, (columns, rows))
     assert patch.cells == columns * rows
     assert patch.area() == pytest.approx(a * b, rel=ROUNDING)
     # n points with spacing h along a line have the mean square h^2 (n^2 - 1)/12.
-    exact = (a / columns) ** 2 * (columns**2 - 1) / 12 + (b / rows) ** 2 * (rows**2 - 1) / 12
+    exact = (a / columns) ** 2 * (columns**2 - 1) / 12 + (b / rows) ** 2 * (
+        rows**2 - 1
+    ) / 12
     assert tile_moment(patch) == pytest.approx(exact, rel=ROUNDING)
     assert patch.second_moment() == pytest.approx((a**2 + b**2) / 12, rel=ROUNDING)
     # r of a rectangle: four times the rectangle a/2 x b/2 with the centre of rotation at its corner.
-    p, q = a / 2, b / 2
+    p = a / 2
+    q = b / 2
     d = math.hypot(p, q)
     corner = (2 * p * q * d + p**3 * math.asinh(q / p) + q**3 * math.asinh(p / q)) / 6
-    found = orders(lambda n: pf.ContactPatch.rectangle(a, b, n), contact_radius, 4 * corner / (a * b), (48, 96, 192))
+    found = orders(
+        lambda n: pf.ContactPatch.rectangle(a, b, n),
+        contact_radius,
+        4 * corner / (a * b),
+        (48, 96, 192),
+    )
     # Near the origin, where |rho| has a kink, the error is of order 3: a correction of relative size h, 3.5 % here.
     assert found == pytest.approx([2, 2], abs=0.05)
 
 
 def test_one_number_of_cells_keeps_the_cells_square():
-    assert pf.ContactPatch.rectangle(0.04, 0.01, 20).grid == Grid.around_origin(0.04, 0.01, 20, 5)
-    assert pf.ContactPatch.rectangle(0.01, 0.04, 20).grid == Grid.around_origin(0.01, 0.04, 5, 20)
+    assert pf.ContactPatch.rectangle(0.04, 0.01, 20).grid == Grid.around_origin(
+        0.04, 0.01, 20, 5
+    )
+    assert pf.ContactPatch.rectangle(0.01, 0.04, 20).grid == Grid.around_origin(
+        0.01, 0.04, 5, 20
+    )
     assert pf.ContactPatch.rectangle(1.0, 0.001, 4).grid.rows == 1
 
 
@@ -208,17 +270,25 @@ def test_line_closed_forms(cells, direction):
     length = 0.02
     patch = pf.ContactPatch.line(length, cells, direction=direction)
     assert patch.cells == cells
-    assert tile_moment(patch) == pytest.approx(length**2 / 12 * (1 - 1 / cells**2), rel=ROUNDING, abs=1e-30)
-    assert patch.second_moment() == pytest.approx(length**2 / 12 if cells > 1 else 0.0, rel=ROUNDING)
+    assert tile_moment(patch) == pytest.approx(
+        length**2 / 12 * (1 - 1 / cells**2), rel=ROUNDING, abs=1e-30
+    )
+    assert patch.second_moment() == pytest.approx(
+        length**2 / 12 if cells > 1 else 0.0, rel=ROUNDING
+    )
     odd_loss = 1 / cells**2 if cells % 2 else 0.0
     tile_radius = patch.tile_weights() @ np.hypot(*patch.positions.T)
-    assert tile_radius == pytest.approx(length / 4 * (1 - odd_loss), rel=ROUNDING, abs=1e-18)
+    assert tile_radius == pytest.approx(
+        length / 4 * (1 - odd_loss), rel=ROUNDING, abs=1e-18
+    )
     # The grid has the line in the middle of one of its columns or rows.
     rows, columns = patch.grid.locate(patch.positions)
     across, along = (columns, rows) if direction == "y" else (rows, columns)
     middle = {"y": patch.grid.columns, "x": patch.grid.rows}[direction] // 2
     assert (across == middle).all() and (along == np.arange(cells)).all()
-    assert patch.positions == pytest.approx(patch.grid.centres().reshape(patch.grid.rows, -1, 2)[rows, columns])
+    assert patch.positions == pytest.approx(
+        patch.grid.centres().reshape(patch.grid.rows, -1, 2)[rows, columns]
+    )
 
 
 @pytest.mark.parametrize("far", [1e17, 1e50])
@@ -242,26 +312,37 @@ def test_line_profiles_run_from_the_top_and_from_the_left():
 
 def test_polygon_closed_forms():
     # A right triangle: centroid at a third of each side, polar second moment (a^2 + b^2)/18 about it.
-    a, b = 0.03, 0.02
+    a = 0.03
+    b = 0.02
     corners = [(0.01, 0.02), (0.01 + a, 0.02), (0.01, 0.02 + b)]
     patch = pf.ContactPatch.polygon(corners, 15)
     assert patch.area() == pytest.approx(a * b / 2, rel=1e-12)
     # Cut cells carry their centroids: the centre of pressure is exact, not approximate.
-    assert patch.centre_of_pressure() == pytest.approx((0.01 + a / 3, 0.02 + b / 3), rel=1e-12)
-    found = orders(lambda n: pf.ContactPatch.polygon(corners, n), second_moment, (a * a + b * b) / 18)
+    assert patch.centre_of_pressure() == pytest.approx(
+        (0.01 + a / 3, 0.02 + b / 3), rel=1e-12
+    )
+    found = orders(
+        lambda n: pf.ContactPatch.polygon(corners, n),
+        second_moment,
+        (a * a + b * b) / 18,
+    )
     # The spread of whole cells is in their weights; that of cut ones, of which there are fewer, is not: order 3.
     assert found == pytest.approx([3] * 3, abs=0.05)
 
 
 def test_polygon_agrees_with_rectangle_and_takes_concave_outlines():
-    w, h = 0.04, 0.02
+    w = 0.04
+    h = 0.02
     box = [(-w / 2, -h / 2), (w / 2, -h / 2), (w / 2, h / 2), (-w / 2, h / 2)]
-    cut, whole = pf.ContactPatch.polygon(box, (8, 4)), pf.ContactPatch.rectangle(w, h, (8, 4))
+    cut = pf.ContactPatch.polygon(box, (8, 4))
+    whole = pf.ContactPatch.rectangle(w, h, (8, 4))
     assert cut.positions == pytest.approx(whole.positions, abs=1e-16)
     assert cut.areas == pytest.approx(whole.areas, rel=1e-12)
     corner = 0.5 * np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
     assert pf.ContactPatch.polygon(corner, 7).area() == pytest.approx(0.75, rel=1e-12)
-    assert pf.ContactPatch.polygon(corner, 7).centre_of_pressure() == pytest.approx((5 / 12, 5 / 12), rel=1e-12)
+    assert pf.ContactPatch.polygon(corner, 7).centre_of_pressure() == pytest.approx(
+        (5 / 12, 5 / 12), rel=1e-12
+    )
 
 
 def test_cells_run_row_by_row_from_the_top_left():
@@ -286,7 +367,9 @@ def test_points_keep_their_order_and_weights():
     assert patch.centre_of_pressure() == pytest.approx((0, 0.025))
     assert pf.ContactPatch.points(legs).weights() == pytest.approx([1 / 3] * 3)
     assert pf.ContactPatch.points(legs, [1, 0, 1]).cells == 2
-    assert pf.ContactPatch.points(legs, area=2e-4).pressure_values(6.0) == pytest.approx([1e4] * 3)
+    assert pf.ContactPatch.points(legs, area=2e-4).pressure_values(
+        6.0
+    ) == pytest.approx([1e4] * 3)
     assert pf.ContactPatch.points([(0.3, 0.4)]).contact_radius() == 0.0
 
 

@@ -27,20 +27,31 @@ def test_within_the_kern_the_pressure_is_a_plane():
     w = RECTANGLE.weights(None)
     plane = w * (1.0 + 0.012 * X / (w @ X**2) - 0.002 * Y / (w @ Y**2))
     assert plane.min() > 0.0
-    np.testing.assert_allclose(follow(RECTANGLE, (0.012, -0.002)), plane, rtol=1e-11, atol=0.0)
+    np.testing.assert_allclose(
+        follow(RECTANGLE, (0.012, -0.002)), plane, rtol=1e-11, atol=0.0
+    )
 
 
 def test_beyond_the_kern_an_edge_lifts():
     """Without tension, a strip whose load is d from its edge presses along 3 d of it, as a triangle."""
-    fine, x_c = pf.ContactPatch.rectangle(0.1, 0.06, 200), 0.03
-    weights, edge, size = follow(fine, (x_c, 0.0)), 0.05, 0.1 / 200
+    fine = pf.ContactPatch.rectangle(0.1, 0.06, 200)
+    x_c = 0.03
+    weights = follow(fine, (x_c, 0.0))
+    edge = 0.05
+    size = 0.1 / 200
     pressing = weights > 0.0
-    assert fine.positions[pressing, 0].min() == pytest.approx(edge - 3.0 * (edge - x_c), abs=size)
+    assert fine.positions[pressing, 0].min() == pytest.approx(
+        edge - 3.0 * (edge - x_c), abs=size
+    )
     peak = weights.max() / weights[pressing].mean()
-    assert peak == pytest.approx(2.0, rel=2e-2)  # of a triangle; the last cell's middle is half a cell from the edge
+    assert peak == pytest.approx(
+        2.0, rel=2e-2
+    )  # of a triangle; the last cell's middle is half a cell from the edge
 
 
-@pytest.mark.parametrize("asked", [(0.012, 0.0), (0.03, -0.01), (-0.045, 0.02), (0.0, 0.027)])
+@pytest.mark.parametrize(
+    "asked", [(0.012, 0.0), (0.03, -0.01), (-0.045, 0.02), (0.0, 0.027)]
+)
 def test_total_and_moments_come_out(asked):
     """They do to 1e-7 of the patch, also close to its edge: the compliance of the rule times the steepness there."""
     weights = follow(RECTANGLE, asked)
@@ -51,7 +62,9 @@ def test_total_and_moments_come_out(asked):
 
 def test_a_load_beyond_an_edge_lies_on_it():
     edge = np.where(X.max() == X, RECTANGLE.weights(), 0.0)
-    np.testing.assert_allclose(follow(RECTANGLE, (0.2, 0.0)), edge / edge.sum(), atol=1e-7)
+    np.testing.assert_allclose(
+        follow(RECTANGLE, (0.2, 0.0)), edge / edge.sum(), atol=1e-7
+    )
     corner = (X.min() == X) & (Y.max() == Y)
     np.testing.assert_array_equal(follow(RECTANGLE, (-0.3, 0.5)) > 0.0, corner)
 
@@ -62,8 +75,13 @@ def test_the_nearest_point_of_the_hull_carries_what_lies_beyond():
         patch = pf.ContactPatch.points(0.01 * rng.normal(size=(rng.integers(3, 12), 2)))
         hull = shapely.MultiPoint(patch.positions).convex_hull
         asked = 0.02 * rng.normal(size=(200, 2))
-        nearest = [shapely.get_coordinates(shapely.shortest_line(hull, shapely.Point(p)))[0] for p in asked]
-        np.testing.assert_allclose(centre(patch, follow(patch, asked)), nearest, atol=1e-7)
+        nearest = [
+            shapely.get_coordinates(shapely.shortest_line(hull, shapely.Point(p)))[0]
+            for p in asked
+        ]
+        np.testing.assert_allclose(
+            centre(patch, follow(patch, asked)), nearest, atol=1e-7
+        )
 
 
 def test_weights_are_continuous_where_cells_lift_and_beyond_the_edge():
@@ -74,11 +92,17 @@ def test_weights_are_continuous_where_cells_lift_and_beyond_the_edge():
 
 
 def test_the_own_centre_and_no_load_change_nothing():
-    soft = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+    soft = pf.ContactPatch.disc(
+        0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
+    )
     for patch in (RECTANGLE, soft):
         x, y = patch.centre_of_pressure(LOAD)
-        np.testing.assert_allclose(patch.weights(LOAD, (LOAD * y, -LOAD * x)), patch.weights(LOAD), atol=1e-15)
-        np.testing.assert_array_equal(patch.weights(0.0, (0.1, 0.1)), patch.weights(0.0))
+        np.testing.assert_allclose(
+            patch.weights(LOAD, (LOAD * y, -LOAD * x)), patch.weights(LOAD), atol=1e-15
+        )
+        np.testing.assert_array_equal(
+            patch.weights(0.0, (0.1, 0.1)), patch.weights(0.0)
+        )
 
 
 def test_a_line_tilts_along_itself_and_a_point_does_not():
@@ -90,14 +114,21 @@ def test_a_line_tilts_along_itself_and_a_point_does_not():
 
 
 def test_batches_broadcast_and_are_those_of_each():
-    loads, moments = np.array([[1.0], [2.0]]), 0.01 * np.random.default_rng(0).normal(size=(3, 2))
+    loads = np.array([[1.0], [2.0]])
+    moments = 0.01 * np.random.default_rng(0).normal(size=(3, 2))
     weights = RECTANGLE.weights(loads, moments)
     assert weights.shape == (2, 3, RECTANGLE.cells)
     np.testing.assert_array_equal(weights[1, 2], RECTANGLE.weights(2.0, moments[2]))
 
 
 @pytest.mark.parametrize(
-    "load, moments", [(None, (0.0, 0.0)), (1.0, (0.0,)), (1.0, (np.nan, 0.0)), ([1.0, 2.0, 3.0], [(0, 0), (0, 0)])]
+    "load, moments",
+    [
+        (None, (0.0, 0.0)),
+        (1.0, (0.0,)),
+        (1.0, (np.nan, 0.0)),
+        ([1.0, 2.0, 3.0], [(0, 0), (0, 0)]),
+    ],
 )
 def test_bad_moments_say_so(load, moments):
     with pytest.raises(InvalidValueError, match=r"moments|normal_force"):

@@ -13,18 +13,29 @@ import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.planning import holding_load, plan_grip
 from planarfriction.planning.grip import _bounds
-from planarfriction.planning.motions import Aim, Grips, grip_position, load_on, report_of, slide_of
+from planarfriction.planning.motions import (
+    Aim,
+    Grips,
+    grip_position,
+    load_on,
+    report_of,
+    slide_of,
+)
 from tests.support.repository import script
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
 PATCH = pf.ContactPatch.disc(0.01, cells=11)
 MODEL = pf.ReducedModel(PATCH, LAW)
-SOFT = pf.ContactPatch.disc(0.02, cells=11, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+SOFT = pf.ContactPatch.disc(
+    0.02, cells=11, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
+)
 HALF = math.radians(30.0)
 
 
 def plate(offset: float = 0.025, model=MODEL) -> pf.Scene:
-    return pf.scenes.in_hand(model, centre_of_mass=(offset, 0.0), normal_force=4.0, t_end=1.0)
+    return pf.scenes.in_hand(
+        model, centre_of_mass=(offset, 0.0), normal_force=4.0, t_end=1.0
+    )
 
 
 @functools.cache
@@ -33,7 +44,10 @@ def turning():
 
 
 def at_the_end(solution: pf.Solution) -> dict[str, float]:
-    return {name: float(solution.data[name][-1]) for name in ("x", "y", "theta", "vx", "vy", "omega")}
+    return {
+        name: float(solution.data[name][-1])
+        for name in ("x", "y", "theta", "vx", "vy", "omega")
+    }
 
 
 # ---------------------------------------------------------------------- plans
@@ -45,15 +59,24 @@ def test_a_plate_turns_by_thirty_degrees_slides_little_and_is_held():
     longer = dataclasses.replace(plan.scene, t_end=2.0)
     data = pf.simulate(longer, save_every=0.5).data
     for at in (1.0, 2.0):
-        assert math.degrees(float(data.theta.sel(time=at))) == pytest.approx(-30.0, abs=0.05)
+        assert math.degrees(float(data.theta.sel(time=at))) == pytest.approx(
+            -30.0, abs=0.05
+        )
     end = at_the_end(pf.simulate(plan.scene))
-    assert np.hypot(*slide_of(plan.scene, 0, np.array([end["x"], end["y"], end["theta"]]))) < 1.45e-3
+    assert (
+        np.hypot(*slide_of(plan.scene, 0, np.array([end["x"], end["y"], end["theta"]])))
+        < 1.45e-3
+    )
     assert plan.report.angle == pytest.approx(end["theta"], abs=1e-9)
     assert plan.report.speed < 1e-9
     assert plan.scene.contacts[0].normal_force == plan.signal
-    assert plan.report.jacobians <= 6 and plan.report.simulations <= 100  # it ends when nothing more is gained
+    assert (
+        plan.report.jacobians <= 6 and plan.report.simulations <= 100
+    )  # it ends when nothing more is gained
     assert plan.signal.values[-1] >= 1.5 * plan.report.holding * (1 - 1e-9)
-    assert (plan.signal.values[:3] < load_and_level(plan.scene)[1]).all()  # it starts where something gives way
+    assert (
+        plan.signal.values[:3] < load_and_level(plan.scene)[1]
+    ).all()  # it starts where something gives way
 
 
 def load_and_level(scene: pf.Scene) -> tuple[np.ndarray, float]:
@@ -73,7 +96,9 @@ def test_a_plate_slides_by_ten_millimetres_without_turning(offset):
 
 
 def held_at_first(grip: float) -> pf.Scene:
-    scene = pf.scenes.in_hand(MODEL, centre_of_mass=(0.025, 0.0), normal_force=grip, t_end=1.0)
+    scene = pf.scenes.in_hand(
+        MODEL, centre_of_mass=(0.025, 0.0), normal_force=grip, t_end=1.0
+    )
     return dataclasses.replace(scene, start="equilibrium")
 
 
@@ -89,15 +114,23 @@ def test_the_report_says_what_friction_does():
     """Its frictions are those of scenes whose law is scaled, and one percent is the slope between them."""
     report = turning().report
     law = dataclasses.replace(LAW, mu_c=1.05, mu_s=1.2 * 1.05)
-    contact = dataclasses.replace(turning().scene.contacts[0], model=pf.ReducedModel(PATCH, law))
+    contact = dataclasses.replace(
+        turning().scene.contacts[0], model=pf.ReducedModel(PATCH, law)
+    )
     changed = pf.simulate(dataclasses.replace(turning().scene, contacts=[contact]))
     assert report.frictions.tolist() == [0.95, 0.99, 1.0, 1.01, 1.05]
     assert report.angles[-1] == pytest.approx(float(changed.data.theta[-1]), abs=1e-9)
     assert (np.diff(report.angles) > 0.0).all()  # the more friction, the less it turns
-    assert report.per_percent == pytest.approx((report.angles[3] - report.angles[1]) / 2)
+    assert report.per_percent == pytest.approx(
+        (report.angles[3] - report.angles[1]) / 2
+    )
     assert report.spread == pytest.approx(np.abs(report.angles + HALF).max())
     shown = repr(turning())
-    assert "turn by -30 degrees" in shown and "+5 %" in shown and "An error of one percent" in shown
+    assert (
+        "turn by -30 degrees" in shown
+        and "+5 %" in shown
+        and "An error of one percent" in shown
+    )
 
 
 @pytest.mark.slow
@@ -111,27 +144,36 @@ def test_the_worst_friction_misses_by_less_where_that_is_the_aim():
 def test_slopes_of_ends_are_differences():
     """Central differences over 1e-3 N, right to 1e-3 of the largest; speed, slide and angle of a plate that moves."""
     scene = dataclasses.replace(plate(), t_end=0.2)
-    grips, times = Grips(scene, 0, [1.0]), np.array([0.0, 0.08, 0.15])
+    grips = Grips(scene, 0, [1.0])
+    times = np.array([0.0, 0.08, 0.15])
     values = np.array([2.0, 2.8, 3.5])
 
     def vector(change) -> np.ndarray:
-        return grips.ends(pf.Signal(times, values + change, "linear"), [1.0], rtol=1e-9)[0]
+        return grips.ends(
+            pf.Signal(times, values + change, "linear"), [1.0], rtol=1e-9
+        )[0]
 
     (slopes,) = grips.slopes(pf.Signal(times, values, "linear"), [1.0])
     step = 1e-3 * np.eye(3)
-    differences = np.stack([(vector(each) - vector(-each)) / 2e-3 for each in step], axis=1)
-    assert (np.abs(slopes - differences) < 1e-3 * np.abs(differences).max(axis=1)[:, None]).all()
+    differences = np.stack(
+        [(vector(each) - vector(-each)) / 2e-3 for each in step], axis=1
+    )
+    assert (
+        np.abs(slopes - differences) < 1e-3 * np.abs(differences).max(axis=1)[:, None]
+    ).all()
 
 
 @pytest.mark.parametrize("mounted_on", ["world", "body"])
 def test_ends_and_loads_of_a_scene_that_is_seen_turned_are_turned(mounted_on):
     """A pad off the origin on a plate that is pulled, seen from axes turned by 0.5: rounding and 1e-5 of the solver."""
-    turn, profile = 0.5, pf.Signal.constant(0.5)
+    turn = 0.5
+    profile = pf.Signal.constant(0.5)
     patch = pf.ContactPatch.rectangle(0.02, 0.01, cells=6)
     pad = {"count": 2, "mounted_on": mounted_on, "position": (0.01, 0.02), "angle": 0.2}
     for_one = pf.Contact(pf.ReducedModel(patch, LAW), 3.0, **pad)
     body = pf.Body(0.2, 3e-4, position=(0.03, -0.01), angle=0.3, gravity=(0.0, -9.81))
-    ends, loads = [], []
+    ends = []
+    loads = []
     for by in (0.0, turn):
         seen = dataclasses.replace(
             body,
@@ -142,16 +184,25 @@ def test_ends_and_loads_of_a_scene_that_is_seen_turned_are_turned(mounted_on):
         contact = for_one
         if mounted_on == "world":
             place = tuple(pf.geometry.rotate(np.array(for_one.position), by))
-            contact = dataclasses.replace(for_one, position=place, angle=for_one.angle + by)
+            contact = dataclasses.replace(
+                for_one, position=place, angle=for_one.angle + by
+            )
         scene = pf.Scene(seen, contact, 0.1)
         ends.append(Grips(scene, 0, [1.0]).ends(profile, [1.0])[0])
-        loads.append(load_on(scene, 0, 0.2, pf.geometry.rotate(np.array([0.004, -0.002]), by), 0.0))
-    speed, slide = pf.geometry.rotate(ends[0][:2], turn), pf.geometry.rotate(ends[0][3:5], turn)
+        loads.append(
+            load_on(
+                scene, 0, 0.2, pf.geometry.rotate(np.array([0.004, -0.002]), by), 0.0
+            )
+        )
+    speed = pf.geometry.rotate(ends[0][:2], turn)
+    slide = pf.geometry.rotate(ends[0][3:5], turn)
     assert ends[1] == pytest.approx([*speed, ends[0][2], *slide, ends[0][5]], abs=1e-5)
     assert abs(ends[0][5]) > 1e-3 and np.hypot(*ends[0][3:5]) > 1e-4
     assert loads[1] == pytest.approx(loads[0], abs=1e-9)
     away = np.array(body.position) - grip_position(pf.Scene(body, for_one, 0.1), 0)
-    arm = pf.geometry.rotate(away, 0.2) + np.array([0.004, -0.002])  # the pad stays where it is
+    arm = pf.geometry.rotate(away, 0.2) + np.array(
+        [0.004, -0.002]
+    )  # the pad stays where it is
     if mounted_on == "world":  # half the weight, about the pad, in its axes
         force = pf.geometry.rotate(np.array([0.0, -0.981]), -for_one.angle)
         assert loads[0] == pytest.approx([*force, -0.981 * arm[0]], abs=1e-9)
@@ -166,17 +217,29 @@ def test_misses_count_what_was_wanted():
 
 def test_a_plan_draws_itself():
     figure = turning().plot()
-    assert [axes.get_ylabel() for axes in figure.axes] == ["grip [N]", "turn [deg]", "slide [mm]"]
+    assert [axes.get_ylabel() for axes in figure.axes] == [
+        "grip [N]",
+        "turn [deg]",
+        "slide [mm]",
+    ]
     assert len(figure.axes[1].lines) == 4  # three frictions and the goal
-    report, (grip, turn, slide) = turning().report, figure.axes
+    report = turning().report
+    (grip, turn, slide) = figure.axes
     assert turn.lines[3].get_ydata()[0] == pytest.approx(-30.0)
     for number, factor in enumerate((1.0, 0.95, 1.05)):
         k = report.frictions.tolist().index(factor)
-        assert turn.lines[number].get_ydata()[-1] == pytest.approx(math.degrees(report.angles[k]), abs=1e-3)
-        assert slide.lines[number].get_ydata()[-1] == pytest.approx(1e3 * np.hypot(*report.slides[k]), abs=1e-3)
+        assert turn.lines[number].get_ydata()[-1] == pytest.approx(
+            math.degrees(report.angles[k]), abs=1e-3
+        )
+        assert slide.lines[number].get_ydata()[-1] == pytest.approx(
+            1e3 * np.hypot(*report.slides[k]), abs=1e-3
+        )
     assert grip.lines[0].get_ydata()[-1] == pytest.approx(report.grip)
     assert grip.lines[1].get_ydata()[0] == pytest.approx(report.holding)
-    assert [each.get_text() for each in turn.get_legend().get_texts()][1:] == ["friction -5 %", "friction +5 %"]
+    assert [each.get_text() for each in turn.get_legend().get_texts()][1:] == [
+        "friction -5 %",
+        "friction +5 %",
+    ]
 
 
 def test_grips_are_between_a_fiftieth_and_four_times_the_holding_load():
@@ -185,33 +248,58 @@ def test_grips_are_between_a_fiftieth_and_four_times_the_holding_load():
 
 
 def test_a_report_is_in_degrees_and_millimetres():
-    frictions, ends = [0.99, 1.0, 1.01], np.zeros((3, 6))
+    frictions = [0.99, 1.0, 1.01]
+    ends = np.zeros((3, 6))
     ends[:, 3:] = [[4e-3, 3e-3, 0.30], [2e-3, 1e-3, 0.20], [1e-3, 0.0, 0.14]]
     ends[1, :3] = 3e-3, 0.0, 0.4
-    turned = report_of(Aim(0.2, np.zeros(2), 0.01), frictions, ends, 6.0, 4.0, (1, 2, 3.0))
+    turned = report_of(
+        Aim(0.2, np.zeros(2), 0.01), frictions, ends, 6.0, 4.0, (1, 2, 3.0)
+    )
     assert turned.per_percent == pytest.approx(0.08)  # (0.30 - 0.14)/2
     assert turned.speed == pytest.approx(5e-3)  # 3 mm/s, and 0.4 rad/s at 10 mm
     assert turned.spread == pytest.approx(0.1)
     said = " ".join(str(turned).split())
-    assert "turn by 11.46 degrees" in said and "-1 % 17.189 4.000 3.000 nominal 11.459 2.000 1.000 +1 % 8.021" in said
-    assert "changes the result by 4.6 degrees" in said and "6 N, 1.50 times the holding force" in said
-    slid = report_of(Aim(None, np.array([0.0, 1e-3]), 0.01), frictions, ends, 6.0, 4.0, (1, 2, 3.0))
-    assert slid.per_percent == pytest.approx(1.5e-3) and slid.spread == pytest.approx(np.sqrt(20.0) * 1e-3)
-    assert "slide by (0, 1) mm" in str(slid) and "changes the result by 1.5 mm" in str(slid)
+    assert (
+        "turn by 11.46 degrees" in said
+        and "-1 % 17.189 4.000 3.000 nominal 11.459 2.000 1.000 +1 % 8.021" in said
+    )
+    assert (
+        "changes the result by 4.6 degrees" in said
+        and "6 N, 1.50 times the holding force" in said
+    )
+    slid = report_of(
+        Aim(None, np.array([0.0, 1e-3]), 0.01), frictions, ends, 6.0, 4.0, (1, 2, 3.0)
+    )
+    assert slid.per_percent == pytest.approx(1.5e-3) and slid.spread == pytest.approx(
+        np.sqrt(20.0) * 1e-3
+    )
+    assert "slide by (0, 1) mm" in str(slid) and "changes the result by 1.5 mm" in str(
+        slid
+    )
 
 
 @pytest.mark.parametrize("patch", [PATCH, SOFT])
-@pytest.mark.parametrize("kind", [pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished])
+@pytest.mark.parametrize(
+    "kind", [pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished]
+)
 def test_a_model_with_another_law_is_that_model_to_the_bit(kind, patch):
     """Data taken over from the first model are those that the second builds; another exponent needs another map."""
     first = kind(patch, LAW)
-    twist, load, dt = (0.003, 0.001, 0.4), 2.3, 1e-3
+    twist = (0.003, 0.001, 0.4)
+    load = 2.3
+    dt = 1e-3
     first.step(first.rest(), twist, load, dt)
-    for law in (dataclasses.replace(LAW, mu_c=0.7), dataclasses.replace(LAW, gamma=1.5)):
-        shared, alone = first.with_law(law), kind(patch, law)
+    for law in (
+        dataclasses.replace(LAW, mu_c=0.7),
+        dataclasses.replace(LAW, gamma=1.5),
+    ):
+        shared = first.with_law(law)
+        alone = kind(patch, law)
         assert shared == alone
         for mine, its in zip(
-            shared.step(shared.rest(), twist, load, dt), alone.step(alone.rest(), twist, load, dt), strict=True
+            shared.step(shared.rest(), twist, load, dt),
+            alone.step(alone.rest(), twist, load, dt),
+            strict=True,
         ):
             assert (mine == its).all()
 
@@ -221,17 +309,27 @@ def test_a_model_with_another_law_is_that_model_to_the_bit(kind, patch):
 
 def test_the_smallest_grip_of_a_force_of_a_torque_and_of_both():
     """Closed forms of a disc: `F/mu`, `3 tau/(2 mu R)`; both together take more than either."""
-    force, torque = (0.0, -3.0, 0.0), (0.0, 0.0, 0.02)
+    force = (0.0, -3.0, 0.0)
+    torque = (0.0, 0.0, 0.02)
     assert holding_load(force, PATCH, 0.6) == pytest.approx(3.0 / 0.6, rel=1e-9)
-    assert holding_load(torque, PATCH, 0.6) == pytest.approx(1.5 * 0.02 / (0.6 * 0.01), rel=1e-9)
+    assert holding_load(torque, PATCH, 0.6) == pytest.approx(
+        1.5 * 0.02 / (0.6 * 0.01), rel=1e-9
+    )
     both = holding_load((0.0, -3.0, 0.02), PATCH, 0.6)
     assert 5.0 < both < 10.0
-    assert holding_load((0.0, -3.0, 0.02), PATCH, 0.6, margin=0.25) == pytest.approx(1.25 * both)
+    assert holding_load((0.0, -3.0, 0.02), PATCH, 0.6, margin=0.25) == pytest.approx(
+        1.25 * both
+    )
     assert holding_load(np.zeros(3), PATCH, 0.6) == 0.0
 
 
 @pytest.mark.parametrize(
-    "patch", [PATCH, SOFT, PATCH.with_friction_metric(pf.friction_metric(0.3, 0.5, 1.0), (0.2, 0.1))]
+    "patch",
+    [
+        PATCH,
+        SOFT,
+        PATCH.with_friction_metric(pf.friction_metric(0.3, 0.5, 1.0), (0.2, 0.1)),
+    ],
 )
 def test_the_smallest_grip_puts_the_load_on_the_limit_surface(patch):
     """At that grip the wrench of its twist is the load, to 1e-6; a brushed patch holds less one way than the other."""
@@ -250,7 +348,9 @@ def test_a_plate_holds_just_above_the_smallest_grip_and_slips_just_below():
     least = holding_load(load, PATCH, LAW.mu_s)
     moved = {}
     for share in (0.96, 1.04):
-        scene = pf.scenes.in_hand(MODEL, centre_of_mass=(0.025, 0.0), normal_force=share * least, t_end=0.2)
+        scene = pf.scenes.in_hand(
+            MODEL, centre_of_mass=(0.025, 0.0), normal_force=share * least, t_end=0.2
+        )
         try:
             data = pf.simulate(dataclasses.replace(scene, start="equilibrium")).data
             moved[share] = abs(float(data.theta[-1]))

@@ -10,9 +10,22 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.planning import dynamic_holding_load, holding, holding_load, plan_grip
+from planarfriction.planning import (
+    dynamic_holding_load,
+    holding,
+    holding_load,
+    plan_grip,
+)
 
-LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
+LAW = pf.LuGre(
+    mu_c=1.0,
+    mu_s=1.2,
+    v_s=1e-3,
+    sigma_0=1e6,
+    sigma_1=8e2,
+    sigma_2=0.2,
+    elasto_plastic=0.9,
+)
 PADS = PUBLISHED_PATCHES["NonConvex1"]()
 DISC = pf.ContactPatch.disc(0.01, cells=11)
 LEVER, WEIGHT = 0.025, 0.5 * 0.2 * 9.81
@@ -22,7 +35,9 @@ PLATE = {"mass": 0.1, "inertia": 0.1 * ((0.15**2 + 0.08**2) / 12 + LEVER**2)}
 
 def moved(model, grip: pf.Signal) -> float:
     """Distance [m] that the plate of the published runs moves as its grip changes."""
-    scene = pf.scenes.in_hand(model, centre_of_mass=(LEVER, 0.0), normal_force=grip, t_end=0.6)
+    scene = pf.scenes.in_hand(
+        model, centre_of_mass=(LEVER, 0.0), normal_force=grip, t_end=0.6
+    )
     data = pf.simulate(dataclasses.replace(scene, start="equilibrium")).data
     return float(np.hypot(data.x[-1] - data.x[0], data.y[-1] - data.y[0]))
 
@@ -39,8 +54,12 @@ def test_a_grip_that_drops_to_it_holds_the_plate_and_one_below_drops_it(patch):
 
 def test_cells_that_break_first_weaken_so_that_a_quick_fall_needs_more():
     """Two narrow pads: +5.4 %, +4.5 %, +3.3 % of a fall in one step, in 10 ms, in 1 s (0.1 % of search, 0.5 % room)."""
-    model, slow = pf.DistributedModel(PADS, LAW), holding_load(LOAD, PADS, LAW.mu_s)
-    shares = [dynamic_holding_load(LOAD, model, ramp=ramp, **PLATE) / slow for ramp in (0.0, 0.01, 1.0)]
+    model = pf.DistributedModel(PADS, LAW)
+    slow = holding_load(LOAD, PADS, LAW.mu_s)
+    shares = [
+        dynamic_holding_load(LOAD, model, ramp=ramp, **PLATE) / slow
+        for ramp in (0.0, 0.01, 1.0)
+    ]
     assert shares == pytest.approx([1.054, 1.045, 1.033], abs=5e-3)
     assert shares[0] > shares[1] > shares[2] > 1.0
     assert shares[0] < LAW.mu_s / LAW.mu_c  # what slides is held by mu_c
@@ -52,13 +71,16 @@ def test_a_central_force_without_stribeck_needs_what_statics_says():
     force = (0.0, -WEIGHT, 0.0)
     least = dynamic_holding_load(force, model, ramp=0.01, fall=2.0)
     assert least == pytest.approx(WEIGHT, rel=1e-2)
-    assert dynamic_holding_load(force, model, ramp=0.01, fall=2.0, margin=0.5) == pytest.approx(1.5 * least, rel=1e-12)
+    assert dynamic_holding_load(
+        force, model, ramp=0.01, fall=2.0, margin=0.5
+    ) == pytest.approx(1.5 * least, rel=1e-12)
     assert dynamic_holding_load(np.zeros(3), model) == 0.0
 
 
 def test_a_torque_alone_slips_by_its_turn():
     """The middle of the disc stays where it is: the angle alone shows the slip."""
-    model, torque = pf.DistributedModel(DISC, dataclasses.replace(LAW, mu_s=1.0)), (0.0, 0.0, 0.01)
+    model = pf.DistributedModel(DISC, dataclasses.replace(LAW, mu_s=1.0))
+    torque = (0.0, 0.0, 0.01)
     least = dynamic_holding_load(torque, model, ramp=0.01, fall=2.0)
     assert least == pytest.approx(holding_load(torque, DISC, 1.0), rel=3e-2)
 
@@ -69,23 +91,42 @@ def test_a_plan_ends_above_what_holds_the_cells_of_the_model():
     law = pf.LuGre(mu_c=1.0, elasto_plastic=0.9)
     by_area = pf.ContactPatch.disc(0.01, cells=5, pressure=lambda x, y: 1.0)
     coarse = pf.DistributedModel(by_area, law)
-    scene = pf.scenes.in_hand(coarse, centre_of_mass=(LEVER, 0.0), normal_force=4.0, t_end=1.0)
+    scene = pf.scenes.in_hand(
+        coarse, centre_of_mass=(LEVER, 0.0), normal_force=4.0, t_end=1.0
+    )
     with pytest.raises(InvalidValueError, match=r"bounds must reach the 3\.9"):
-        plan_grip(scene, {"angle": np.radians(-10.0)}, knots=8, margin=0.0, bounds=(0.06, 3.885))
+        plan_grip(
+            scene,
+            {"angle": np.radians(-10.0)},
+            knots=8,
+            margin=0.0,
+            bounds=(0.06, 3.885),
+        )
 
 
 def test_a_ramp_shorter_than_times_tell_apart_is_a_step():
     model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 9), pf.LuGre(mu_s=1.2))
-    step, ramp = (dynamic_holding_load((1.0, 0.0, 0.001), model, ramp=ramp) for ramp in (0.0, 5e-324))
+    step, ramp = (
+        dynamic_holding_load((1.0, 0.0, 0.001), model, ramp=ramp)
+        for ramp in (0.0, 5e-324)
+    )
     assert ramp == step
 
 
 def test_a_load_alone_weighs_what_it_pulls_at_its_contact_radius(monkeypatch):
     made = []
-    monkeypatch.setattr(holding, "_slips", lambda model, body, *_: made.append(body) or len(made) % 2 == 0)
+    monkeypatch.setattr(
+        holding,
+        "_slips",
+        lambda model, body, *_: made.append(body) or len(made) % 2 == 0,
+    )
     radius = DISC.contact_radius()
     mass = np.linalg.norm([LOAD[0], LOAD[1], LOAD[2] / radius]) / 9.81
     dynamic_holding_load(LOAD, pf.DistributedModel(DISC, LAW))
     dynamic_holding_load(LOAD, pf.DistributedModel(DISC, LAW), mass=3.0)
-    assert (made[0].mass, made[0].inertia) == pytest.approx((mass, mass * radius**2), rel=1e-12)
-    assert (made[-1].mass, made[-1].inertia) == pytest.approx((3.0, 3.0 * radius**2), rel=1e-12)
+    assert (made[0].mass, made[0].inertia) == pytest.approx(
+        (mass, mass * radius**2), rel=1e-12
+    )
+    assert (made[-1].mass, made[-1].inertia) == pytest.approx(
+        (3.0, 3.0 * radius**2), rel=1e-12
+    )

@@ -25,7 +25,9 @@ from planarfriction.scenes.slip import bristles_of, slip_field
 from tests.support import synthetic
 from tests.support.pictures import faults
 
-LAW = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_0=1e4, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+LAW = pf.LuGre(
+    mu_c=1.0, mu_s=1.0, sigma_0=1e4, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9
+)
 """Bristles that bend by 0.1 mm and stick up to 0.09 mm."""
 
 SMALL = {"dpi": 25.0, "slow": 0.1}
@@ -47,7 +49,9 @@ def film_of(run: pf.Solution, frames: int = 5, follow: bool = True) -> Film:
 
 def changed(run: pf.Solution, **values) -> pf.Solution:
     """The solution with other values of some of its variables."""
-    data = run.data.assign({name: (run.data[name].dims, each) for name, each in values.items()})
+    data = run.data.assign(
+        {name: (run.data[name].dims, each) for name, each in values.items()}
+    )
     return dataclasses.replace(run, histories=data)
 
 
@@ -100,10 +104,15 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
     What it stands on, or the pad, may move as well.
     """
     scene = synthetic.scene(contacts=2, mounted_on=mounted_on)
-    contacts = [dataclasses.replace(each, angle=0.4, support_velocity=moves) for each in scene.contacts]
+    contacts = [
+        dataclasses.replace(each, angle=0.4, support_velocity=moves)
+        for each in scene.contacts
+    ]
     scene = dataclasses.replace(scene, contacts=contacts)
-    run, time = synthetic.solution(scene), np.linspace(0.0, 2.0, 201)
-    turn, arm = 1.5 * time, 0.05
+    run = synthetic.solution(scene)
+    time = np.linspace(0.0, 2.0, 201)
+    turn = 1.5 * time
+    arm = 0.05
     run = changed(
         run,
         x=arm * np.cos(turn),
@@ -117,9 +126,13 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
 
     poses = np.stack([np.asarray(run.data[name]) for name in ("x", "y", "theta")], -1)
     for contact in run.scene.contacts:
-        displacements = _displacements(contact, time, poses, contact_poses(contact, time, poses))
+        displacements = _displacements(
+            contact, time, poses, contact_poses(contact, time, poses)
+        )
         twists = run.contact_twist(contact.name)
-        assert displacements / 0.01 == pytest.approx(0.5 * (twists[1:] + twists[:-1]), abs=1e-4)
+        assert displacements / 0.01 == pytest.approx(
+            0.5 * (twists[1:] + twists[:-1]), abs=1e-4
+        )
 
 
 # ---------------------------------------------------------------------- which cells slip
@@ -127,16 +140,25 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
 
 def field(displacements: np.ndarray, cells: int = 21):
     model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, cells), LAW))
-    times, loads = 0.01 * np.arange(len(displacements) + 1), np.full(len(displacements) + 1, 2.0)
+    times = 0.01 * np.arange(len(displacements) + 1)
+    loads = np.full(len(displacements) + 1, 2.0)
     return model.patch, slip_field(
-        model, model.rest(), times, np.asarray(displacements), loads, np.arange(len(times)), np.zeros(3)
+        model,
+        model.rest(),
+        times,
+        np.asarray(displacements),
+        loads,
+        np.arange(len(times)),
+        np.zeros(3),
     )
 
 
 def test_a_patch_that_is_pushed_sticks_up_to_breakaway_and_slips_beyond():
     _, (bent, slips) = field([[1e-5, 0.0, 0.0]] * 30)
     way = 1e-5 * np.arange(31)
-    assert bent[:9, 0] == pytest.approx(way[:9] / 1e-4, rel=1e-6)  # elastic: the bristle takes up all of the way
+    assert bent[:9, 0] == pytest.approx(
+        way[:9] / 1e-4, rel=1e-6
+    )  # elastic: the bristle takes up all of the way
     assert not slips[:9].any()
     assert slips[13:].all()  # 0.13 mm: past the 0.1 mm that the bristles can bend
     assert bent[-1] == pytest.approx(np.ones_like(bent[-1]), rel=1e-3)
@@ -153,14 +175,25 @@ def test_a_patch_that_turns_slips_outside_and_sticks_inside():
 @pytest.mark.parametrize("speed", [0.0, 1e-2])
 def test_at_first_slips_what_moves(speed):
     model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW))
-    displacements, twist = np.full((2, 3), [1e-3, 0.0, 0.0]), np.array([speed, 0.0, 0.0])
-    _, slips = slip_field(model, model.rest(), np.arange(3.0), displacements, np.full(3, 2.0), np.arange(3), twist)
+    displacements = np.full((2, 3), [1e-3, 0.0, 0.0])
+    twist = np.array([speed, 0.0, 0.0])
+    _, slips = slip_field(
+        model,
+        model.rest(),
+        np.arange(3.0),
+        displacements,
+        np.full(3, 2.0),
+        np.arange(3),
+        twist,
+    )
     assert slips[1:].all()
     assert slips[0].all() == (speed > 0.0)
 
 
 def test_what_stops_does_not_slip():
-    _, (bent, slips) = field([[1e-5, 0.0, 0.0]] * 30 + [[1e-9, 0.0, 0.0]] * 3)  # creeps by 1e-5 of a full deflection
+    _, (bent, slips) = field(
+        [[1e-5, 0.0, 0.0]] * 30 + [[1e-9, 0.0, 0.0]] * 3
+    )  # creeps by 1e-5 of a full deflection
     assert slips[30].all() and not slips[31:].any()
     assert bent[-1] == pytest.approx(np.ones_like(bent[-1]), rel=1e-3)
 
@@ -171,13 +204,23 @@ def test_a_reduced_model_shows_the_bristles_that_a_distributed_one_has():
     The path is known every 2 ms here. Held twists in between, and a speed for the Stribeck curve that is their mean,
     leave 5e-4 of the largest deflection in the mean; ten times that is still not to be seen.
     """
-    model = pf.DistributedModel(pf.ContactPatch.disc(0.01, 9), pf.LuGre(mu_s=1.2, elasto_plastic=0.9))
-    run = pf.simulate(pf.scenes.in_hand(model), t_end=0.4, save_every=2e-3, bristles="all")
+    model = pf.DistributedModel(
+        pf.ContactPatch.disc(0.01, 9), pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
+    )
+    run = pf.simulate(
+        pf.scenes.in_hand(model), t_end=0.4, save_every=2e-3, bristles="all"
+    )
     times = np.asarray(run.histories["time"].values)
     bent, slips = track_of(run, times).contacts[0].slip
     bristles = np.asarray(run.histories["bristles_fingers"].values)
-    speed = np.linalg.norm(np.einsum("nci,ti->tcn", model.patch.levers(), run.contact_twist()), axis=1)
-    true = np.linalg.norm(bristles, axis=1) * 1e6 / (1.0 + 0.2 * np.exp(-((speed / 1e-3) ** 2)))
+    speed = np.linalg.norm(
+        np.einsum("nci,ti->tcn", model.patch.levers(), run.contact_twist()), axis=1
+    )
+    true = (
+        np.linalg.norm(bristles, axis=1)
+        * 1e6
+        / (1.0 + 0.2 * np.exp(-((speed / 1e-3) ** 2)))
+    )
     assert np.abs(bent - true).mean() < 5e-3
     assert 0.1 < slips.mean() < 0.9  # the plate slips and is held
 
@@ -188,11 +231,16 @@ def test_a_law_without_bristles_leaves_the_cells_plain():
 
 @pytest.mark.parametrize("start", ["equilibrium", "sliding"])
 def test_bristles_start_as_those_of_the_scene(start):
-    model, moving = pf.ReducedModel(pf.ContactPatch.disc(0.01, 7), LAW), (0.05, 0.0, 0.0)
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 7), LAW)
+    moving = (0.05, 0.0, 0.0)
     scene = synthetic.scene()
-    body = dataclasses.replace(scene.body, velocity=moving if start == "sliding" else (0.0, 0.0, 0.0))
+    body = dataclasses.replace(
+        scene.body, velocity=moving if start == "sliding" else (0.0, 0.0, 0.0)
+    )
     contacts = [dataclasses.replace(scene.contacts[0], model=model, normal_force=4.0)]
-    run = synthetic.solution(dataclasses.replace(scene, body=body, contacts=contacts, start=start))
+    run = synthetic.solution(
+        dataclasses.replace(scene, body=body, contacts=contacts, start=start)
+    )
     zero = np.zeros(201)
     run = changed(run, x=zero, y=zero, theta=zero, normal_force=np.full((201, 1), 4.0))
     bent = track_of(run, np.linspace(0.0, 2.0, 3)).contacts[0].slip.bent
@@ -218,18 +266,31 @@ def test_a_body_that_stands_turns_about_no_point():
     assert len(film.centre.get_xydata()) == 0
 
 
-@pytest.mark.parametrize(("mounted_on", "turned"), [("world", 0.0), ("body", -0.3 * 1.5**2)])
-def test_the_arrow_of_friction_is_in_world_axes_for_identical_contacts(mounted_on, turned):
+@pytest.mark.parametrize(
+    ("mounted_on", "turned"), [("world", 0.0), ("body", -0.3 * 1.5**2)]
+)
+def test_the_arrow_of_friction_is_in_world_axes_for_identical_contacts(
+    mounted_on, turned
+):
     scene = synthetic.scene(mounted_on=mounted_on)
-    scene = dataclasses.replace(scene, contacts=[dataclasses.replace(scene.contacts[0], angle=0.5, count=2)])
+    scene = dataclasses.replace(
+        scene, contacts=[dataclasses.replace(scene.contacts[0], angle=0.5, count=2)]
+    )
     run = synthetic.solution(scene)
     film = film_of(run)
     film.show(3)
     fx, fy = (2.0 * float(run.data[name][150, 0]) for name in ("fx", "fy"))
     angle = turned + 0.5
-    force = np.array([np.cos(angle) * fx - np.sin(angle) * fy, np.sin(angle) * fx + np.cos(angle) * fy])
+    force = np.array(
+        [
+            np.cos(angle) * fx - np.sin(angle) * fy,
+            np.sin(angle) * fx + np.cos(angle) * fy,
+        ]
+    )
     start, end = film.contacts[0][2]._posA_posB
-    assert np.asarray(end) - np.asarray(start) == pytest.approx(film.millimetres_per_newton * force, abs=1e-9)
+    assert np.asarray(end) - np.asarray(start) == pytest.approx(
+        film.millimetres_per_newton * force, abs=1e-9
+    )
 
 
 def test_the_outline_is_drawn_where_the_body_is():
@@ -240,7 +301,9 @@ def test_the_outline_is_drawn_where_the_body_is():
     angle = -0.3 * 4.0
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     # 1e-6 mm: the way through pixels and back loses a few digits
-    assert drawn[:4] == pytest.approx(1e3 * synthetic.PLATE @ turn.T + np.array([2.0, -20.0]), abs=1e-6)
+    assert drawn[:4] == pytest.approx(
+        1e3 * synthetic.PLATE @ turn.T + np.array([2.0, -20.0]), abs=1e-6
+    )
 
 
 def test_a_frame_draws_and_says_where_body_and_contacts_are():
@@ -248,33 +311,46 @@ def test_a_frame_draws_and_says_where_body_and_contacts_are():
     patch = pf.patch.PUBLISHED_PATCHES["LineGrad"]()
     scene = synthetic.scene(contacts=2, mounted_on="body", patch=patch)
     contacts = [
-        dataclasses.replace(each, angle=0.5, position=(0.03, 0.01 * i)) for i, each in enumerate(scene.contacts)
+        dataclasses.replace(each, angle=0.5, position=(0.03, 0.01 * i))
+        for i, each in enumerate(scene.contacts)
     ]
     run = synthetic.solution(dataclasses.replace(scene, contacts=contacts))
     run = changed(run, x=0.002 + 0.003 * np.asarray(run.data["time"]))
     film = film_of(run)
     film.show(3)  # 1.5 s
-    x, y, theta = 0.002 + 0.0045, -0.005 * 1.5**2, -0.3 * 1.5**2
+    x = 0.002 + 0.0045
+    y = -0.005 * 1.5**2
+    theta = -0.3 * 1.5**2
     times = np.linspace(0.0, 1.5, 4)
     path = 1e3 * np.stack([0.002 + 0.003 * times, -0.005 * times**2], -1)
     assert film.path.get_xydata() == pytest.approx(path, abs=1e-9)
 
     def turned(points, angle):
-        return points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        return points @ np.array(
+            [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+        )
 
     for contact, (_, cells, arrow) in zip(contacts, film.contacts, strict=True):
         origin = np.array([x, y]) + turned(np.array(contact.position), theta)
-        drawn = np.array([polygon.vertices[:4].mean(axis=0) for polygon in cells.get_paths()])
+        drawn = np.array(
+            [polygon.vertices[:4].mean(axis=0) for polygon in cells.get_paths()]
+        )
         drawn = (cells.get_transform() - film.axes.transData).transform(drawn)
-        assert drawn == pytest.approx(1e3 * (origin + turned(patch.positions, theta + 0.5)), abs=1e-6)
+        assert drawn == pytest.approx(
+            1e3 * (origin + turned(patch.positions, theta + 0.5)), abs=1e-6
+        )
         start = 1e3 * (origin + turned(patch.centre_of_pressure(), theta + 0.5))
         assert arrow._posA_posB[0] == pytest.approx(start, abs=1e-9)
-    assert film.words.get_text() == "moved by x 4.50 mm, y -11.25 mm, turned by -38.67 deg"
+    assert (
+        film.words.get_text() == "moved by x 4.50 mm, y -11.25 mm, turned by -38.67 deg"
+    )
     assert film.clock.get_text() == "t = 1.50 s"
     longest = max(np.hypot(*each.forces.T).max() for each in film.track.contacts)
     side = np.diff(film.views[0], axis=-1).min()
     assert film.millimetres_per_newton * longest == pytest.approx(0.3 * side)
-    assert f"(longest {longest:.3g} N)" in film.figure.legends[0].get_texts()[0].get_text()
+    assert (
+        f"(longest {longest:.3g} N)" in film.figure.legends[0].get_texts()[0].get_text()
+    )
 
 
 def test_the_wrench_is_drawn_with_its_shadow_and_its_tail():
@@ -285,23 +361,40 @@ def test_the_wrench_is_drawn_with_its_shadow_and_its_tail():
     fx, fy, _ = head = panel.points[30]
     names = [float(run.data[name][150, 0]) for name in ("fx", "fy", "tau")]
     radius = run.scene.contacts[0].model.patch.contact_radius()
-    assert head == pytest.approx(np.array(names) / 2.0 / [1.0, 1.0, radius], rel=2e-3)  # exact radius, of cells here
+    assert head == pytest.approx(
+        np.array(names) / 2.0 / [1.0, 1.0, radius], rel=2e-3
+    )  # exact radius, of cells here
     assert np.ravel(panel.head.get_data_3d()) == pytest.approx(head)
     assert pytest.approx(panel.points[5:31]) == np.asarray(panel.tail.get_data_3d()).T
-    assert pytest.approx(np.array([[0.0, 0.0, 0.0], head])) == np.asarray(panel.arm.get_data_3d()).T
+    assert (
+        pytest.approx(np.array([[0.0, 0.0, 0.0], head]))
+        == np.asarray(panel.arm.get_data_3d()).T
+    )
     floor = panel.axes.get_zlim()[0]
-    assert pytest.approx(np.array([[fx, fy, floor]] * 2)) == np.asarray(panel.shadow.get_data_3d()).T
+    assert (
+        pytest.approx(np.array([[fx, fy, floor]] * 2))
+        == np.asarray(panel.shadow.get_data_3d()).T
+    )
 
 
 def test_cells_are_pale_unbent_blue_bent_and_orange_where_they_slip():
-    film = film_of(synthetic.solution(synthetic.scene(patch=pf.ContactPatch.rectangle(0.04, 0.01, 8))))
+    film = film_of(
+        synthetic.solution(
+            synthetic.scene(patch=pf.ContactPatch.rectangle(0.04, 0.01, 8))
+        )
+    )
     (panel,) = panels(film, CellPanel)
     bent, slips = panel.track.slip
-    bent[2], slips[2] = np.linspace(0.0, 1.2, bent.shape[1]), np.arange(bent.shape[1]) % 3 == 0
+    bent[2], slips[2] = (
+        np.linspace(0.0, 1.2, bent.shape[1]),
+        np.arange(bent.shape[1]) % 3 == 0,
+    )
     panel.show(2)
     expected = np.where(slips[2], 1.0, 0.89 * np.minimum(bent[2], 1.0))
     assert np.asarray(panel.cells.get_array()) == pytest.approx(expected)
-    assert (*panel.axes.get_xlim(), *panel.axes.get_ylim()) == pytest.approx((-22.4, 22.4) * 2)
+    assert (*panel.axes.get_xlim(), *panel.axes.get_ylim()) == pytest.approx(
+        (-22.4, 22.4) * 2
+    )
     twist = panel.track.twists[2]
     centre = (-1e3 * twist[1] / twist[2], 1e3 * twist[0] / twist[2])
     assert panel.centre.get_xydata()[0] == pytest.approx(centre, abs=1e-9)
@@ -309,20 +402,29 @@ def test_cells_are_pale_unbent_blue_bent_and_orange_where_they_slip():
 
 def test_a_frame_without_load_has_the_surface_of_the_last_load_before():
     run = soft_finger()
-    run = changed(run, normal_force=np.repeat([0.0, 1.0, 0.0, 3.0, 0.0], 41)[:201, None])
+    run = changed(
+        run, normal_force=np.repeat([0.0, 1.0, 0.0, 3.0, 0.0], 41)[:201, None]
+    )
     (panel,) = panels(film_of(run), SurfacePanel)
     low, high = (round(np.log(load) / np.log(1.15)) for load in (1.0, 3.0))
-    assert [level_of(panel.track, frame) for frame in range(5)] == [low, low, low, high, high]
-    assert {level: float(load) for level, load in panel.levels.items()} == pytest.approx(
-        {low: 1.15**low, high: 1.15**high}
-    )
+    assert [level_of(panel.track, frame) for frame in range(5)] == [
+        low,
+        low,
+        low,
+        high,
+        high,
+    ]
+    assert {
+        level: float(load) for level, load in panel.levels.items()
+    } == pytest.approx({low: 1.15**low, high: 1.15**high})
 
 
 def test_a_patch_in_steady_sliding_has_its_wrench_on_the_limit_surface():
     patch = pf.patch.PUBLISHED_PATCHES["NonConvex2"]()
     run = synthetic.solution(synthetic.scene(patch=patch))
     surface = pf.LimitSurfaceExact(patch)
-    polar, azimuth = np.full(201, 1.1), np.linspace(0.0, 6.0, 201)
+    polar = np.full(201, 1.1)
+    azimuth = np.linspace(0.0, 6.0, 201)
     twists, points = (each for each in scaled_samples(surface, polar, azimuth))
     del twists
     from planarfriction.plots.limit_surface import sample_limit_surface
@@ -337,21 +439,24 @@ def test_a_patch_in_steady_sliding_has_its_wrench_on_the_limit_surface():
 
 
 def soft_finger() -> pf.Solution:
-    soft = pf.ContactPatch.rectangle(0.02, cells=9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01))
+    soft = pf.ContactPatch.rectangle(
+        0.02, cells=9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01)
+    )
     run = synthetic.solution(synthetic.scene(patch=soft))
     return changed(run, normal_force=np.linspace(0.0, 4.0, 201)[:, None])
 
 
 def test_the_patch_and_its_limit_surface_follow_the_load():
     film = film_of(soft_finger())
-    (cells,), (surface,) = panels(film, CellPanel), panels(film, SurfacePanel)
+    (cells,) = panels(film, CellPanel)
+    (surface,) = panels(film, SurfacePanel)
     shown = []
     for frame in range(5):
         film.picture(frame)
         shown.append(int((~np.ma.getmaskarray(cells.cells.get_array())).sum()))
-        assert [level for level, each in surface.drawn.items() if each.get_visible()] == [
-            level_of(surface.track, frame)
-        ]
+        assert [
+            level for level, each in surface.drawn.items() if each.get_visible()
+        ] == [level_of(surface.track, frame)]
     assert shown[0] == 0 and shown[1] > 0
     assert shown == sorted(shown) and shown[4] > shown[1]
     assert len(surface.levels) == 4  # a first frame without load has that of the next
@@ -360,7 +465,11 @@ def test_the_patch_and_its_limit_surface_follow_the_load():
 def test_every_contact_has_its_panels_and_the_rest_is_drawn_in_the_world():
     assert len(film_of(synthetic.solution(synthetic.scene(contacts=2))).panels) == 4
     film = film_of(synthetic.solution(synthetic.scene(contacts=5)))
-    assert [each.track.contact.name for each in panels(film, CellPanel)] == ["pad 3", "pad 4", "pad 5"]
+    assert [each.track.contact.name for each in panels(film, CellPanel)] == [
+        "pad 3",
+        "pad 4",
+        "pad 5",
+    ]
     assert len(film.contacts) == 5
 
 
@@ -372,9 +481,12 @@ def test_the_share_that_slips_is_that_of_the_load():
     panel.show(2)
     share = 100.0 * slips[2].sum() / slips.shape[1]
     assert panel.words.get_text() == f"pad: {share:.0f} % of the load slips"
-    panel = panels(film_of(synthetic.solution(synthetic.scene(contacts=2))), CellPanel)[1]
+    panel = panels(film_of(synthetic.solution(synthetic.scene(contacts=2))), CellPanel)[
+        1
+    ]
     panel.track = dataclasses.replace(
-        panel.track, contact=dataclasses.replace(panel.track.contact, name="long" + 8 * " long")
+        panel.track,
+        contact=dataclasses.replace(panel.track.contact, name="long" + 8 * " long"),
     )
     panel.show(0)
     assert panel.words.get_text().startswith("long long long long...: ")
@@ -402,10 +514,14 @@ def test_the_view_follows_a_body_that_goes_far():
     for frame, pose in enumerate(film.track.poses):
         low, high = film.views[frame].T
         reach = 1e3 * np.hypot(0.075, 0.04)
-        assert (low < 1e3 * pose[:2] - reach + 25.0).all() and (1e3 * pose[:2] + reach - 25.0 < high).all()
+        assert (low < 1e3 * pose[:2] - reach + 25.0).all() and (
+            1e3 * pose[:2] + reach - 25.0 < high
+        ).all()
 
 
-@pytest.mark.parametrize(("run", "follow"), [(lambda: far(), False), (lambda: far(0.05), True)])
+@pytest.mark.parametrize(
+    ("run", "follow"), [(lambda: far(), False), (lambda: far(0.05), True)]
+)
 def test_the_view_holds_the_whole_motion_where_it_need_not_follow(run, follow):
     film = film_of(run(), follow=follow)
     assert np.ptp(film.views, axis=0) == pytest.approx(np.zeros((2, 2)), abs=1e-9)
@@ -417,7 +533,9 @@ def test_the_view_holds_the_whole_motion_where_it_need_not_follow(run, follow):
 def test_both_axes_have_one_scale():
     film = film_of(synthetic.solution())
     width, height = sides(film)[0]
-    assert width / height == pytest.approx(film.axes.bbox.width / film.axes.bbox.height, rel=1e-9)
+    assert width / height == pytest.approx(
+        film.axes.bbox.width / film.axes.bbox.height, rel=1e-9
+    )
 
 
 # ---------------------------------------------------------------------- what can be drawn
@@ -426,12 +544,15 @@ def test_both_axes_have_one_scale():
 class Own:
     """A model of one's own, without a law of bristles."""
 
-    patch, law = pf.ContactPatch.disc(0.01, 5), "tape"
+    patch = pf.ContactPatch.disc(0.01, 5)
+    law = "tape"
 
 
 def with_model(model) -> pf.Solution:
     scene = synthetic.scene()
-    return synthetic.solution(dataclasses.replace(scene, contacts=[pf.Contact(model, 2.0, name="pad")]))
+    return synthetic.solution(
+        dataclasses.replace(scene, contacts=[pf.Contact(model, 2.0, name="pad")])
+    )
 
 
 def one_sample() -> pf.Solution:
@@ -440,28 +561,45 @@ def one_sample() -> pf.Solution:
 
 
 GROOVED = pf.ContactPatch.disc(0.01, 7).with_friction_metric(np.diag([1.0, 0.25]))
-EACH = GROOVED.with_friction_metric(np.linspace(1.0, 2.0, len(GROOVED.positions))[:, None, None] * np.eye(2))
+EACH = GROOVED.with_friction_metric(
+    np.linspace(1.0, 2.0, len(GROOVED.positions))[:, None, None] * np.eye(2)
+)
 DRAWN = {
-    "legs": lambda: synthetic.solution(synthetic.scene(patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)]))),
-    "one point": lambda: with_model(pf.DistributedModel(pf.ContactPatch.points([(0.0, 0.0)]), LAW)),
+    "legs": lambda: synthetic.solution(
+        synthetic.scene(patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)]))
+    ),
+    "one point": lambda: with_model(
+        pf.DistributedModel(pf.ContactPatch.points([(0.0, 0.0)]), LAW)
+    ),
     "own model": lambda: with_model(Own()),
-    "no outline": lambda: synthetic.solution(synthetic.scene(mounted_on="body", outline=None)),
+    "no outline": lambda: synthetic.solution(
+        synthetic.scene(mounted_on="body", outline=None)
+    ),
     "one sample": one_sample,
     "cells differ": lambda: synthetic.solution(synthetic.scene(patch=EACH)),
     "grooved": lambda: synthetic.solution(synthetic.scene(patch=GROOVED)),
-    "published": lambda: with_model(pf.ReducedModelPublished(pf.ContactPatch.disc(0.01, 7), LAW)),
+    "published": lambda: with_model(
+        pf.ReducedModelPublished(pf.ContactPatch.disc(0.01, 7), LAW)
+    ),
     "three contacts": lambda: synthetic.solution(synthetic.scene(contacts=3)),
-    "no load": lambda: changed(synthetic.solution(), normal_force=np.zeros((201, 1)), fy=np.zeros((201, 1))),
+    "no load": lambda: changed(
+        synthetic.solution(), normal_force=np.zeros((201, 1)), fy=np.zeros((201, 1))
+    ),
 }
 
 
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_frame_of_it_is_drawn(name):
     film = film_of(DRAWN[name](), frames=2)
-    first, last = film.picture(0), film.picture(1)
+    first = film.picture(0)
+    last = film.picture(1)
     assert first.shape == last.shape == (270, 480, 3)
     assert (first < 100).any()
-    assert len(panels(film, SurfacePanel)) == {"one point": 0, "own model": 0, "three contacts": 3}.get(name, 1)
+    assert len(panels(film, SurfacePanel)) == {
+        "one point": 0,
+        "own model": 0,
+        "three contacts": 3,
+    }.get(name, 1)
 
 
 @pytest.mark.parametrize("contacts", [1, 2, 3])
@@ -484,7 +622,9 @@ def test_no_word_of_a_frame_is_cut_or_covered(contacts):
 
 def test_a_gif_has_its_frames_at_their_pace(tmp_path):
     seen: list[float] = []
-    path = synthetic.solution(t_end=0.3).animate(tmp_path / "motion.gif", slow=1.0, dpi=30.0, progress=seen.append)
+    path = synthetic.solution(t_end=0.3).animate(
+        tmp_path / "motion.gif", slow=1.0, dpi=30.0, progress=seen.append
+    )
     with Image.open(path) as image:
         durations = []
         for frame in range(image.n_frames):
@@ -500,31 +640,46 @@ def test_a_gif_has_its_frames_at_their_pace(tmp_path):
 def coloured(number: int) -> np.ndarray:
     """A frame of 60 x 40 pixels: white, two frequent colours, and 30 rare ones that change from frame to frame."""
     pixels = np.full((60, 40, 3), 255, dtype=np.uint8)
-    pixels[:20], pixels[20:30] = (0, 114, 178), (230, 97, 0)
+    pixels[:20] = (0, 114, 178)
+    pixels[20:30] = (230, 97, 0)
     rare = 7 * np.arange(30) + 211 * number
-    pixels[50:].reshape(-1, 3)[:30] = np.stack([rare % 256, rare // 7 % 256, rare // 3 % 256], -1)
+    pixels[50:].reshape(-1, 3)[:30] = np.stack(
+        [rare % 256, rare // 7 % 256, rare // 3 % 256], -1
+    )
     return pixels
 
 
 def test_frequent_colours_are_kept_and_rare_ones_are_near(tmp_path):
-    path, file = tmp_path / "colours.gif", io.BytesIO()
+    path = tmp_path / "colours.gif"
+    file = io.BytesIO()
     film_files.write_frames(path, file, coloured, 8, 10.0)
     with Image.open(file) as image:
         assert image.n_frames == 8 and image.info["loop"] == 0
         for number in range(8):
             image.seek(number)
             assert image.info["duration"] == (100 if number < 7 else 1100)
-            off = np.abs(np.asarray(image.convert("RGB"), dtype=int) - coloured(number).astype(int))
+            off = np.abs(
+                np.asarray(image.convert("RGB"), dtype=int)
+                - coloured(number).astype(int)
+            )
             assert off[:50].max() == 0
-            assert off.reshape(-1, 3)[2000:2030].mean() < 30.0  # 22: medians of 256 boxes
+            assert (
+                off.reshape(-1, 3)[2000:2030].mean() < 30.0
+            )  # 22: medians of 256 boxes
 
 
 def test_an_html_file_plays_by_itself(tmp_path):
-    text = synthetic.solution().animate(tmp_path / "motion.html", **SMALL).read_text(encoding="utf-8")
+    text = (
+        synthetic.solution()
+        .animate(tmp_path / "motion.html", **SMALL)
+        .read_text(encoding="utf-8")
+    )
     assert text.count("data:image/png;base64") == 7
     assert re.search(r"(anim\w+) = new Animation\([^;]*; \1\.play_animation\(\);", text)
     assert "http" not in text.replace("http://www.w3.org", "")  # nothing is fetched
-    assert all(each in text for each in ("&minus;</button>", " &gt;</button>", "+</button>"))
+    assert all(
+        each in text for each in ("&minus;</button>", " &gt;</button>", "+</button>")
+    )
 
 
 def test_an_mp4_file_is_a_film(tmp_path):
@@ -536,20 +691,29 @@ def test_an_mp4_file_is_a_film(tmp_path):
 def test_without_ffmpeg_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(film_files.shutil, "which", lambda name: None)
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
-    with pytest.raises(FileError, match=r"ffmpeg is not installed: run pip install 'planarfriction\[ffmpeg\]'"):
+    with pytest.raises(
+        FileError,
+        match=r"ffmpeg is not installed: run pip install 'planarfriction\[ffmpeg\]'",
+    ):
         synthetic.solution().animate(tmp_path / "motion.mp4")
 
 
-def test_an_ffmpeg_that_is_not_where_it_is_named_is_said_to_be_missing(tmp_path, monkeypatch):
+def test_an_ffmpeg_that_is_not_where_it_is_named_is_said_to_be_missing(
+    tmp_path, monkeypatch
+):
     pytest.importorskip("imageio_ffmpeg")
     monkeypatch.setattr(film_files.shutil, "which", lambda name: None)
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "gone"))
-    with pytest.raises(FileError, match=r"there is no ffmpeg at .*gone, which imageio-ffmpeg names"):
+    with pytest.raises(
+        FileError, match=r"there is no ffmpeg at .*gone, which imageio-ffmpeg names"
+    ):
         synthetic.solution().animate(tmp_path / "motion.mp4")
 
 
 def test_the_slowest_gif_is_written(tmp_path):
-    path = synthetic.solution().animate(tmp_path / "motion.gif", fps=animation.SLOWEST, slow=1e3, dpi=20.0)
+    path = synthetic.solution().animate(
+        tmp_path / "motion.gif", fps=animation.SLOWEST, slow=1e3, dpi=20.0
+    )
     assert path.stat().st_size > 0
 
 
@@ -563,7 +727,9 @@ def test_ctrl_c_leaves_what_was_there(tmp_path, kind):
 
     def stop(time: float) -> None:
         calls.append(time)
-        if len(calls) == 9:  # the colours are chosen from 6 frames before the first is written
+        if (
+            len(calls) == 9
+        ):  # the colours are chosen from 6 frames before the first is written
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -573,7 +739,9 @@ def test_ctrl_c_leaves_what_was_there(tmp_path, kind):
 
 
 @pytest.mark.parametrize("stopped", [True, False])
-def test_an_ffmpeg_that_fails_is_named_and_one_that_is_stopped_is_not(tmp_path, monkeypatch, stopped):
+def test_an_ffmpeg_that_fails_is_named_and_one_that_is_stopped_is_not(
+    tmp_path, monkeypatch, stopped
+):
     pytest.importorskip("imageio_ffmpeg")
     from matplotlib.animation import FFMpegWriter
 
@@ -588,31 +756,48 @@ def test_an_ffmpeg_that_fails_is_named_and_one_that_is_stopped_is_not(tmp_path, 
             raise KeyboardInterrupt
 
     monkeypatch.setattr(FFMpegWriter, "finish", fails)
-    wanted = None if stopped else "cannot write .*: ffmpeg failed; write a .gif or .html file instead"
+    wanted = (
+        None
+        if stopped
+        else "cannot write .*: ffmpeg failed; write a .gif or .html file instead"
+    )
     count = iter(range(99))
     with pytest.raises(KeyboardInterrupt if stopped else FileError, match=wanted):
         path = tmp_path / "motion.mp4"
-        synthetic.solution().animate(path, **SMALL, progress=lambda time: stop(time) if next(count) > 2 else None)
+        synthetic.solution().animate(
+            path, **SMALL, progress=lambda time: stop(time) if next(count) > 2 else None
+        )
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"path": "motion.avi"}, r"cannot write motion.avi: animations are .gif, .mp4 or .html files"),
+        (
+            {"path": "motion.avi"},
+            r"cannot write motion.avi: animations are .gif, .mp4 or .html files",
+        ),
         ({"path": "missing/motion.gif"}, "there is no folder"),
         ({"path": 5}, "path must"),
         ({"slow": 0.0}, "slow must be > 0, got 0.0"),
         ({"slow": "fast"}, "slow must"),
-        ({"slow": 1e4}, "slow must be at most 50 here, for at most 3000 frames, got 10000.0"),
+        (
+            {"slow": 1e4},
+            "slow must be at most 50 here, for at most 3000 frames, got 10000.0",
+        ),
         ({"fps": 60}, "fps must be at most 50, got 60.0"),
         ({"fps": -1}, "fps must be > 0"),
         ({"fps": 1e-3}, "fps must be at least 0.01, got 0.001"),
         ({"follow": "body"}, "follow must be True or False, got 'body'"),
         ({"dpi": 5}, "dpi must be from 20 to 400, got 5.0"),
-        ({"progress": 5}, "progress must be a function of the time of a frame, or None, got 5"),
+        (
+            {"progress": 5},
+            "progress must be a function of the time of a frame, or None, got 5",
+        ),
     ],
 )
-def test_what_cannot_be_animated_is_named_in_one_line(arguments, message, tmp_path, monkeypatch):
+def test_what_cannot_be_animated_is_named_in_one_line(
+    arguments, message, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     with pytest.raises((FileError, InvalidValueError), match=message) as caught:
         synthetic.solution().animate(**{"path": "motion.gif", **arguments})
@@ -623,7 +808,9 @@ def test_what_cannot_be_animated_is_named_in_one_line(arguments, message, tmp_pa
 def test_a_solution_without_its_scene_is_not_animated(tmp_path):
     run = dataclasses.replace(synthetic.solution(), scene=None)
     run.data.attrs["scene_left_out"] = "it was so"
-    with pytest.raises(FileError, match="the file has no scene, which the animation needs: it was so"):
+    with pytest.raises(
+        FileError, match="the file has no scene, which the animation needs: it was so"
+    ):
         run.animate(tmp_path / "motion.gif")
     with pytest.raises(InvalidValueError, match="solution must be a Solution, got 5"):
         plots.animate_solution(5, tmp_path / "motion.gif")

@@ -43,7 +43,9 @@ def overhang(figure) -> float:
     canvas.draw()
     drawn = figure.get_tightbbox(canvas.get_renderer())
     width, height = figure.get_size_inches()
-    return figure.dpi * max(0.0, -drawn.x0, -drawn.y0, drawn.x1 - width, drawn.y1 - height)
+    return figure.dpi * max(
+        0.0, -drawn.x0, -drawn.y0, drawn.x1 - width, drawn.y1 - height
+    )
 
 
 def labels(axes) -> set[str]:
@@ -57,7 +59,9 @@ def patch_axes(figure):
     return figure.axes[0]
 
 
-@pytest.mark.parametrize("patch", [pf.ContactPatch.disc(0.01, 11), pf.ContactPatch.rectangle(0.04, 0.01, 12)])
+@pytest.mark.parametrize(
+    "patch", [pf.ContactPatch.disc(0.01, 11), pf.ContactPatch.rectangle(0.04, 0.01, 12)]
+)
 def test_cells_are_drawn_in_their_true_size(patch):
     (cells,) = patch_axes(plots.plot_patch(patch)).collections
     drawn = np.array([polygon.vertices[:4] for polygon in cells.get_paths()])
@@ -69,26 +73,43 @@ def test_cells_are_drawn_in_their_true_size(patch):
 
 def test_ticks_of_lengths_are_in_the_unit_of_their_label():
     axes = style.new_figure(2.0, 2.0).add_subplot()
-    for largest, drawn, label, tick in ((0.01, 10.0, "y [mm]", "10"), (3.0, -2000.0, "y [m]", "\N{MINUS SIGN}2")):
+    for largest, drawn, label, tick in (
+        (0.01, 10.0, "y [mm]", "10"),
+        (3.0, -2000.0, "y [m]", "\N{MINUS SIGN}2"),
+    ):
         style.show_lengths(axes, largest)  # drawn in mm
-        assert (axes.get_ylabel(), axes.yaxis.get_major_formatter()(drawn)) == (label, tick)
+        assert (axes.get_ylabel(), axes.yaxis.get_major_formatter()(drawn)) == (
+            label,
+            tick,
+        )
 
 
 def test_points_show_the_force_on_each():
-    patch = pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05), (0.1, -0.05)], [1, 2, 3], name="three legs")
+    patch = pf.ContactPatch.points(
+        [(0.0, 0.1), (-0.1, -0.05), (0.1, -0.05)], [1, 2, 3], name="three legs"
+    )
     figure = plots.plot_patch(patch, normal_force=6.0)
     (points,) = patch_axes(figure).collections
-    assert np.asarray(points.get_offsets()) == pytest.approx(1e3 * patch.positions, abs=DRAWING)
+    assert np.asarray(points.get_offsets()) == pytest.approx(
+        1e3 * patch.positions, abs=DRAWING
+    )
     assert np.asarray(points.get_array()) == pytest.approx([1.0, 2.0, 3.0], rel=1e-12)
     assert figure.axes[1].get_ylabel() == "normal force [N]"
 
 
 def test_a_patch_that_depends_on_the_load_needs_one():
-    patch = pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01))
+    patch = pf.ContactPatch.rectangle(
+        0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01)
+    )
     with pytest.raises(InvalidValueError, match="normal_force"):
         plots.plot_patch(patch)
     few, many = (
-        (patch_axes(plots.plot_patch(patch, normal_force=load)).collections[0].get_array() > 0).sum()
+        (
+            patch_axes(plots.plot_patch(patch, normal_force=load))
+            .collections[0]
+            .get_array()
+            > 0
+        ).sum()
         for load in (0.1, 3.0)
     )
     assert few < many
@@ -112,7 +133,9 @@ def test_samples_have_spin_and_slide_where_they_belong(name):
 def test_the_poles_close_over_a_cell_in_the_centre_of_pressure():
     # Friction jumps where the centre of rotation crosses a cell: a pole off by rounding would leave a hole in the mesh.
     surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES["Line"]())
-    _, points = scaled_samples(surface, np.array([[0.0], [np.pi]]), np.linspace(0.0, 2 * np.pi, 7)[None, :])
+    _, points = scaled_samples(
+        surface, np.array([[0.0], [np.pi]]), np.linspace(0.0, 2 * np.pi, 7)[None, :]
+    )
     assert (points == points[:, :1]).all()
     assert (
         np.abs(points[..., :2]).max() <= 1 / 21 + 1e-12
@@ -121,7 +144,9 @@ def test_the_poles_close_over_a_cell_in_the_centre_of_pressure():
 
 def test_samples_are_about_the_origin_of_the_contact_frame():
     surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES["LineGrad"]())
-    twists, wrenches = sample_limit_surface(surface, np.array([1.0, 2.0]), np.array([0.5, 4.0]))
+    twists, wrenches = sample_limit_surface(
+        surface, np.array([1.0, 2.0]), np.array([0.5, 4.0])
+    )
     assert wrenches == pytest.approx(surface.wrench(twists), abs=1e-15)
     power = -np.einsum("ni,ni->n", wrenches, twists)
     assert power == pytest.approx(surface.dissipation(twists), rel=1e-12)
@@ -132,19 +157,31 @@ def test_the_ellipsoid_beside_the_surface_is_a_sphere_in_equal_limits(monkeypatc
 
     monkeypatch.setattr(limit_surface, "POLAR_SEGMENTS", 16)
     monkeypatch.setattr(limit_surface, "AZIMUTH_SEGMENTS", 24)
-    meshes, draw = {}, Axes3D.plot_surface
+    meshes = {}
+    draw = Axes3D.plot_surface
     monkeypatch.setattr(
-        Axes3D, "plot_surface", lambda axes, *xyz, **how: meshes.update({axes: xyz}) or draw(axes, *xyz, **how)
+        Axes3D,
+        "plot_surface",
+        lambda axes, *xyz, **how: meshes.update({axes: xyz}) or draw(axes, *xyz, **how),
     )
     surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES["LineGrad"]())
     figure = plots.plot_limit_surface(surface)
     own, ellipsoid = figure.axes
-    soft = pf.ContactPatch.disc(0.02, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01))
-    assert len(plots.plot_limit_surface(pf.LimitSurfaceCells(soft, normal_force=2.0)).axes) == 2  # both at its load
+    soft = pf.ContactPatch.disc(
+        0.02, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01)
+    )
+    assert (
+        len(plots.plot_limit_surface(pf.LimitSurfaceCells(soft, normal_force=2.0)).axes)
+        == 2
+    )  # both at its load
     for axes in figure.axes:
-        assert (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()) == (own.get_xlim(),) * 3
+        assert (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()) == (
+            own.get_xlim(),
+        ) * 3
         assert axes.get_zlabel() == "$\\tau/r$ [-]"
-    assert np.linalg.norm(meshes[ellipsoid], axis=0) == pytest.approx(np.ones_like(meshes[ellipsoid][0]), abs=1e-9)
+    assert np.linalg.norm(meshes[ellipsoid], axis=0) == pytest.approx(
+        np.ones_like(meshes[ellipsoid][0]), abs=1e-9
+    )
     distance = np.linalg.norm(meshes[own], axis=0)
     assert distance.max() < np.sqrt(2) + 1e-9
     assert np.abs(distance - 1.0).max() > 0.1  # the line is not an ellipsoid
@@ -152,7 +189,9 @@ def test_the_ellipsoid_beside_the_surface_is_a_sphere_in_equal_limits(monkeypatc
 
 
 def test_a_limit_surface_can_be_drawn_alone():
-    figure = plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01, 9)), beside=None)
+    figure = plots.plot_limit_surface(
+        pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01, 9)), beside=None
+    )
     (axes,) = figure.axes
     assert axes.get_title() == "disc: ellipsoid"
     assert overhang(figure) <= CUT
@@ -163,10 +202,17 @@ def test_the_facets_of_a_surface_are_small_where_it_is_nearly_flat():
     surface = pf.LimitSurfaceExact(PUBLISHED_PATCHES["NonConvex1"]())
     _, points = scaled_samples(surface, *even_mesh(surface))
     assert points.shape == (POLAR_SEGMENTS + 1, AZIMUTH_SEGMENTS + 1, 3)
-    steps = [np.linalg.norm(np.diff(points, axis=axis), axis=-1).max() for axis in (0, 1)]
-    even = np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)[:, None], np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)
+    steps = [
+        np.linalg.norm(np.diff(points, axis=axis), axis=-1).max() for axis in (0, 1)
+    ]
+    even = (
+        np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)[:, None],
+        np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1),
+    )
     _, points = scaled_samples(surface, *even)
-    before = [np.linalg.norm(np.diff(points, axis=axis), axis=-1).max() for axis in (0, 1)]
+    before = [
+        np.linalg.norm(np.diff(points, axis=axis), axis=-1).max() for axis in (0, 1)
+    ]
     assert max(steps) < 0.5 * max(before)
 
 
@@ -177,21 +223,33 @@ def test_the_surface_to_be_turned_has_the_numbers_of_the_picture(beside):
     figure = plots.interactive_limit_surface(surface, beside=beside)
     assert len(figure.data) == (1 if beside is None else 2)
     own = figure.data[0]
-    mesh, directions = np.stack([own.x, own.y, own.z], -1), np.asarray(own.customdata)
+    mesh = np.stack([own.x, own.y, own.z], -1)
+    directions = np.asarray(own.customdata)
     twists = directions[7, 11] / [1.0, 1.0, surface.contact_radius]
     centre = surface.centre_of_pressure
-    wrench = pf.geometry.wrench_at(surface.wrench(pf.geometry.twist_at(twists, -centre)), centre)
+    wrench = pf.geometry.wrench_at(
+        surface.wrench(pf.geometry.twist_at(twists, -centre)), centre
+    )
     # the direction under the pointer has six digits
-    assert mesh[7, 11] == pytest.approx(wrench / [1.0, 1.0, surface.contact_radius], abs=1e-5)
-    assert isinstance(own.customdata[7][11], list)  # an array of three dimensions shows nothing under the pointer
+    assert mesh[7, 11] == pytest.approx(
+        wrench / [1.0, 1.0, surface.contact_radius], abs=1e-5
+    )
+    assert isinstance(
+        own.customdata[7][11], list
+    )  # an array of three dimensions shows nothing under the pointer
     low, high = figure.layout.scene.zaxis.range
     assert low < mesh.min() and mesh.max() < high
 
 
 def test_without_plotly_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "plotly", None)
-    with pytest.raises(MissingExtraError, match=r"plotly is not installed: run pip install 'planarfriction\[plotly\]'"):
-        plots.interactive_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01, 9)))
+    with pytest.raises(
+        MissingExtraError,
+        match=r"plotly is not installed: run pip install 'planarfriction\[plotly\]'",
+    ):
+        plots.interactive_limit_surface(
+            pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01, 9))
+        )
 
 
 # ---------------------------------------------------------------------- histories
@@ -223,7 +281,9 @@ def test_every_contact_has_its_line_and_its_entry():
     force = figure.axes[1].get_lines()
     assert len(force) == 6
     for line, factor in zip(force, [1, 2, 3, 1, 2, 3], strict=True):
-        assert line.get_ydata() == pytest.approx(factor * np.asarray(run.data["fx"][:, 0]), abs=DRAWING)
+        assert line.get_ydata() == pytest.approx(
+            factor * np.asarray(run.data["fx"][:, 0]), abs=DRAWING
+        )
     (legend,) = figure.legends
     # Column by column, as matplotlib fills legends: each run has its row.
     texts = [text.get_text() for text in legend.get_texts()]
@@ -235,7 +295,9 @@ def test_every_contact_has_its_line_and_its_entry():
 
 def with_values(run: pf.Solution, **values) -> pf.Solution:
     """The solution with other values of some of its variables."""
-    data = run.data.assign({name: (run.data[name].dims, each) for name, each in values.items()})
+    data = run.data.assign(
+        {name: (run.data[name].dims, each) for name, each in values.items()}
+    )
     return pf.Solution(data, run.statistics, run.status, run.message, run.scene)
 
 
@@ -269,7 +331,10 @@ def outlines(figure) -> list[np.ndarray]:
     """Closed lines of five corners, in mm: the outlines of the plate."""
     axes = figure.axes[0]
     drawn = [line for line in axes.lines if len(line.get_xdata()) == 5]
-    return [(line.get_transform() - axes.transData).transform(line.get_xydata()) for line in drawn]
+    return [
+        (line.get_transform() - axes.transData).transform(line.get_xydata())
+        for line in drawn
+    ]
 
 
 def test_strobe_shows_the_outline_where_the_body_is():
@@ -287,9 +352,13 @@ def test_strobe_shows_the_outline_where_the_body_is():
     assert figure.axes[0].get_aspect() == 1.0
 
 
-@pytest.mark.parametrize(("mounted_on", "times"), [("world", 1), ("body", motion.INSTANTS)])
+@pytest.mark.parametrize(
+    ("mounted_on", "times"), [("world", 1), ("body", motion.INSTANTS)]
+)
 def test_pads_are_drawn_with_what_they_are_fixed_to(mounted_on, times):
-    figure = plots.plot_motion(synthetic.solution(synthetic.scene(mounted_on=mounted_on)))
+    figure = plots.plot_motion(
+        synthetic.solution(synthetic.scene(mounted_on=mounted_on))
+    )
     axes = figure.axes[0]
     assert len(axes.patches) == times
     path = axes.patches[-1].get_path().vertices.reshape(317, 5, 2)
@@ -298,9 +367,12 @@ def test_pads_are_drawn_with_what_they_are_fixed_to(mounted_on, times):
 
 
 def test_pads_and_the_path_are_drawn_where_they_are():
-    scene = synthetic.scene(contacts=2, mounted_on="body", patch=pf.ContactPatch.rectangle(0.02, 0.01, 6))
+    scene = synthetic.scene(
+        contacts=2, mounted_on="body", patch=pf.ContactPatch.rectangle(0.02, 0.01, 6)
+    )
     contacts = [
-        dataclasses.replace(each, angle=0.5, position=(0.03 * i, 0.01)) for i, each in enumerate(scene.contacts)
+        dataclasses.replace(each, angle=0.5, position=(0.03 * i, 0.01))
+        for i, each in enumerate(scene.contacts)
     ]
     run = synthetic.solution(dataclasses.replace(scene, contacts=contacts))
     run = with_values(run, x=0.002 + 0.01 * run.data["time"].values)
@@ -310,11 +382,20 @@ def test_pads_and_the_path_are_drawn_where_they_are():
     assert line.get_xydata() == pytest.approx(1e3 * poses[:, :2], abs=DRAWING)
     strobe = poses[np.linspace(0, 200, 12).round().astype(int)]
     (dots,) = [each for each in axes.collections if len(each.get_offsets()) == 12]
-    assert np.asarray(dots.get_offsets()) == pytest.approx(1e3 * strobe[:, :2], abs=DRAWING)
-    pads = [(each.get_transform() - axes.transData).transform(each.get_path().vertices) for each in axes.patches]
-    for pad, (contact, pose) in zip(pads, ((each, pose) for pose in strobe for each in contacts), strict=True):
+    assert np.asarray(dots.get_offsets()) == pytest.approx(
+        1e3 * strobe[:, :2], abs=DRAWING
+    )
+    pads = [
+        (each.get_transform() - axes.transData).transform(each.get_path().vertices)
+        for each in axes.patches
+    ]
+    for pad, (contact, pose) in zip(
+        pads, ((each, pose) for pose in strobe for each in contacts), strict=True
+    ):
         middle = pose[:2] + pf.geometry.rotate(np.array(contact.position), pose[2])
-        assert pad.reshape(-1, 5, 2)[:, :4].mean(axis=(0, 1)) == pytest.approx(1e3 * middle, abs=1e-6)
+        assert pad.reshape(-1, 5, 2)[:, :4].mean(axis=(0, 1)) == pytest.approx(
+            1e3 * middle, abs=1e-6
+        )
         corner = middle + pf.geometry.rotate(np.array([0.01, 0.005]), pose[2] + 0.5)
         assert np.abs(pad - 1e3 * corner).sum(axis=1).min() < 1e-6
 
@@ -329,20 +410,29 @@ def test_a_motion_that_cannot_be_seen_says_how_far_it_goes():
 
 @pytest.mark.parametrize("mounted_on", ["world", "body"])
 def test_everything_drawn_is_within_the_view(mounted_on):
-    run = synthetic.solution(synthetic.scene(contacts=5, mounted_on=mounted_on), scale=3.0)
+    run = synthetic.solution(
+        synthetic.scene(contacts=5, mounted_on=mounted_on), scale=3.0
+    )
     figure = plots.plot_motion(run)
     figure.draw_without_rendering()
     axes = figure.axes[0]
     pads = [path.get_transform() - axes.transData for path in axes.patches]
-    pads = [back.transform(path.get_path().vertices) for back, path in zip(pads, axes.patches, strict=True)]
+    pads = [
+        back.transform(path.get_path().vertices)
+        for back, path in zip(pads, axes.patches, strict=True)
+    ]
     corners = np.concatenate([*outlines(figure), *pads])
-    for values, (low, high) in zip(corners.T, (axes.get_xlim(), axes.get_ylim()), strict=True):
+    for values, (low, high) in zip(
+        corners.T, (axes.get_xlim(), axes.get_ylim()), strict=True
+    ):
         assert low < values.min() and values.max() < high
 
 
 def test_a_run_of_one_sample_can_be_drawn():
     run = synthetic.solution()
-    short = pf.Solution(run.data.isel(time=slice(1)), run.statistics, "success", "", run.scene)
+    short = pf.Solution(
+        run.data.isel(time=slice(1)), run.statistics, "success", "", run.scene
+    )
     assert len(outlines(plots.plot_motion(short))) == 1
     assert overhang(plots.plot_histories(short)) <= CUT
 
@@ -351,11 +441,19 @@ def test_a_run_of_one_sample_can_be_drawn():
 
 
 FIGURES = {
-    "patch": lambda: plots.plot_patch(PUBLISHED_PATCHES["LineGradX"](), normal_force=2.0),
+    "patch": lambda: plots.plot_patch(
+        PUBLISHED_PATCHES["LineGradX"](), normal_force=2.0
+    ),
     "patch, wide": lambda: plots.plot_patch(pf.ContactPatch.rectangle(0.2, 0.01, 30)),
-    "patch, points": lambda: plots.plot_patch(pf.ContactPatch.points([(0.0, 0.1), (-0.1, 0.0)], name="two")),
-    "histories": lambda: plots.plot_histories({"distributed": synthetic.solution(), "reduced": synthetic.solution()}),
-    "histories, contacts": lambda: plots.plot_histories(synthetic.solution(synthetic.scene(contacts=4))),
+    "patch, points": lambda: plots.plot_patch(
+        pf.ContactPatch.points([(0.0, 0.1), (-0.1, 0.0)], name="two")
+    ),
+    "histories": lambda: plots.plot_histories(
+        {"distributed": synthetic.solution(), "reduced": synthetic.solution()}
+    ),
+    "histories, contacts": lambda: plots.plot_histories(
+        synthetic.solution(synthetic.scene(contacts=4))
+    ),
     "motion": lambda: plots.plot_motion(synthetic.solution()),
     "solution": lambda: synthetic.solution().plot(),
 }
@@ -375,7 +473,11 @@ def test_a_label_that_is_cut_off_is_found():
 
 
 def test_notebooks_show_figures():
-    assert plots.plot_patch(pf.ContactPatch.rectangle(0.02, cells=3))._repr_png_().startswith(b"\x89PNG")
+    assert (
+        plots.plot_patch(pf.ContactPatch.rectangle(0.02, cells=3))
+        ._repr_png_()
+        .startswith(b"\x89PNG")
+    )
 
 
 WINDOW = """
@@ -418,7 +520,9 @@ def test_a_figure_opens_its_window_and_waits():
 def test_without_a_screen_show_says_what_to_do():
     code = "import planarfriction as pf; pf.ContactPatch.disc(0.01, 5).plot().show()"
     asked = {"capture_output": True, "text": True, "check": True, "timeout": 120}
-    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, "MPLBACKEND": "agg"}, **asked)
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "MPLBACKEND": "agg"}, **asked
+    )
     assert "no window can open here (agg): use savefig" in done.stderr
 
 
@@ -434,15 +538,54 @@ def test_pyplot_is_left_alone():
 
 
 @settings(deadline=None, max_examples=25)
-@given(kind=st.sampled_from(sorted(shown._UNITS)), exponent=st.floats(-8.0, 4.0), sign=st.sampled_from([-1.0, 1.0]))
+@given(
+    kind=st.sampled_from(sorted(shown._UNITS)),
+    exponent=st.floats(-8.0, 4.0),
+    sign=st.sampled_from([-1.0, 1.0]),
+)
 def test_units_suit_the_numbers(kind, exponent, sign):
     value = sign * 10.0**exponent
     unit = unit_for(kind, np.array([0.0, value]), np.array([0.5 * value]))
     assert unit == unit_for(kind, np.array([value]))
-    names = {"N mm": 1e3, "N µm": 1e6, "mm/s": 1e3, "µm/s": 1e6, "nm/s": 1e9, "deg": 180 / np.pi, "µrad": 1e6}
-    names |= {"m": 1, "mm": 1e3, "µm": 1e6, "nm": 1e9, "m/s": 1, "N": 1, "kN": 1e-3, "mN": 1e3, "N m": 1}
-    names |= {"GPa": 1e-9, "MPa": 1e-6, "kPa": 1e-3, "Pa": 1, "µN": 1e6, "nN": 1e9, "kN m": 1e-3, "N nm": 1e9}
-    names |= {"km": 1e-3, "km/s": 1e-3, "h": 1 / 3600, "s": 1, "ms": 1e3, "µs": 1e6, "ns": 1e9}
+    names = {
+        "N mm": 1e3,
+        "N µm": 1e6,
+        "mm/s": 1e3,
+        "µm/s": 1e6,
+        "nm/s": 1e9,
+        "deg": 180 / np.pi,
+        "µrad": 1e6,
+    }
+    names |= {
+        "m": 1,
+        "mm": 1e3,
+        "µm": 1e6,
+        "nm": 1e9,
+        "m/s": 1,
+        "N": 1,
+        "kN": 1e-3,
+        "mN": 1e3,
+        "N m": 1,
+    }
+    names |= {
+        "GPa": 1e-9,
+        "MPa": 1e-6,
+        "kPa": 1e-3,
+        "Pa": 1,
+        "µN": 1e6,
+        "nN": 1e9,
+        "kN m": 1e-3,
+        "N nm": 1e9,
+    }
+    names |= {
+        "km": 1e-3,
+        "km/s": 1e-3,
+        "h": 1 / 3600,
+        "s": 1,
+        "ms": 1e3,
+        "µs": 1e6,
+        "ns": 1e9,
+    }
     assert unit.factor == pytest.approx(names[unit.label])
 
 
@@ -456,14 +599,25 @@ def test_zero_is_shown_in_the_usual_unit():
     [
         (lambda: plots.plot_motion(5), "solution must be a Solution, got 5"),
         (lambda: plots.plot_solution(None), "solution must be a Solution, got None"),
-        (lambda: plots.plot_histories("run"), "solutions must be a Solution or a table of them by name, got 'run'"),
-        (lambda: plots.plot_histories({"run": 5}), "solutions must be Solutions, under 'run' too, got 5"),
+        (
+            lambda: plots.plot_histories("run"),
+            "solutions must be a Solution or a table of them by name, got 'run'",
+        ),
+        (
+            lambda: plots.plot_histories({"run": 5}),
+            "solutions must be Solutions, under 'run' too, got 5",
+        ),
         (lambda: plots.plot_histories({}), "solutions must hold at least one Solution"),
         (lambda: plots.plot_patch(5), "patch must be a ContactPatch, got 5"),
-        (lambda: plots.plot_patch(pf.ContactPatch.disc(0.01), normal_force=[1.0]), "normal_force must be a number"),
+        (
+            lambda: plots.plot_patch(pf.ContactPatch.disc(0.01), normal_force=[1.0]),
+            "normal_force must be a number",
+        ),
         (lambda: plots.plot_limit_surface(5), "surface must be a limit surface, got 5"),
         (
-            lambda: plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), beside="me"),
+            lambda: plots.plot_limit_surface(
+                pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), beside="me"
+            ),
             "beside must be a limit surface, \"ellipsoid\" or None, got 'me'",
         ),
     ],
@@ -479,18 +633,31 @@ def test_what_cannot_be_drawn_is_named_in_one_line(call, message):
 def changed(run: pf.Solution, every: float = 1.0, **values) -> pf.Solution:
     """The solution with other values of some variables, and its times so many times as long."""
     run = with_values(run, **values)
-    return dataclasses.replace(run, histories=run.data.assign_coords(time=every * run.data["time"]))
+    return dataclasses.replace(
+        run, histories=run.data.assign_coords(time=every * run.data["time"])
+    )
 
 
 def scaled(by: float) -> pf.Solution:
     """All lengths and forces so many times as large; the body and its patch stay as they are."""
     run = synthetic.solution()
-    return with_values(run, **{name: by * run.data[name].values for name in ("x", "y", "vx", "vy", *FORCES)})
+    return with_values(
+        run,
+        **{
+            name: by * run.data[name].values for name in ("x", "y", "vx", "vy", *FORCES)
+        },
+    )
 
 
 def resting() -> pf.Solution:
     run = synthetic.solution()
-    return with_values(run, **{name: 0.0 * run.data[name].values for name in ("x", "y", "theta", "vx", "vy", "omega")})
+    return with_values(
+        run,
+        **{
+            name: 0.0 * run.data[name].values
+            for name in ("x", "y", "theta", "vx", "vy", "omega")
+        },
+    )
 
 
 FORCES = ("fx", "fy", "tau", "normal_force")
@@ -498,16 +665,26 @@ LONG = "a name that is rather long for a plate in the hand of somebody"
 AWKWARD = {
     "microseconds": lambda: changed(synthetic.solution(), 1e-6),
     "days": lambda: changed(synthetic.solution(), 1e5),
-    "one sample": lambda: dataclasses.replace(synthetic.solution(), histories=synthetic.solution().data.isel(time=[0])),
+    "one sample": lambda: dataclasses.replace(
+        synthetic.solution(), histories=synthetic.solution().data.isel(time=[0])
+    ),
     "tiny": lambda: scaled(1e-9),
-    "far": lambda: with_values(synthetic.solution(), x=3e4 * np.linspace(0.0, 1.0, 201)),
-    "no outline": lambda: synthetic.solution(synthetic.scene(mounted_on="body", outline=None)),
-    "legs": lambda: synthetic.solution(synthetic.scene(patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)]))),
+    "far": lambda: with_values(
+        synthetic.solution(), x=3e4 * np.linspace(0.0, 1.0, 201)
+    ),
+    "no outline": lambda: synthetic.solution(
+        synthetic.scene(mounted_on="body", outline=None)
+    ),
+    "legs": lambda: synthetic.solution(
+        synthetic.scene(patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)]))
+    ),
     "long names": lambda: synthetic.solution(synthetic.scene(contacts=3, name=LONG)),
 }
 
 
-@pytest.mark.parametrize("name", ["microseconds", "one sample", "tiny", "far", "no outline", "legs"])
+@pytest.mark.parametrize(
+    "name", ["microseconds", "one sample", "tiny", "far", "no outline", "legs"]
+)
 def test_nothing_is_wrong_with_the_picture_of_a_motion(name):
     assert faults(plots.plot_motion(AWKWARD[name]())) == []
 
@@ -522,9 +699,14 @@ def test_one_sample_is_seen():
     assert [line.get_marker() for line in lines] == ["o"]
 
 
-@pytest.mark.parametrize("labels", [[f"mu_c = {i / 100:.2f}, mass = {i}" for i in range(30)], [LONG, 2 * LONG]])
+@pytest.mark.parametrize(
+    "labels",
+    [[f"mu_c = {i / 100:.2f}, mass = {i}" for i in range(30)], [LONG, 2 * LONG]],
+)
 def test_many_runs_and_long_names_of_them_fit(labels):
-    runs = {label: synthetic.solution(scale=1.0 + 0.1 * i) for i, label in enumerate(labels)}
+    runs = {
+        label: synthetic.solution(scale=1.0 + 0.1 * i) for i, label in enumerate(labels)
+    }
     figure = plots.plot_histories(runs)
     assert faults(figure) == []
     assert len(figure.axes[1].get_lines()) == len(labels)
@@ -538,7 +720,9 @@ PATCHES = {
     "tall": lambda: (pf.ContactPatch.rectangle(0.004, 0.4, cells=5), 2.0),
     "line": lambda: (PUBLISHED_PATCHES["Line"](), None),
     "map": lambda: (
-        pf.ContactPatch.from_pressure(np.ones((90, 120)), cell_size=1e-4, name=LONG + " there"),
+        pf.ContactPatch.from_pressure(
+            np.ones((90, 120)), cell_size=1e-4, name=LONG + " there"
+        ),
         123456.789,
     ),
     "without load": lambda: (pf.ContactPatch.disc(0.01, 11), 0.0),
@@ -558,7 +742,8 @@ def test_nothing_is_wrong_with_the_picture_of_a_patch(name):
 
 
 def test_a_model_has_its_colour_in_every_figure():
-    patch, law = pf.ContactPatch.disc_published(0.01, 7), pf.LuGre(mu_s=1.2)
+    patch = pf.ContactPatch.disc_published(0.01, 7)
+    law = pf.LuGre(mu_s=1.2)
     models = {
         "a": pf.DistributedModel(patch, law),
         "b": pf.ReducedModelPublished(patch, law),
@@ -566,10 +751,14 @@ def test_a_model_has_its_colour_in_every_figure():
     }
     scene = synthetic.scene()
     runs = {
-        name: synthetic.solution(dataclasses.replace(scene, contacts=[pf.Contact(model, 2.0, name="pad")]))
+        name: synthetic.solution(
+            dataclasses.replace(scene, contacts=[pf.Contact(model, 2.0, name="pad")])
+        )
         for name, model in models.items()
     }
-    drawn = [line.get_color() for line in plots.plot_histories(runs).axes[0].get_lines()]
+    drawn = [
+        line.get_color() for line in plots.plot_histories(runs).axes[0].get_lines()
+    ]
     assert drawn == [style.DISTRIBUTED, style.PUBLISHED, style.FEW]
     assert tuple(drawn) == (looks.DISTRIBUTED, looks.REDUCED, looks.FEW)
 
@@ -578,41 +767,58 @@ def test_a_body_that_is_tiny_beside_its_path_is_drawn_larger_and_says_so():
     figure = plots.plot_motion(AWKWARD["far"]())
     times = float(figure.axes[0].get_title(loc="left").split()[2])
     plate = outlines(figure)[0]
-    assert np.ptp(plate, axis=0) == pytest.approx(times * np.array([150.0, 80.0]), rel=1e-6)
-    assert labels(figure.axes[0]) == {"x [km]", "y [km]"}  # 30 km along x, and less along y
+    assert np.ptp(plate, axis=0) == pytest.approx(
+        times * np.array([150.0, 80.0]), rel=1e-6
+    )
+    assert labels(figure.axes[0]) == {
+        "x [km]",
+        "y [km]",
+    }  # 30 km along x, and less along y
     assert plots.plot_motion(synthetic.solution()).axes[0].get_title(loc="left") == ""
-    assert plots.plot_motion(resting()).axes[0].get_title(loc="left") == "it does not move"
+    assert (
+        plots.plot_motion(resting()).axes[0].get_title(loc="left") == "it does not move"
+    )
 
 
 def test_the_turn_of_a_round_body_shows():
     angle = np.linspace(0.0, 2.0 * np.pi, 40)[:-1]
     scene = synthetic.scene(outline=0.05 * np.stack([np.cos(angle), np.sin(angle)], -1))
     lines = motion.body_lines(synthetic.solution(scene))
-    assert len(lines) == 2 and lines[1] == pytest.approx(np.array([[0.0, 0.0], [0.05, 0.0]]))
+    assert len(lines) == 2 and lines[1] == pytest.approx(
+        np.array([[0.0, 0.0], [0.05, 0.0]])
+    )
     assert len(motion.body_lines(synthetic.solution())) == 1
 
 
 def test_figures_have_the_size_and_the_panels_that_are_asked_for():
     run = synthetic.solution()
-    figure = plots.plot_histories({"a": run, "b": run}, panels=("y", "theta"), size=(3.5, 3.0))
+    figure = plots.plot_histories(
+        {"a": run, "b": run}, panels=("y", "theta"), size=(3.5, 3.0)
+    )
     assert tuple(figure.get_size_inches()) == (3.5, 3.0)
     assert [axes.get_ylabel().partition(" [")[0] for axes in figure.axes] == ["y", "θ"]
     assert overhang(figure) <= CUT
     patch = pf.ContactPatch.disc(0.01)
-    for small in (plots.plot_motion(run, size=(3.5, 3.0)), plots.plot_patch(patch, size=(3.5, 3.0))):
+    for small in (
+        plots.plot_motion(run, size=(3.5, 3.0)),
+        plots.plot_patch(patch, size=(3.5, 3.0)),
+    ):
         assert tuple(small.get_size_inches()) == (3.5, 3.0)
         assert overhang(small) <= CUT
 
 
 def test_all_histories_fit_into_a_column_of_a_paper():
     with matplotlib.style.context("planarfriction.plots.print"):
-        figure = plots.plot_histories({"a": synthetic.solution(), "b": synthetic.solution()}, size=(3.5, 3.0))
+        figure = plots.plot_histories(
+            {"a": synthetic.solution(), "b": synthetic.solution()}, size=(3.5, 3.0)
+        )
         assert faults(figure) == []
     assert [figure.axes[i].get_title() for i in range(2)] == ["body", "contacts"]
 
 
 def test_figures_draw_into_axes_of_a_users_own():
-    run, figure = synthetic.solution(), style.new_figure(9.0, 3.0)
+    run = synthetic.solution()
+    figure = style.new_figure(9.0, 3.0)
     left, middle, right = figure.subplots(1, 3)
     assert plots.plot_histories(run, panels=["fx"], axes=right) is figure
     assert plots.plot_motion(run, ax=middle) is figure
@@ -621,7 +827,12 @@ def test_figures_draw_into_axes_of_a_users_own():
     assert middle.get_lines()
     assert left.collections
     space = style.new_figure(3.0, 3.0).add_subplot(projection="3d")
-    assert plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), ax=space) is space.figure
+    assert (
+        plots.plot_limit_surface(
+            pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), ax=space
+        )
+        is space.figure
+    )
     assert len(space.collections) == 1
 
 
@@ -649,25 +860,35 @@ def test_axes_of_three_dimensions_are_refused_in_the_plane():
         lambda: plots.plot_patch(pf.ContactPatch.disc(0.01), ax=space),
     ]
     for call in calls:
-        with pytest.raises(pf.FrictionError, match="must be those of a plane") as caught:
+        with pytest.raises(
+            pf.FrictionError, match="must be those of a plane"
+        ) as caught:
             call()
         assert "\n" not in str(caught.value)
     flat = style.new_figure(3.0, 3.0).add_subplot()
     with pytest.raises(pf.FrictionError, match="ax must have three dimensions"):
-        plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), ax=flat)
+        plots.plot_limit_surface(
+            pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), ax=flat
+        )
 
 
 def test_axes_are_as_many_as_panels():
     axes = style.new_figure(3.0, 3.0).subplots(2)
-    with pytest.raises(pf.FrictionError, match="axes must be one for each of 1 panels, got 2"):
+    with pytest.raises(
+        pf.FrictionError, match="axes must be one for each of 1 panels, got 2"
+    ):
         plots.plot_histories(synthetic.solution(), panels=["x"], axes=axes)
     with pytest.raises(pf.FrictionError, match="size must be left out with axes"):
-        plots.plot_histories(synthetic.solution(), panels=["x"], axes=axes[:1], size=(3.0, 3.0))
+        plots.plot_histories(
+            synthetic.solution(), panels=["x"], axes=axes[:1], size=(3.0, 3.0)
+        )
 
 
 @pytest.mark.parametrize(("sheet", "points"), [("print", 8.0), ("talk", 16.0)])
 def test_style_sheets_come_with_the_library(sheet, points):
     with matplotlib.style.context(f"planarfriction.plots.{sheet}"):
-        figure = plots.plot_histories({"a model of some name": synthetic.solution(), "b": synthetic.solution()})
+        figure = plots.plot_histories(
+            {"a model of some name": synthetic.solution(), "b": synthetic.solution()}
+        )
         assert figure.axes[0].yaxis.label.get_size() == pytest.approx(points)
         assert overhang(figure) <= CUT

@@ -9,7 +9,9 @@ from planarfriction.plots import style
 def test_a_figure_without_a_window_says_so(monkeypatch):
     monkeypatch.setattr(pyplot, "get_backend", lambda: "Agg")
     monkeypatch.setattr(pyplot, "show", lambda: pytest.fail("a window opens"))
-    with pytest.warns(UserWarning, match=r"no window can open here \(Agg\): use savefig"):
+    with pytest.warns(
+        UserWarning, match=r"no window can open here \(Agg\): use savefig"
+    ):
         style.PlotFigure().show()
     style.PlotFigure().show(warn=False)
 

@@ -11,7 +11,15 @@ from scipy import integrate
 import planarfriction as pf
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.scenes import driven, in_hand
-from tests.support.anisotropic import GRAIN, GRAINS, LEANS, PATCHES, PLAIN, STRIBECK, reduced
+from tests.support.anisotropic import (
+    GRAIN,
+    GRAINS,
+    LEANS,
+    PATCHES,
+    PLAIN,
+    STRIBECK,
+    reduced,
+)
 from tests.support.repository import script
 
 every_patch = pytest.mark.parametrize("name", PATCHES)
@@ -21,32 +29,58 @@ def test_a_block_with_a_grooved_sole_drifts_as_the_closed_form_says():
     example = script("examples/grooved_incline.py")
     slope = math.radians(25.0)
     for kind in ("distributed", "reduced"):
-        assert example.drift_of(example.slide(slope, kind)) == pytest.approx(example.drift(slope), abs=1e-4)
+        assert example.drift_of(example.slide(slope, kind)) == pytest.approx(
+            example.drift(slope), abs=1e-4
+        )
     limit = example.steepest_at_rest()
-    assert np.hypot(*(example.slide(limit - 0.002).data[v].values[-1] for v in "xy")) < 1e-4
-    assert np.hypot(*(example.slide(limit + 0.01).data[v].values[-1] for v in "xy")) > 1e-3
+    assert (
+        np.hypot(*(example.slide(limit - 0.002).data[v].values[-1] for v in "xy"))
+        < 1e-4
+    )
+    assert (
+        np.hypot(*(example.slide(limit + 0.01).data[v].values[-1] for v in "xy")) > 1e-3
+    )
 
 
 @every_patch
 def test_the_solver_agrees_with_an_independent_integration(name):
     """The patch is moved as prescribed; the bristles are integrated from `rate` by a general solver."""
     model = pf.DistributedModel(PATCHES[name], STRIBECK)
-    twist = pf.Signal.sampled([0.0, 0.05], [(0.0, 0.0, 0.0), (3e-3, -1e-3, 0.4)], hold="linear")
-    data = pf.simulate(driven(model, twist=twist, at="origin", t_end=0.05), rtol=1e-8, atol=1e-7).data
+    twist = pf.Signal.sampled(
+        [0.0, 0.05], [(0.0, 0.0, 0.0), (3e-3, -1e-3, 0.4)], hold="linear"
+    )
+    data = pf.simulate(
+        driven(model, twist=twist, at="origin", t_end=0.05), rtol=1e-8, atol=1e-7
+    ).data
 
     def rate(t, z):
-        return model.rate(z.reshape(model.state_shape) * 1e-6, twist(t), 1.0).ravel() * 1e6
+        return (
+            model.rate(z.reshape(model.state_shape) * 1e-6, twist(t), 1.0).ravel() * 1e6
+        )
 
-    run = integrate.solve_ivp(rate, (0.0, 0.05), model.rest().ravel(), method="LSODA", rtol=1e-9, atol=1e-9)
-    wrench = model.wrench(run.y[:, -1].reshape(model.state_shape) * 1e-6, twist(0.05), 1.0)
-    np.testing.assert_allclose([data[v].values[-1, 0] for v in ("fx", "fy", "tau")], wrench, rtol=1e-5, atol=1e-8)
+    run = integrate.solve_ivp(
+        rate, (0.0, 0.05), model.rest().ravel(), method="LSODA", rtol=1e-9, atol=1e-9
+    )
+    wrench = model.wrench(
+        run.y[:, -1].reshape(model.state_shape) * 1e-6, twist(0.05), 1.0
+    )
+    np.testing.assert_allclose(
+        [data[v].values[-1, 0] for v in ("fx", "fy", "tau")],
+        wrench,
+        rtol=1e-5,
+        atol=1e-8,
+    )
 
 
 @every_patch
 def test_a_free_body_converges_in_few_steps(name):
     """A wrong Jacobian would cost the solver its order: many more steps, and results that depend on the tolerance."""
-    model, plain = pf.DistributedModel(PATCHES[name], STRIBECK), pf.DistributedModel(PLAIN, STRIBECK)
-    loose, tight = (pf.simulate(in_hand(model, t_end=0.4), rtol=rtol, atol=50 * rtol) for rtol in (1e-5, 1e-8))
+    model = pf.DistributedModel(PATCHES[name], STRIBECK)
+    plain = pf.DistributedModel(PLAIN, STRIBECK)
+    loose, tight = (
+        pf.simulate(in_hand(model, t_end=0.4), rtol=rtol, atol=50 * rtol)
+        for rtol in (1e-5, 1e-8)
+    )
     reference = pf.simulate(in_hand(plain, t_end=0.4), rtol=1e-8, atol=5e-7)
     assert tight.statistics.steps < 2.0 * reference.statistics.steps
     for history in ("x", "y"):
@@ -60,8 +94,12 @@ def test_scenes_round_trip_to_the_bit(tmp_path):
             scene.to_file(tmp_path / f"{number}.{suffix}")
             again = pf.Scene.from_file(tmp_path / f"{number}.{suffix}")
             assert again.digest() == scene.digest()
-            assert np.array_equal(again.contacts[0].model.patch.levers(), patch.levers())
-            assert np.array_equal(again.contacts[0].model.patch.asymmetries(), patch.asymmetries())
+            assert np.array_equal(
+                again.contacts[0].model.patch.levers(), patch.levers()
+            )
+            assert np.array_equal(
+                again.contacts[0].model.patch.asymmetries(), patch.asymmetries()
+            )
 
 
 SHORT = """
@@ -85,7 +123,11 @@ def test_a_grain_in_a_scene_file(tmp_path):
     np.testing.assert_array_equal(patch.metric, GRAIN)
     np.testing.assert_array_equal(patch.asymmetry, [0.1, 0.0])
     for old, new, message in (
-        ("along = 1.3", "along = -1", r"\[contact.patch.metric\]: along must be > 0, got -1.0"),
+        (
+            "along = 1.3",
+            "along = -1",
+            r"\[contact.patch.metric\]: along must be > 0, got -1.0",
+        ),
         ("along = 1.3, ", "", r"\[contact.patch.metric\]: missing key 'along'"),
         ("across", "acros", "unknown key 'acros'"),
         ("[0.1, 0]", "[2, 0]", r"\[contact.patch\]: asymmetry must be shorter than 1"),
@@ -105,7 +147,9 @@ def test_finer_cells_keep_their_friction():
 def test_dropped_cells_take_their_metric_along():
     kept = np.arange(PLAIN.cells) % 3 > 0
     pressure = np.where(kept, 1.0, 0.0)
-    patch = pf.ContactPatch(PLAIN.positions, PLAIN.areas, pressure, metric=GRAINS, asymmetry=LEANS)
+    patch = pf.ContactPatch(
+        PLAIN.positions, PLAIN.areas, pressure, metric=GRAINS, asymmetry=LEANS
+    )
     assert np.array_equal(patch.metric, GRAINS[kept])
     assert np.array_equal(patch.asymmetry, LEANS[kept])
 
@@ -116,8 +160,16 @@ def test_dropped_cells_take_their_metric_along():
 @pytest.mark.parametrize(
     ("metric", "asymmetry", "message"),
     [
-        ([[1.0, 2.0], [2.0, 1.0]], None, "metric must be symmetric and positive definite"),
-        ([[1.0, 0.1], [0.0, 1.0]], None, "metric must be symmetric and positive definite"),
+        (
+            [[1.0, 2.0], [2.0, 1.0]],
+            None,
+            "metric must be symmetric and positive definite",
+        ),
+        (
+            [[1.0, 0.1], [0.0, 1.0]],
+            None,
+            "metric must be symmetric and positive definite",
+        ),
         (np.zeros((2, 2)), None, "metric must be symmetric and positive definite"),
         (np.eye(3), None, r"metric must have shape \[2, 2\], got shape \[3, 3\]"),
         (np.tile(np.eye(2), (3, 1, 1)), None, r"metric must have shape \[12, 2, 2\]"),
@@ -141,7 +193,9 @@ def test_wrong_metrics_get_one_line(metric, asymmetry, message):
         lambda: pf.ReducedModelPublished(PATCHES["metric"], STRIBECK),
         lambda: reduced(PATCHES["cell metrics"]),
         lambda: reduced(PATCHES["both"]),
-        lambda: pf.ReducedModelPublished(PATCHES["metric"], STRIBECK, surface=pf.LimitSurfaceTable(PLAIN)),
+        lambda: pf.ReducedModelPublished(
+            PATCHES["metric"], STRIBECK, surface=pf.LimitSurfaceTable(PLAIN)
+        ),
         lambda: pf.identify.identify_motion([], PATCHES["metric"], None),  # pyright: ignore
     ],
 )

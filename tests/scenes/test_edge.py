@@ -27,14 +27,31 @@ def square(cells):
 PADS = [square(5), square(11), pf.ReducedModel(pf.ContactPatch.rectangle(WIDTH), LAW)]
 
 
-def slide(model, velocity, t_end=1.0, *, position=(0.0, 0.0), angle=0.0, outline=PLATE, pad=None, **options):
+def slide(
+    model,
+    velocity,
+    t_end=1.0,
+    *,
+    position=(0.0, 0.0),
+    angle=0.0,
+    outline=PLATE,
+    pad=None,
+    **options,
+):
     """Return the scene of a plate that slides past a pad, without gravity."""
     body = pf.Body(0.2, 4.8e-4, position, angle, velocity, (0.0, 0.0), outline)
-    return pf.Scene(body, [pf.Contact(model, LOAD, edge=True, **(pad or {}))], t_end, **options)
+    return pf.Scene(
+        body, [pf.Contact(model, LOAD, edge=True, **(pad or {}))], t_end, **options
+    )
 
 
 def end_of(solution):
-    return np.array([float(solution.data[name][-1]) for name in ("x", "y", "theta", "vx", "vy", "omega")])
+    return np.array(
+        [
+            float(solution.data[name][-1])
+            for name in ("x", "y", "theta", "vx", "vy", "omega")
+        ]
+    )
 
 
 @jit
@@ -46,15 +63,27 @@ def _covered(place, corners, x, y, radius):
 def test_the_covered_part_of_a_disc_is_that_in_its_polygon(corners):
     random = np.random.default_rng(corners)
     for _ in range(100):
-        angles = 2.0 * np.pi / corners * (np.arange(corners) + random.uniform(0.0, 0.9, corners))
-        outline = random.uniform(0.2, 1.5, (corners, 1)) * np.column_stack([np.cos(angles), np.sin(angles)])
-        (x, y), radius = random.uniform(-1.0, 1.0, 2), random.uniform(0.05, 1.0)
-        disc = shapely.Point(x, y).buffer(radius, quad_segs=2000)  # a polygon: its area is right to 1e-7
+        angles = (
+            2.0
+            * np.pi
+            / corners
+            * (np.arange(corners) + random.uniform(0.0, 0.9, corners))
+        )
+        outline = random.uniform(0.2, 1.5, (corners, 1)) * np.column_stack(
+            [np.cos(angles), np.sin(angles)]
+        )
+        (x, y) = random.uniform(-1.0, 1.0, 2)
+        radius = random.uniform(0.05, 1.0)
+        disc = shapely.Point(x, y).buffer(
+            radius, quad_segs=2000
+        )  # a polygon: its area is right to 1e-7
         part = shapely.intersection(disc, shapely.Polygon(outline))
         share, mx, my = _covered(place_of(outline), corners, x, y, radius)
         assert share == pytest.approx(part.area / disc.area, abs=1e-6)
         if share > 1e-3:
-            assert (x + mx, y + my) == pytest.approx((part.centroid.x, part.centroid.y), abs=1e-4)
+            assert (x + mx, y + my) == pytest.approx(
+                (part.centroid.x, part.centroid.y), abs=1e-4
+            )
 
 
 @pytest.mark.parametrize("far", [1e2, 1e6, 1e12])
@@ -68,35 +97,62 @@ def test_corners_may_be_far_away(far):
         assert share == pytest.approx(area / np.pi, rel=1e-12)
         assert mx == pytest.approx(-2e-3 / 3.0 * np.sin(half) ** 3 / area, rel=1e-10)
         assert abs(my) < 1e-15
-    corner, along = np.array([2e-4, 1e-4]), np.array([[-0.6, -0.8], [-0.8, 0.6]])
-    found = [_covered(place_of(np.vstack([corner, corner + size * along])), 3, 0.0, 0.0, 1e-3) for size in (0.1, far)]
+    corner = np.array([2e-4, 1e-4])
+    along = np.array([[-0.6, -0.8], [-0.8, 0.6]])
+    found = [
+        _covered(
+            place_of(np.vstack([corner, corner + size * along])), 3, 0.0, 0.0, 1e-3
+        )
+        for size in (0.1, far)
+    ]
     assert found[1] == pytest.approx(found[0], rel=1e-10)
 
 
-@pytest.mark.parametrize(("model", "late"), list(zip(PADS, (3e-4, 1.3e-4, 4e-4), strict=True)))
+@pytest.mark.parametrize(
+    ("model", "late"), list(zip(PADS, (3e-4, 1.3e-4, 4e-4), strict=True))
+)
 def test_a_plate_pulled_off_brakes_with_all_of_the_load_to_the_end(model, late):
     """It leaves when it has moved 50 mm; a cell stands for a disc of its area, which reaches 0.064 cells further."""
     solution = pf.simulate(slide(model, (0.0, -1.0, 0.0), start="sliding"))
-    data, way = solution.data.squeeze("contact"), -float(solution.data.y[-1])
+    data = solution.data.squeeze("contact")
+    way = -float(solution.data.y[-1])
     assert np.abs(data.fy[:-1] - MU * LOAD).max() < 1e-9 and float(data.fy[-1]) == 0.0
-    assert (data.normal_force[:-1] == LOAD).all() and float(data.normal_force[-1]) == 0.0
+    assert (data.normal_force[:-1] == LOAD).all() and float(
+        data.normal_force[-1]
+    ) == 0.0
     assert 0.05 < way < 0.05 + late
-    assert float(data.vy[-1]) ** 2 == pytest.approx(1.0 - 2.0 * MU * LOAD / 0.2 * way, rel=1e-4)
+    assert float(data.vy[-1]) ** 2 == pytest.approx(
+        1.0 - 2.0 * MU * LOAD / 0.2 * way, rel=1e-4
+    )
     assert float(data.ended) == float(data.time[-1])
-    assert (solution.status, solution.message) == ("left its contacts", "the body left its last contact")
-    assert f"left its contacts: {len(data.time)} samples to t={float(data.time[-1]):g} s" in repr(solution)
+    assert (solution.status, solution.message) == (
+        "left its contacts",
+        "the body left its last contact",
+    )
+    assert (
+        f"left its contacts: {len(data.time)} samples to t={float(data.time[-1]):g} s"
+        in repr(solution)
+    )
     assert f"'contact' ended at t={float(data.ended):.4g} s" in repr(solution)
 
 
-@pytest.mark.parametrize(("model", "off"), list(zip(PADS, (2.5e-4, 6e-5, 1e-4), strict=True)))
+@pytest.mark.parametrize(
+    ("model", "off"), list(zip(PADS, (2.5e-4, 6e-5, 1e-4), strict=True))
+)
 def test_the_torque_is_that_of_the_covered_part(model, off):
     for edge in np.linspace(-0.009, 0.009, 7):
         middle = [(edge, 0.0), (edge, 0.0)]  # twice, and over the centre of a cell
         outline = [(-0.1, -0.05), (edge, -0.05), *middle, (edge, 0.05), (-0.1, 0.05)]
-        body = pf.Body(1e3, 1e3, velocity=(0.0, -0.1, 0.0), gravity=(0.0, 0.0), outline=outline)
-        data = pf.simulate(pf.Scene(body, [pf.Contact(model, LOAD, edge=True)], 0.01)).data
+        body = pf.Body(
+            1e3, 1e3, velocity=(0.0, -0.1, 0.0), gravity=(0.0, 0.0), outline=outline
+        )
+        data = pf.simulate(
+            pf.Scene(body, [pf.Contact(model, LOAD, edge=True)], 0.01)
+        ).data
         assert np.isfinite(data.tau).all()
-        assert float(data.tau[-1, 0] / data.fy[-1, 0]) == pytest.approx(0.5 * (edge - 0.5 * WIDTH), abs=off)
+        assert float(data.tau[-1, 0] / data.fy[-1, 0]) == pytest.approx(
+            0.5 * (edge - 0.5 * WIDTH), abs=off
+        )
 
 
 def test_a_plate_of_any_size_moves_as_a_large_one():
@@ -111,12 +167,17 @@ def test_a_plate_of_any_size_moves_as_a_large_one():
 
 
 def test_half_a_disc_spins_as_a_disc_of_half_the_area_about_its_centroid():
-    model, torque = pf.DistributedModel(square(11).patch.discs(1), LAW), []
+    model = pf.DistributedModel(square(11).patch.discs(1), LAW)
+    torque = []
     off = 4.0 * model.patch.radii[0] / (3.0 * np.pi)
     for edge, centre in ((0.1, 0.0), (0.0, -off)):
         outline = [(-0.1, -0.05), (edge, -0.05), (edge, 0.05), (-0.1, 0.05)]
-        body = pf.Body(1e3, 1e3, velocity=(0.0, -centre, 1.0), gravity=(0.0, 0.0), outline=outline)
-        data = pf.simulate(pf.Scene(body, [pf.Contact(model, LOAD, edge=True)], 1e-3)).data.isel(time=-1, contact=0)
+        body = pf.Body(
+            1e3, 1e3, velocity=(0.0, -centre, 1.0), gravity=(0.0, 0.0), outline=outline
+        )
+        data = pf.simulate(
+            pf.Scene(body, [pf.Contact(model, LOAD, edge=True)], 1e-3)
+        ).data.isel(time=-1, contact=0)
         torque.append(float(data.tau - centre * data.fy))
     assert torque[1] == pytest.approx(np.sqrt(0.5) * torque[0], rel=1e-3)
 
@@ -124,24 +185,40 @@ def test_half_a_disc_spins_as_a_disc_of_half_the_area_about_its_centroid():
 def test_a_contact_without_load_ends_at_the_same_place():
     """No force jumps there, which would shorten the steps: the end is looked for."""
     pulled = slide(square(5), (0.0, -1.0, 0.0), start="sliding")
-    light = dataclasses.replace(pulled, contacts=[dataclasses.replace(pulled.contacts[0], normal_force=0.0)])
-    data, place = pf.simulate(light).data, float(pf.simulate(pulled).data.y[-1])
+    light = dataclasses.replace(
+        pulled, contacts=[dataclasses.replace(pulled.contacts[0], normal_force=0.0)]
+    )
+    data = pf.simulate(light).data
+    place = float(pf.simulate(pulled).data.y[-1])
     assert float(data.y[-1]) == pytest.approx(place, abs=2e-6)
-    assert float(data.ended[0]) == float(data.time[-1]) == pytest.approx(-place, abs=2e-6)
+    assert (
+        float(data.ended[0]) == float(data.time[-1]) == pytest.approx(-place, abs=2e-6)
+    )
 
 
-@pytest.mark.parametrize("velocity", [(0.0, -0.3, 20.0), (0.5, 0.2, -8.0), (0.05, -0.25, 0.0)])
+@pytest.mark.parametrize(
+    "velocity", [(0.0, -0.3, 20.0), (0.5, 0.2, -8.0), (0.05, -0.25, 0.0)]
+)
 def test_no_energy_comes_from_the_edge(velocity):
-    place = {"position": (0.01, -0.03), "angle": 0.3, "save_every": 1e-3, "stop_speed": 1e-4}
+    place = {
+        "position": (0.01, -0.03),
+        "angle": 0.3,
+        "save_every": 1e-3,
+        "stop_speed": 1e-4,
+    }
     for model in (square(9), PADS[-1]):
         data = pf.simulate(slide(model, velocity, 0.5, **place)).data
         energy = 0.1 * (data.vx**2 + data.vy**2) + 2.4e-4 * data.omega**2
-        assert float(energy.diff("time").max()) < 0.5 * MU * LOAD * LAW.largest_deflection  # what bristles give back
+        assert (
+            float(energy.diff("time").max()) < 0.5 * MU * LOAD * LAW.largest_deflection
+        )  # what bristles give back
 
 
 def test_the_motion_converges_in_few_steps():
     """With the derivatives by the place; without those of the bristles' rates it takes ten times as many steps."""
-    scene = in_hand(pf.ReducedModel(pf.ContactPatch.disc(0.01), LAW), normal_force=LOAD, edge=True)
+    scene = in_hand(
+        pf.ReducedModel(pf.ContactPatch.disc(0.01), LAW), normal_force=LOAD, edge=True
+    )
     runs = [pf.simulate(scene, rtol=rtol) for rtol in (1e-5, 1e-8)]
     assert np.abs(end_of(runs[0]) - end_of(runs[1]))[:3] == pytest.approx(0.0, abs=2e-6)
     assert float(abs(runs[0].data.ended - runs[1].data.ended)[0]) < 1e-6
@@ -152,52 +229,97 @@ def test_a_covered_pad_is_one_without_an_edge():
     model = pf.ReducedModel(pf.ContactPatch.disc(0.01), pf.LuGre(mu_s=1.2))
     plain, edge = (pf.simulate(in_hand(model, edge=edge)) for edge in (False, True))
     assert edge.data.drop_vars("ended").drop_attrs().equals(plain.data.drop_attrs())
-    assert np.isnan(edge.data.ended).all() and edge.status == "success" and "ended at" not in repr(edge)
+    assert (
+        np.isnan(edge.data.ended).all()
+        and edge.status == "success"
+        and "ended at" not in repr(edge)
+    )
 
 
 @pytest.mark.parametrize("patch", [square(7).patch, square(7).patch.discs(12)])
 def test_it_is_the_same_in_all_frames_and_for_a_friction_metric_of_ones(patch):
-    turn, place, velocity = 0.7, np.array([0.01, -0.035]), np.array([0.1, -0.3])
+    turn = 0.7
+    place = np.array([0.01, -0.035])
+    velocity = np.array([0.1, -0.3])
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    plain = slide(pf.DistributedModel(patch, LAW), (*velocity, 9.0), 0.05, position=place)
-    metric = patch.with_friction_metric(np.diag([1.0, 1.0 + 1e-12]))  # of ones it is none
-    turned = {"position": rotation @ place + 0.3, "angle": turn, "pad": {"position": (0.3, 0.3), "angle": turn}}
-    turned = slide(pf.DistributedModel(metric, LAW), (*rotation @ velocity, 9.0), 0.05, outline=PLATE[::-1], **turned)
+    plain = slide(
+        pf.DistributedModel(patch, LAW), (*velocity, 9.0), 0.05, position=place
+    )
+    metric = patch.with_friction_metric(
+        np.diag([1.0, 1.0 + 1e-12])
+    )  # of ones it is none
+    turned = {
+        "position": rotation @ place + 0.3,
+        "angle": turn,
+        "pad": {"position": (0.3, 0.3), "angle": turn},
+    }
+    turned = slide(
+        pf.DistributedModel(metric, LAW),
+        (*rotation @ velocity, 9.0),
+        0.05,
+        outline=PLATE[::-1],
+        **turned,
+    )
     end, expected = (end_of(pf.simulate(each, rtol=1e-8)) for each in (turned, plain))
-    back = np.concatenate([(end[:2] - 0.3) @ rotation, [end[2] - turn], end[3:5] @ rotation, end[5:]])
+    back = np.concatenate(
+        [(end[:2] - 0.3) @ rotation, [end[2] - turn], end[3:5] @ rotation, end[5:]]
+    )
     assert back == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_pad_that_moves_off_is_a_plate_that_moves_off():
     pulled = pf.simulate(slide(PADS[-1], (0.0, -0.5, 2.0), position=(0.005, -0.04)))
-    moves = slide(PADS[-1], (0.0, 0.0, 2.0), position=(0.005, -0.04), pad={"support_velocity": (0.0, 0.5, 0.0)})
+    moves = slide(
+        PADS[-1],
+        (0.0, 0.0, 2.0),
+        position=(0.005, -0.04),
+        pad={"support_velocity": (0.0, 0.5, 0.0)},
+    )
     moved = pf.simulate(moves)
     assert moved.status == pulled.status == "left its contacts"
-    assert float(moved.data.ended[0]) == pytest.approx(float(pulled.data.ended[0]), abs=1e-6)
-    assert end_of(moved)[[0, 2, 3, 5]] == pytest.approx(end_of(pulled)[[0, 2, 3, 5]], abs=1e-5)
+    assert float(moved.data.ended[0]) == pytest.approx(
+        float(pulled.data.ended[0]), abs=1e-6
+    )
+    assert end_of(moved)[[0, 2, 3, 5]] == pytest.approx(
+        end_of(pulled)[[0, 2, 3, 5]], abs=1e-5
+    )
 
 
 def test_a_contact_that_ends_may_begin_again_while_another_holds_on():
     swings = pf.Spring(40.0, anchor=(0.0, -0.03))
     body = pf.Body(0.2, 1.0, gravity=(0.0, 0.0), outline=PLATE)
-    weak, far = (dataclasses.replace(PADS[-1], law=dataclasses.replace(LAW, mu_c=mu, mu_s=mu)) for mu in (0.05, 0.01))
-    pads = [pf.Contact(weak, LOAD, edge=True, name="upper"), pf.Contact(far, 0.5, position=(0.0, -0.05), name="lower")]
+    weak, far = (
+        dataclasses.replace(PADS[-1], law=dataclasses.replace(LAW, mu_c=mu, mu_s=mu))
+        for mu in (0.05, 0.01)
+    )
+    pads = [
+        pf.Contact(weak, LOAD, edge=True, name="upper"),
+        pf.Contact(far, 0.5, position=(0.0, -0.05), name="lower"),
+    ]
     scene = pf.Scene(body, pads, 0.5, springs=swings, save_every=2e-3)
     swinging = pf.simulate(scene)
-    load, y = swinging.data.normal_force.sel(contact="upper"), swinging.data.y
+    load = swinging.data.normal_force.sel(contact="upper")
+    y = swinging.data.y
     assert swinging.status == "success" and np.isnan(swinging.data.ended).all()
-    assert (load.where(y > -0.0499, LOAD) == LOAD).all() and (load.where(y < -0.0505, 0.0) == 0.0).all()
+    assert (load.where(y > -0.0499, LOAD) == LOAD).all() and (
+        load.where(y < -0.0505, 0.0) == 0.0
+    ).all()
     assert int((load == 0.0).sum()) > 5
     away = pf.simulate(scene, t_end=float(y.time[int(np.argmin(y.values))]))
     assert "'upper' ended at t=" in repr(away) and "'lower' ended" not in repr(away)
-    assert pf.simulate(dataclasses.replace(scene, contacts=pads[:1])).status == "left its contacts"
+    assert (
+        pf.simulate(dataclasses.replace(scene, contacts=pads[:1])).status
+        == "left its contacts"
+    )
 
 
 def test_files_know_an_edge_and_scenes_without_one_stay_as_they_were(tmp_path):
     scene = slide(PADS[-1], (0.0, -1.0, 0.0))
     scene.to_file(tmp_path / "scene.toml")
     again = pf.Scene.from_file(tmp_path / "scene.toml")
-    assert again == scene and again.contacts[0].edge and again.digest() == scene.digest()
+    assert (
+        again == scene and again.contacts[0].edge and again.digest() == scene.digest()
+    )
     solution = pf.simulate(scene)
     solution.save(tmp_path / "run.nc")
     assert repr(pf.Solution.load(tmp_path / "run.nc")) == repr(solution)
@@ -206,23 +328,58 @@ def test_files_know_an_edge_and_scenes_without_one_stay_as_they_were(tmp_path):
 
 def test_what_an_edge_cannot_have_is_refused():
     scene = slide(PADS[-1], (0.0, -1.0, 0.0))
-    (pad,), still = scene.contacts, dataclasses.replace(scene.body, velocity=(0.0, 0.0, 0.0))
+    (pad,) = scene.contacts
+    still = dataclasses.replace(scene.body, velocity=(0.0, 0.0, 0.0))
     published = pf.ReducedModelPublished(pf.ContactPatch.disc(0.01), LAW)
-    with pytest.raises(InvalidValueError, match="edge of contact 'contact' must be False on the body: only a pad"):
+    with pytest.raises(
+        InvalidValueError,
+        match="edge of contact 'contact' must be False on the body: only a pad",
+    ):
         dataclasses.replace(pad, mounted_on="body")
-    with pytest.raises(InvalidValueError, match="edge of contact 'contact' must be True or False, got 'yes'"):
+    with pytest.raises(
+        InvalidValueError,
+        match="edge of contact 'contact' must be True or False, got 'yes'",
+    ):
         dataclasses.replace(pad, edge="yes")
-    with pytest.raises(InvalidValueError, match="must have bristles on cells where the body has an edge"):
+    with pytest.raises(
+        InvalidValueError,
+        match="must have bristles on cells where the body has an edge",
+    ):
         dataclasses.replace(pad, model=published)
-    for changes in ({"body": dataclasses.replace(scene.body, outline=None)}, {"velocity": (0.0, 0.1, 0.0)}):
-        with pytest.raises(InvalidValueError, match="must be False unless the body moves freely and has an outline"):
+    for changes in (
+        {"body": dataclasses.replace(scene.body, outline=None)},
+        {"velocity": (0.0, 0.1, 0.0)},
+    ):
+        with pytest.raises(
+            InvalidValueError,
+            match="must be False unless the body moves freely and has an outline",
+        ):
             dataclasses.replace(scene, **changes)
-    with pytest.raises(InvalidValueError, match="start must be 'rest' or 'sliding' if a contact has an edge"):
+    with pytest.raises(
+        InvalidValueError,
+        match="start must be 'rest' or 'sliding' if a contact has an edge",
+    ):
         dataclasses.replace(scene, body=still, start="equilibrium")
-    with pytest.raises(InvalidValueError, match="edge of contact 'contact' must be False for derivatives of scenes"):
+    with pytest.raises(
+        InvalidValueError,
+        match="edge of contact 'contact' must be False for derivatives of scenes",
+    ):
         scene_sensitivities(scene, ["mu"])
-    with pytest.raises(InvalidValueError, match="outline must enclose an area where a contact has an edge"):
-        pf.simulate(dataclasses.replace(scene, body=dataclasses.replace(still, outline=np.ones((3, 2)))))
-    fixed = dataclasses.replace(PADS[-1], law=dataclasses.replace(LAW, reference_load=1.0))
-    with pytest.raises(InvalidValueError, match="law must have no reference_load for an edge"):
-        pf.simulate(dataclasses.replace(scene, contacts=[dataclasses.replace(pad, model=fixed)]))
+    with pytest.raises(
+        InvalidValueError,
+        match="outline must enclose an area where a contact has an edge",
+    ):
+        pf.simulate(
+            dataclasses.replace(
+                scene, body=dataclasses.replace(still, outline=np.ones((3, 2)))
+            )
+        )
+    fixed = dataclasses.replace(
+        PADS[-1], law=dataclasses.replace(LAW, reference_load=1.0)
+    )
+    with pytest.raises(
+        InvalidValueError, match="law must have no reference_load for an edge"
+    ):
+        pf.simulate(
+            dataclasses.replace(scene, contacts=[dataclasses.replace(pad, model=fixed)])
+        )

@@ -14,7 +14,9 @@ from planarfriction.scenes.start import first_slopes, first_states
 
 ONE = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
 _GRID = ContactPatch.disc(0.02, cells=4)
-DISCS = ContactPatch(_GRID.positions, _GRID.areas, _GRID.weights(), radii=np.full(_GRID.cells, 0.005))
+DISCS = ContactPatch(
+    _GRID.positions, _GRID.areas, _GRID.weights(), radii=np.full(_GRID.cells, 0.005)
+)
 LEANING = dataclasses.replace(DISCS, asymmetry=(0.3, -0.2))
 
 
@@ -22,9 +24,13 @@ def _body(mass: float = 0.1, inertia: float = 1e-4) -> Body:
     return Body(mass, inertia, gravity=(0.0, 0.0))
 
 
-def _swinging(mean: float, share: float, rate: float, t_end: float, steps: int) -> Signal:
+def _swinging(
+    mean: float, share: float, rate: float, t_end: float, steps: int
+) -> Signal:
     time = np.linspace(0.0, t_end, steps + 1)
-    return Signal(time, mean * (1.0 + share * np.sin(2.0 * np.pi * rate * time)), "linear")
+    return Signal(
+        time, mean * (1.0 + share * np.sin(2.0 * np.pi * rate * time)), "linear"
+    )
 
 
 @pytest.mark.parametrize(
@@ -36,25 +42,40 @@ def _swinging(mean: float, share: float, rate: float, t_end: float, steps: int) 
         (0.8, None, None, 0.98, 1.51),
     ],
 )
-def test_a_body_under_a_load_that_oscillates_stays_where_it_is(pull, reference, swing, first, last):
+def test_a_body_under_a_load_that_oscillates_stays_where_it_is(
+    pull, reference, swing, first, last
+):
     """The published law swings, and creeps near the limit."""
     law = LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=reference)
     contact = Contact(DistributedModel(ONE, law), _swinging(1.0, 0.3, 2.0, 20.0, 4000))
-    x = 1e6 * simulate(Scene(_body(), contact, 20.0, force=(pull, 0.0, 0.0), save_every=0.01)).data["x"].values
+    x = (
+        1e6
+        * simulate(
+            Scene(_body(), contact, 20.0, force=(pull, 0.0, 0.0), save_every=0.01)
+        )
+        .data["x"]
+        .values
+    )
     if swing is not None:
         assert np.ptp(x[1850:]) == pytest.approx(swing, abs=0.01 if swing else 1e-6)
     if first is not None:
-        np.testing.assert_allclose(x[[500, -1]], [first, last], atol=1e-6 if reference else 0.02)
+        np.testing.assert_allclose(
+            x[[500, -1]], [first, last], atol=1e-6 if reference else 0.02
+        )
 
 
 def _explicit(model, body, load, pull, t_end, steps):
     """Integrate a contact on the body by the classical method of Runge and Kutta; return its velocity and place."""
-    dt, mass = t_end / steps, np.array([body.mass, body.mass, body.inertia])
+    dt = t_end / steps
+    mass = np.array([body.mass, body.mass, body.inertia])
     size = int(np.prod(model.state_shape))
 
     def rate(t, y):
-        z, u, f = y[:size].reshape(model.state_shape), y[size : size + 3], float(load(t))
-        cos, sin = np.cos(y[-1]), np.sin(y[-1])
+        z = y[:size].reshape(model.state_shape)
+        u = y[size : size + 3]
+        f = float(load(t))
+        cos = np.cos(y[-1])
+        sin = np.sin(y[-1])
         turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
         pulled = pull + turn.T @ model.wrench(z, turn @ u, f)
         return np.concatenate([model.rate(z, turn @ u, f).ravel(), pulled / mass, u])
@@ -69,19 +90,37 @@ def _explicit(model, body, load, pull, t_end, steps):
     return y[size:]
 
 
-@pytest.mark.parametrize("patch", [ONE, DISCS, LEANING], ids=["points", "discs", "leaning discs"])
+@pytest.mark.parametrize(
+    "patch", [ONE, DISCS, LEANING], ids=["points", "discs", "leaning discs"]
+)
 @pytest.mark.parametrize("ratio", [None, 0.8])
 def test_the_solver_agrees_with_a_fine_explicit_integration(patch, ratio):
     """The load falls below what the bristles hold, again and again."""
-    law = LuGre(mu_s=1.2, sigma_0=1e4, sigma_1=20.0, elasto_plastic=ratio, reference_load=1.5)
-    model, body, t_end = DistributedModel(patch, law), _body(0.05, 2e-5), 0.1
-    load = Signal([0.0, 0.02, 0.04, 0.06, 0.08, 0.1], [1.5, 2.5, 0.4, 1.6, 0.5, 1.2], "linear")
+    law = LuGre(
+        mu_s=1.2, sigma_0=1e4, sigma_1=20.0, elasto_plastic=ratio, reference_load=1.5
+    )
+    model = DistributedModel(patch, law)
+    body = _body(0.05, 2e-5)
+    t_end = 0.1
+    load = Signal(
+        [0.0, 0.02, 0.04, 0.06, 0.08, 0.1], [1.5, 2.5, 0.4, 1.6, 0.5, 1.2], "linear"
+    )
     pull = np.array([0.7, 0.1, 3e-3])
     wanted = _explicit(model, body, load, pull, t_end, 10_000)
     data = simulate(
-        Scene(body, Contact(model, load, mounted_on="body"), t_end, force=pull, save_every=t_end, rtol=1e-8, atol=1e-9)
+        Scene(
+            body,
+            Contact(model, load, mounted_on="body"),
+            t_end,
+            force=pull,
+            save_every=t_end,
+            rtol=1e-8,
+            atol=1e-9,
+        )
     ).data
-    found = np.array([data[name][-1] for name in ("vx", "vy", "omega", "x", "y", "theta")])
+    found = np.array(
+        [data[name][-1] for name in ("vx", "vy", "omega", "x", "y", "theta")]
+    )
     assert np.abs(wanted[3:]).min() > 1e-5
     np.testing.assert_allclose(found, wanted, rtol=2e-4, atol=1e-9)
 
@@ -91,7 +130,13 @@ def test_a_load_that_drops_at_once_leaves_no_force_above_the_limit(patch):
     law = LuGre(elasto_plastic=0.9, reference_load=1.0)
     load = Signal([0.0, 0.01, 0.02, 0.03], [2.0, 0.5, 0.0, 3.0])
     velocity = Signal([0.0, 0.005], [[2e-4, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    scene = Scene(_body(), Contact(DistributedModel(patch, law), load), 0.04, velocity=velocity, save_every=1e-3)
+    scene = Scene(
+        _body(),
+        Contact(DistributedModel(patch, law), load),
+        0.04,
+        velocity=velocity,
+        save_every=1e-3,
+    )
     pull = -simulate(scene).data["fx"].values[:, 0]
     np.testing.assert_allclose(pull[[6, 10]], 1.0, rtol=1e-6)  # sigma_0 f_ref 1 um
     np.testing.assert_allclose(pull[[11, 19]], 0.5, rtol=1e-4)
@@ -105,51 +150,88 @@ def test_the_force_of_a_held_contact_never_grows_with_the_load(ratio):
     loads = _swinging(1.0, 0.8, 5.0, 1.0, 1000)
     velocity = Signal([0.0, 0.001], [[8e-4, 0.0, 0.0], [0.0, 0.0, 0.0]])
     data = simulate(
-        Scene(_body(), Contact(model, loads), 1.0, velocity=velocity, save_every=2e-3, rtol=1e-8, atol=1e-8)
+        Scene(
+            _body(),
+            Contact(model, loads),
+            1.0,
+            velocity=velocity,
+            save_every=2e-3,
+            rtol=1e-8,
+            atol=1e-8,
+        )
     ).data
     force = np.abs(data["fx"].values[:, 0])
     assert 0.5 < force[1] <= 0.8 + 1e-6
     assert (np.diff(force[1:]) <= 1e-6).all() and force[-1] < 0.3
 
 
-@pytest.mark.parametrize(("patch", "load"), [(DISCS, 1.3), (LEANING, 1.0)], ids=["discs", "leaning discs"])
+@pytest.mark.parametrize(
+    ("patch", "load"), [(DISCS, 1.3), (LEANING, 1.0)], ids=["discs", "leaning discs"]
+)
 def test_an_equilibrium_follows_the_load(patch, load):
     """Near the limit, where some bristles are bent as far as they can be."""
     body = Body(0.1, 1e-4, (0.008, 0.0), gravity=(0.0, 0.0))
 
     def scene(load: float) -> Scene:
-        model = DistributedModel(patch, LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=1.0))
-        return Scene(body, Contact(model, load), 0.01, force=(1.3, 0.4, 0.0), start="equilibrium")
+        model = DistributedModel(
+            patch, LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=1.0)
+        )
+        return Scene(
+            body, Contact(model, load), 0.01, force=(1.3, 0.4, 0.0), start="equilibrium"
+        )
 
-    slope = first_slopes(scene(load), np.array([load]), np.ones((1, 1)), np.zeros((1, 3)))[0][0]
-    more, less = (first_states(scene(at), np.array([at]))[0] for at in (load + 1e-4, load - 1e-4))
+    slope = first_slopes(
+        scene(load), np.array([load]), np.ones((1, 1)), np.zeros((1, 3))
+    )[0][0]
+    more, less = (
+        first_states(scene(at), np.array([at]))[0] for at in (load + 1e-4, load - 1e-4)
+    )
     wanted = (more - less) / 2e-4
     assert np.abs(wanted).max() > 1e-7
-    np.testing.assert_allclose(slope, wanted, rtol=0.0, atol=1e-6 * np.abs(wanted).max())
+    np.testing.assert_allclose(
+        slope, wanted, rtol=0.0, atol=1e-6 * np.abs(wanted).max()
+    )
 
 
 @pytest.mark.parametrize("start", ["equilibrium", "sliding"])
 def test_a_scene_may_start_under_load_or_sliding(start):
     law = LuGre(elasto_plastic=0.9, reference_load=1.0)
     contact = Contact(ReducedModel(_GRID, law), 2.5, mounted_on="body")
-    given = {"force": (1.5, 0.2, 0.0)} if start == "equilibrium" else {"velocity": (0.01, 0.0, 0.3)}
-    data = simulate(Scene(_body(), contact, 0.05, start=start, save_every=0.01, **given)).data
+    given = (
+        {"force": (1.5, 0.2, 0.0)}
+        if start == "equilibrium"
+        else {"velocity": (0.01, 0.0, 0.3)}
+    )
+    data = simulate(
+        Scene(_body(), contact, 0.05, start=start, save_every=0.01, **given)
+    ).data
     force = np.array([data["fx"].values[:, 0], data["fy"].values[:, 0]])
     if start == "equilibrium":
-        np.testing.assert_allclose(force.T, np.tile([-1.5, -0.2], (force.shape[1], 1)), rtol=1e-6)
+        np.testing.assert_allclose(
+            force.T, np.tile([-1.5, -0.2], (force.shape[1], 1)), rtol=1e-6
+        )
         assert np.abs(data["x"]).max() < 1e-12
     else:
-        np.testing.assert_allclose(force, force[:, :1] * np.ones(force.shape[1]), rtol=1e-5, atol=1e-12)
+        np.testing.assert_allclose(
+            force, force[:, :1] * np.ones(force.shape[1]), rtol=1e-5, atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("ratio", [None, 0.5])
 @pytest.mark.parametrize("hold", ["linear", "previous"])
 def test_a_sliding_body_may_lose_its_load_and_get_it_back(hold, ratio):
     """It slows down by `int mu f_N dt/m`, but for the micrometres in which bristles bend."""
-    law = LuGre(mu_c=0.5, sigma_1=1.0, sigma_2=0.0, elasto_plastic=ratio, reference_load=2.0)
+    law = LuGre(
+        mu_c=0.5, sigma_1=1.0, sigma_2=0.0, elasto_plastic=ratio, reference_load=2.0
+    )
     load = Signal([0.0, 0.02, 0.03, 0.04, 0.1], [2.0, 0.0, 0.0, 3.0, 1.0], hold)
     body = Body(0.4, 1e-4, velocity=(0.5, 0.1, 0.0), gravity=(0.0, 0.0))
-    scene = Scene(body, Contact(DistributedModel(DISCS, law), load, mounted_on="body"), 0.1, save_every=0.1)
+    scene = Scene(
+        body,
+        Contact(DistributedModel(DISCS, law), load, mounted_on="body"),
+        0.1,
+        save_every=0.1,
+    )
     data = simulate(scene, rtol=1e-8, atol=1e-8).data
     lost = 0.5 * {"linear": 0.02 + 0.015 + 0.12, "previous": 0.04 + 0.18}[hold] / 0.4
     found = np.hypot(0.5, 0.1) - np.hypot(data["vx"].values[-1], data["vy"].values[-1])
@@ -157,6 +239,14 @@ def test_a_sliding_body_may_lose_its_load_and_get_it_back(hold, ratio):
 
 
 def test_a_pressure_that_follows_the_load_refuses():
-    contact = Contact(DistributedModel(_GRID, LuGre(reference_load=1.0)), 1.0, mounted_on="body", pressure="follows")
-    with pytest.raises(InvalidValueError, match="law must have no reference_load for a pressure that follows the load"):
+    contact = Contact(
+        DistributedModel(_GRID, LuGre(reference_load=1.0)),
+        1.0,
+        mounted_on="body",
+        pressure="follows",
+    )
+    with pytest.raises(
+        InvalidValueError,
+        match="law must have no reference_load for a pressure that follows the load",
+    ):
         simulate(Scene(_body(), contact, 0.01))

@@ -15,13 +15,17 @@ from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches, Segments
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 FINGER = pf.SoftFinger(c=6 * 0.02 / 9, n=1 / 3, k_per_newton=2.0, radius_max=0.01)
 SOFT = pf.ContactPatch.rectangle(0.02, cells=9, pressure=FINGER)
-MAPS = pf.ContactPatch.from_pressure({1.0: [[0, 1, 2, 1]], 1.5: [[1, 2, 1, 0]], 3.0: [[1, 1, 1, 0]]}, cell_size=4e-3)
+MAPS = pf.ContactPatch.from_pressure(
+    {1.0: [[0, 1, 2, 1]], 1.5: [[1, 2, 1, 0]], 3.0: [[1, 1, 1, 0]]}, cell_size=4e-3
+)
 FIXED = pf.ContactPatch.disc(0.01, cells=5)
 MODELS = {
     "distributed": lambda: pf.DistributedModel(SOFT, LAW),
     "distributed, measured": lambda: pf.DistributedModel(MAPS, LAW),
     "reduced": lambda: pf.ReducedModel(SOFT, LAW, cells=12),
-    "published": lambda: pf.ReducedModelPublished(SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, segments=4)),
+    "published": lambda: pf.ReducedModelPublished(
+        SOFT, LAW, pf.LimitSurfaceTablePublished(SOFT, segments=4)
+    ),
 }
 
 
@@ -32,27 +36,59 @@ def ramp(*samples: tuple[float, float]) -> pf.Signal:
 
 def free(model) -> pf.Scene:
     """Loads that rise, hold, vanish, return and fall; a second contact of fixed shape; a force that bends."""
-    load = ramp((0.0, 0.8), (0.012, 2.2), (0.015, 2.2), (0.02, 0.0), (0.023, 0.0), (0.03, 1.7), (0.05, 1.2))
+    load = ramp(
+        (0.0, 0.8),
+        (0.012, 2.2),
+        (0.015, 2.2),
+        (0.02, 0.0),
+        (0.023, 0.0),
+        (0.03, 1.7),
+        (0.05, 1.2),
+    )
     held = pf.Signal.sampled([0.0, 0.0105, 0.02], [1.0, 0.4, 1.1])
-    force = pf.Signal.sampled([0.0, 0.02, 0.04], [[0.0, 0, 0], [2.0, 1.0, 0.01], [0.0, 0, 0]], hold="linear")
+    force = pf.Signal.sampled(
+        [0.0, 0.02, 0.04], [[0.0, 0, 0], [2.0, 1.0, 0.01], [0.0, 0, 0]], hold="linear"
+    )
     contacts = [
         pf.Contact(model, load, name="soft", position=(0.01, 0.0), angle=0.3),
-        pf.Contact(pf.DistributedModel(FIXED, LAW), held, name="hard", mounted_on="body"),
+        pf.Contact(
+            pf.DistributedModel(FIXED, LAW), held, name="hard", mounted_on="body"
+        ),
     ]
-    return pf.Scene(pf.Body(0.1, 1e-4, velocity=(0.0, 0.02, 1.0)), contacts, 0.035, force=force, save_every=7e-4)
+    return pf.Scene(
+        pf.Body(0.1, 1e-4, velocity=(0.0, 0.02, 1.0)),
+        contacts,
+        0.035,
+        force=force,
+        save_every=7e-4,
+    )
 
 
 def driven(model) -> pf.Scene:
-    twist = pf.Signal.sampled([0.0, 0.01, 0.02], [[0.0, 0, 0], [0.02, 0, 3.0], [0.0, 0.01, 0.0]], hold="linear")
-    return pf.scenes.driven(model, twist=twist, normal_force=ramp((0.0, 0.9), (0.03, 2.0)), at="origin", t_end=0.03)
+    twist = pf.Signal.sampled(
+        [0.0, 0.01, 0.02],
+        [[0.0, 0, 0], [0.02, 0, 3.0], [0.0, 0.01, 0.0]],
+        hold="linear",
+    )
+    return pf.scenes.driven(
+        model,
+        twist=twist,
+        normal_force=ramp((0.0, 0.9), (0.03, 2.0)),
+        at="origin",
+        t_end=0.03,
+    )
 
 
 def recorded(scene: pf.Scene, **options) -> dict[str, np.ndarray]:
     """Everything that a run gives."""
     solution = pf.simulate(scene, bristles="all", **options)
     counts = solution.statistics
-    counted = np.array([counts.steps, counts.rejections, counts.evaluations, counts.jacobians])
-    return {name: history.values for name, history in solution.histories.items()} | {"counts": counted}
+    counted = np.array(
+        [counts.steps, counts.rejections, counts.evaluations, counts.jacobians]
+    )
+    return {name: history.values for name, history in solution.histories.items()} | {
+        "counts": counted
+    }
 
 
 def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
@@ -96,7 +132,9 @@ def test_windows_are_those_of_the_whole_motion():
     (whole,) = SegmentBatches(scene, 0.035, most=10**6)
     parts = list(SegmentBatches(scene, 0.035, most=4))
     assert len(parts) > 5
-    np.testing.assert_array_equal(np.concatenate([p.motion.breaks[:-1] for p in parts]), whole.motion.breaks[:-1])
+    np.testing.assert_array_equal(
+        np.concatenate([p.motion.breaks[:-1] for p in parts]), whole.motion.breaks[:-1]
+    )
     for name in ("load", "force", "acceleration"):
         together = np.concatenate([getattr(part.motion, name) for part in parts])
         np.testing.assert_array_equal(together, getattr(whole.motion, name))
@@ -109,19 +147,29 @@ def test_shapes_are_refined_only_while_their_load_changes():
     pieces = Segments(scene, 0.5)
     breaks = pieces.breaks(np.arange(pieces.count + 1))
     assert pieces.count == 1 + 6 + 1
-    np.testing.assert_allclose(breaks, [0.0, *np.linspace(0.1, 0.1055, 7), 0.5], rtol=1e-14)
+    np.testing.assert_allclose(
+        breaks, [0.0, *np.linspace(0.1, 0.1055, 7), 0.5], rtol=1e-14
+    )
     assert pieces.between(0) == pytest.approx((1.0, 2.0))
     assert pieces.settled == 0.1055
     assert Segments(scene, 0.102).settled == 0.102  # still changing at the end
-    np.testing.assert_allclose(pieces.held(0, np.array([0, 3, 7])), [1.0, 1.0 + 2.5 / 6.0, 2.0], rtol=1e-12)
+    np.testing.assert_allclose(
+        pieces.held(0, np.array([0, 3, 7])), [1.0, 1.0 + 2.5 / 6.0, 2.0], rtol=1e-12
+    )
 
 
 def test_cells_that_are_loaded_between_two_loads():
     for patch in (SOFT, MAPS):
         for low, high in ((0.4, 0.9), (1.2, 1.3), (1.5, 1.5), (2.0, 9.0), (0.1, 0.2)):
-            loads = np.unique(np.concatenate([np.linspace(low, high, 40), [1.5] if low <= 1.5 <= high else []]))
+            loads = np.unique(
+                np.concatenate(
+                    [np.linspace(low, high, 40), [1.5] if low <= 1.5 <= high else []]
+                )
+            )
             expected = (patch.weights(loads) > 0.0).any(axis=0)
-            np.testing.assert_array_equal(patch.pressure.ever_loaded(patch.positions, (low, high)), expected)
+            np.testing.assert_array_equal(
+                patch.pressure.ever_loaded(patch.positions, (low, high)), expected
+            )
 
 
 @pytest.mark.parametrize("name", ["distributed", "reduced", "published"])
@@ -129,7 +177,10 @@ def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
     scene = free(MODELS[name]())
     from planarfriction.derivatives import path as module
 
-    numbers = {"parameters": ("mu", "r", "mass"), "options": pf.scenes.SolverOptions(t_end=0.025, save_every=1e-3)}
+    numbers = {
+        "parameters": ("mu", "r", "mass"),
+        "options": pf.scenes.SolverOptions(t_end=0.025, save_every=1e-3),
+    }
     whole = pf.derivatives.scene_sensitivities(scene, **numbers)
     monkeypatch.setattr(packing, "BATCH", 3)
     windows = pf.derivatives.scene_sensitivities(scene, **numbers)
@@ -137,11 +188,15 @@ def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
     parts = pf.derivatives.scene_sensitivities(scene, **numbers)
     for one in (windows, parts):
         for field in ("time", "motion", "wrenches"):
-            np.testing.assert_array_equal(getattr(one, field), getattr(whole, field), err_msg=field)
+            np.testing.assert_array_equal(
+                getattr(one, field), getattr(whole, field), err_msg=field
+            )
         # derivatives go over several steps at once, fewer where a window or a part ends: to their own error
         for field in ("d_motion", "d_wrenches"):
             wanted = getattr(whole, field)
-            error = np.abs(getattr(one, field) - wanted) / np.abs(wanted).max(axis=(0, -1), keepdims=True)
+            error = np.abs(getattr(one, field) - wanted) / np.abs(wanted).max(
+                axis=(0, -1), keepdims=True
+            )
             assert error.max() < 2e-5, field
     assert np.abs(whole.d_motion).max() > 0.0
 
@@ -149,7 +204,9 @@ def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
 def test_a_body_comes_to_rest_in_a_later_window(monkeypatch):
     model = pf.DistributedModel(SOFT, LAW)
     load = ramp((0.0, 1.5), (0.02, 2.0))
-    scene = pf.scenes.free_slide(model, mass=0.2, twist=(0.1, 0.0, 0.0), normal_force=load, t_end=1.0)
+    scene = pf.scenes.free_slide(
+        model, mass=0.2, twist=(0.1, 0.0, 0.0), normal_force=load, t_end=1.0
+    )
     whole = recorded(scene)
     monkeypatch.setattr(packing, "BATCH", 3)
     assert_same(recorded(scene), whole)
@@ -176,7 +233,8 @@ def test_interruption_in_a_later_window_keeps_what_is_done(monkeypatch):
 def test_interruption_while_shapes_are_built_keeps_what_is_done(monkeypatch):
     monkeypatch.setattr(packing, "BATCH", 3)
     shapes = type(MODELS["published"]().shapes)
-    build, calls = shapes._built, []
+    build = shapes._built
+    calls = []
 
     def slow(self, load):
         calls.append(load)
@@ -192,7 +250,11 @@ def test_interruption_while_shapes_are_built_keeps_what_is_done(monkeypatch):
 
 def peak(t_end: float, name: str) -> float:
     """Largest memory [B] that a run takes."""
-    scene = pf.Scene(pf.Body(0.1, 1e-4), [pf.Contact(MODELS[name](), ramp((0.0, 0.5), (t_end, 3.0)))], t_end)
+    scene = pf.Scene(
+        pf.Body(0.1, 1e-4),
+        [pf.Contact(MODELS[name](), ramp((0.0, 0.5), (t_end, 3.0)))],
+        t_end,
+    )
     tracemalloc.start()
     try:
         pf.simulate(scene, rtol=1e-3, atol=1e-2, save_every=t_end)
@@ -213,10 +275,14 @@ def test_shapes_of_a_long_run_are_not_kept_together(monkeypatch, name):
 
 def test_pieces_that_no_run_would_end_are_refused():
     scene = pf.Scene(
-        pf.Body(1.0, 1.0), [pf.Contact(MODELS["published"](), ramp((0.0, 1.0), (1e12, 2.0)))], 1e12, save_every=1e11
+        pf.Body(1.0, 1.0),
+        [pf.Contact(MODELS["published"](), ramp((0.0, 1.0), (1e12, 2.0)))],
+        1e12,
+        save_every=1e11,
     )
     with pytest.raises(
-        pf.FrictionError, match=r"^t_end must be at most 1e\+09 s if the shape of a patch changes with the load, got 1"
+        pf.FrictionError,
+        match=r"^t_end must be at most 1e\+09 s if the shape of a patch changes with the load, got 1",
     ) as caught:
         pf.simulate(scene)
     assert "\n" not in str(caught.value)

@@ -13,7 +13,9 @@ from planarfriction.scenes.slip import _stretches, centres, reach, slip_fraction
 
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
 LAW = pf.LuGre(mu_c=0.5, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0, elasto_plastic=0.9)
-SOFT = pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+SOFT = pf.ContactPatch.rectangle(
+    0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
+)
 MODELS = [
     pf.DistributedModel(PATCH, LAW),
     pf.ReducedModel(PATCH, LAW, cells=16),
@@ -24,10 +26,14 @@ MODELS = [
 G = 9.81
 
 
-@pytest.mark.parametrize("model", MODELS, ids=lambda m: f"{type(m).__name__}-{m.state_shape}-{m.patch.name}")
+@pytest.mark.parametrize(
+    "model", MODELS, ids=lambda m: f"{type(m).__name__}-{m.state_shape}-{m.patch.name}"
+)
 def test_a_block_slips_until_it_stops(model):
     """From 0 to v/(mu g) over v^2/(2 mu g): to a recording interval, and to a full deflection of 5 um."""
-    scene = pf.scenes.free_slide(model, mass=0.5, twist=(0.1, 0.0, 0.0), save_every=1e-4, t_end=0.03)
+    scene = pf.scenes.free_slide(
+        model, mass=0.5, twist=(0.1, 0.0, 0.0), save_every=1e-4, t_end=0.03
+    )
     scene = dataclasses.replace(scene, start="sliding", stop_speed=None)
     (event,) = pf.simulate(scene, bristles="all").slip_events()
     assert (event.contact, event.onset) == ("table", 0.0)
@@ -37,17 +43,27 @@ def test_a_block_slips_until_it_stops(model):
 
 
 def test_each_push_beyond_friction_is_one_slip_and_one_below_is_none():
-    force = pf.Signal([0.0, 0.02, 0.05, 0.07, 0.1], np.outer([0.3, 1.2, 0.3, 1.2, 0.3], [0.5 * G, 0.0, 0.0]))
+    force = pf.Signal(
+        [0.0, 0.02, 0.05, 0.07, 0.1],
+        np.outer([0.3, 1.2, 0.3, 1.2, 0.3], [0.5 * G, 0.0, 0.0]),
+    )
     body = pf.Body(1.0, 1e-3, gravity=(0.0, 0.0))
     table = pf.Contact(MODELS[0], G, name="table")
-    scene = pf.Scene(body, [table], 0.2, force=force, save_every=5e-4, start="equilibrium")
+    scene = pf.Scene(
+        body, [table], 0.2, force=force, save_every=5e-4, start="equilibrium"
+    )
     events = pf.simulate(scene, bristles="all").slip_events()
     assert len(events) == 2
     for event, begin, end in zip(events, (0.02, 0.07), (0.05, 0.1), strict=True):
-        assert begin < event.onset < begin + 0.005  # after a few milliseconds the bristles are full
+        assert (
+            begin < event.onset < begin + 0.005
+        )  # after a few milliseconds the bristles are full
         # 0.2 mu g for 30 ms less those, and then stopped by 0.7 mu g
         assert end < event.end < end + 0.03 * 0.2 / 0.7 + 1e-3
-    shaken = dataclasses.replace(scene, force=pf.Signal([0.0, 0.02, 0.05], np.outer([0.3, 0.85, 0.3], [0.5 * G, 0, 0])))
+    shaken = dataclasses.replace(
+        scene,
+        force=pf.Signal([0.0, 0.02, 0.05], np.outer([0.3, 0.85, 0.3], [0.5 * G, 0, 0])),
+    )
     assert pf.simulate(shaken, bristles="all").slip_events() == ()
 
 
@@ -57,14 +73,18 @@ def test_bristles_that_give_way_are_no_slip():
     plain = dataclasses.replace(LAW, elasto_plastic=None)
     table = pf.Contact(pf.ReducedModel(PATCH, plain), G, name="table")
     body = pf.Body(1.0, 1e-3, gravity=(0.0, 0.0))
-    scene = pf.Scene(body, [table], 0.1, force=force, save_every=5e-4, start="equilibrium")
+    scene = pf.Scene(
+        body, [table], 0.1, force=force, save_every=5e-4, start="equilibrium"
+    )
     assert pf.simulate(scene, bristles="all").slip_events() == ()
 
 
 def test_slow_is_not_stuck():
     """A contact that is dragged at a hundredth of v_s slips from its first full deflection on."""
     speed = 1e-5
-    scene = pf.scenes.driven(pf.ReducedModel(PATCH, LAW), twist=(speed, 0.0, 0.0), t_end=3.0)
+    scene = pf.scenes.driven(
+        pf.ReducedModel(PATCH, LAW), twist=(speed, 0.0, 0.0), t_end=3.0
+    )
     (event,) = pf.simulate(scene, bristles="all").slip_events()
     full = 0.5 / 1e5 / speed
     assert 0.9 * full < event.onset < full * 1.1
@@ -75,26 +95,38 @@ def test_slow_is_not_stuck():
 def test_the_path_of_a_slip_is_that_of_the_centre_of_pressure():
     """A patch whose load lies beside the origin of its frame, about which it turns while it slides along y."""
     patch = pf.ContactPatch.from_pressure([[1.0, 0.0, 5.0], [1.0, 0.0, 0.0]], 4e-3)
-    twist, (x, y) = (0.0, 0.01, -2.0), patch.centre_of_pressure()
-    scene = pf.scenes.driven(pf.DistributedModel(patch, LAW), twist=twist, at="origin", t_end=0.5)
+    twist = (0.0, 0.01, -2.0)
+    (x, y) = patch.centre_of_pressure()
+    scene = pf.scenes.driven(
+        pf.DistributedModel(patch, LAW), twist=twist, at="origin", t_end=0.5
+    )
     (event,) = pf.simulate(scene, bristles="all", save_every=1e-3).slip_events()
     lasts = event.end - event.onset
     assert event.end == 0.5 and event.onset < 0.002
-    assert event.path == pytest.approx(np.hypot(2.0 * y, 0.01 - 2.0 * x) * lasts, rel=1e-3)
+    assert event.path == pytest.approx(
+        np.hypot(2.0 * y, 0.01 - 2.0 * x) * lasts, rel=1e-3
+    )
     assert event.angle == pytest.approx(-2.0 * lasts, rel=1e-3)
-    assert reach(patch) == pytest.approx(np.hypot(4e-3 + 4e-3 / 3, 2e-3 - 2e-3 / 3), rel=1e-9)
+    assert reach(patch) == pytest.approx(
+        np.hypot(4e-3 + 4e-3 / 3, 2e-3 - 2e-3 / 3), rel=1e-9
+    )
 
 
 def test_the_share_that_slips_counts_loads():
     """Plain bristles without a damper: one cell at full deflection, of a load of 1 or 3 of 4, and one unbent."""
     law = pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0)
     model = pf.DistributedModel(pf.ContactPatch.from_pressure([[1.0, 3.0]], 4e-3), law)
-    twist, full = np.array([[0.01, 0.0, 0.0]] * 4), 0.5 / 1e5
+    twist = np.array([[0.01, 0.0, 0.0]] * 4)
+    full = 0.5 / 1e5
     states = np.zeros((4, 2, 2))
-    states[0, 0, 0], states[1, 0, 1], states[2, 0] = full, full, full
+    states[0, 0, 0] = full
+    states[1, 0, 1] = full
+    states[2, 0] = full
     share = slip_fraction(model, states, twist, np.array([2.0, 2.0, 2.0, 0.0]))
     assert share == pytest.approx(np.sqrt([0.25, 0.75, 1.0, 1.0]), rel=1e-9)
-    assert slip_fraction(model, states, 0.0 * twist, np.ones(4)) == pytest.approx(np.zeros(4))
+    assert slip_fraction(model, states, 0.0 * twist, np.ones(4)) == pytest.approx(
+        np.zeros(4)
+    )
 
 
 def test_centres_follow_the_load_and_stay_where_there_is_none():
@@ -108,13 +140,16 @@ def test_centres_follow_the_load_and_stay_where_there_is_none():
 
 def test_what_slip_events_need_is_said_in_one_line(tmp_path):
     solution = pf.simulate(pf.scenes.driven(MODELS[0], t_end=0.02))
-    with pytest.raises(InvalidValueError, match="bristles must be recorded for slip events"):
+    with pytest.raises(
+        InvalidValueError, match="bristles must be recorded for slip events"
+    ):
         solution.slip_events()
     with pytest.raises(FileError, match="no scene"):
         dataclasses.replace(solution, scene=None).slip_events()
 
 
 def test_a_slip_begins_where_the_line_between_two_samples_crosses_zero():
-    time, above = np.array([0.0, 1.0, 3.0, 4.0, 5.0]), np.array([-1.0, 3.0, -1.0, -1.0, 1.0])
+    time = np.array([0.0, 1.0, 3.0, 4.0, 5.0])
+    above = np.array([-1.0, 3.0, -1.0, -1.0, 1.0])
     assert _stretches(time, above) == [(0.25, 2.5), (4.5, 5.0)]
     assert _stretches(time, -above) == [(0.0, 0.25), (2.5, 4.5)]

@@ -22,14 +22,27 @@ UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}
 def a_solution(name="fingers"):
     """Return a made-up solution, as a simulation returns it."""
     patch = pf.ContactPatch.disc(0.01, 5)
-    scene = in_hand(pf.ReducedModelPublished(patch, pf.LuGre(mu_s=1.2), surface=pf.LimitSurfaceEllipsoid(patch)))
-    scene = dataclasses.replace(scene, contacts=[dataclasses.replace(scene.contacts[0], name=name)])
+    scene = in_hand(
+        pf.ReducedModelPublished(
+            patch, pf.LuGre(mu_s=1.2), surface=pf.LimitSurfaceEllipsoid(patch)
+        )
+    )
+    scene = dataclasses.replace(
+        scene, contacts=[dataclasses.replace(scene.contacts[0], name=name)]
+    )
     time = np.arange(5) * 0.01
     variables = {"x": ("time", time / 3.0, {"units": "m"})}
     random = np.random.default_rng(0)
-    variables |= {key: (("time", "contact"), random.normal(size=(5, 1)), {"units": u}) for key, u in UNITS.items()}
-    data = xr.Dataset(variables, coords={"time": ("time", time, {"units": "s"}), "contact": [name]})
-    return Solution(data, Statistics(steps=12, wall_time=0.1 / 3), "done", "reached t_end", scene)
+    variables |= {
+        key: (("time", "contact"), random.normal(size=(5, 1)), {"units": u})
+        for key, u in UNITS.items()
+    }
+    data = xr.Dataset(
+        variables, coords={"time": ("time", time, {"units": "s"}), "contact": [name]}
+    )
+    return Solution(
+        data, Statistics(steps=12, wall_time=0.1 / 3), "done", "reached t_end", scene
+    )
 
 
 def test_a_saved_solution_comes_back_to_the_bit(tmp_path):
@@ -48,7 +61,10 @@ def test_a_saved_solution_comes_back_to_the_bit(tmp_path):
 
 def test_the_dataset_is_made_once_and_is_what_the_arrays_say():
     full = a_solution()
-    arrays = {name: History(each.dims, each.values, each.attrs) for name, each in full.data.variables.items()}
+    arrays = {
+        name: History(each.dims, each.values, each.attrs)
+        for name, each in full.data.variables.items()
+    }
     solution = dataclasses.replace(full, histories=arrays)
     assert solution.data is solution.data
     xr.testing.assert_identical(solution.data, full.data)
@@ -129,7 +145,9 @@ def test_files_that_are_no_solutions_get_one_line(tmp_path):
     (tmp_path / "empty.nc").write_bytes(b"")
     (tmp_path / "hdf.nc").write_bytes(b"\x89HDF\r\n")
     xr.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="scipy")
-    strange = Solution.load(tmp_path / "good.nc").data.assign_attrs(scene="{}", statistics="{}", status="", message="")
+    strange = Solution.load(tmp_path / "good.nc").data.assign_attrs(
+        scene="{}", statistics="{}", status="", message=""
+    )
     write_dataset(strange, tmp_path / "strange.nc")
     write_dataset(strange.drop_attrs(), tmp_path / "bare.nc")
     (tmp_path / "folder.nc").mkdir()
@@ -156,10 +174,15 @@ def test_files_that_are_no_solutions_get_one_line(tmp_path):
 
 def damaged(content: bytes, random: np.random.Generator) -> bytes:
     """The content with one kind of damage somewhere: bits, bytes, a lost end, a lost or repeated block, noise."""
-    kind, place = random.integers(6), int(random.integers(len(content)))
+    kind = random.integers(6)
+    place = int(random.integers(len(content)))
     length = int(random.integers(1, 65))
     if kind == 0:
-        return content[:place] + bytes([content[place] ^ (1 << int(random.integers(8)))]) + content[place + 1 :]
+        return (
+            content[:place]
+            + bytes([content[place] ^ (1 << int(random.integers(8)))])
+            + content[place + 1 :]
+        )
     if kind == 1:
         return content[:place]
     if kind == 2:
@@ -173,8 +196,10 @@ def damaged(content: bytes, random: np.random.Generator) -> bytes:
 
 def test_a_damaged_file_loads_as_it_was_saved_or_not_at_all(tmp_path):
     """1,500 damages, with a seed: loading gives the very same solution or one line, never another solution."""
-    original, path = a_solution(), tmp_path / "run.nc"
-    good, random = original.save(path).read_bytes(), np.random.default_rng(11)
+    original = a_solution()
+    path = tmp_path / "run.nc"
+    good = original.save(path).read_bytes()
+    random = np.random.default_rng(11)
     refused = 0
     for _ in range(1500):
         bad = damaged(good, random)
@@ -193,13 +218,16 @@ def test_a_damaged_file_loads_as_it_was_saved_or_not_at_all(tmp_path):
 def test_every_byte_counts(tmp_path):
     good = a_solution().save(tmp_path / "run.nc").read_bytes()
     for place in {*range(0, len(good), 7), *range(len(good) - 200, len(good))}:
-        (tmp_path / "run.nc").write_bytes(good[:place] + bytes([good[place] ^ 1]) + good[place + 1 :])
+        (tmp_path / "run.nc").write_bytes(
+            good[:place] + bytes([good[place] ^ 1]) + good[place + 1 :]
+        )
         with pytest.raises(FileError):
             Solution.load(tmp_path / "run.nc")
 
 
 def test_other_programs_read_the_file(tmp_path):
-    path, random = a_solution().save(tmp_path / "run.nc"), np.random.default_rng(0)
+    path = a_solution().save(tmp_path / "run.nc")
+    random = np.random.default_rng(0)
     with xr.load_dataset(path, engine="scipy") as data:
         assert np.array_equal(data["fx"], random.normal(size=(5, 1)))
     with netcdf_file(path, mmap=False) as file:
@@ -213,8 +241,13 @@ def test_a_file_rewritten_by_another_program_is_refused_with_a_remedy(tmp_path):
     data.to_netcdf(tmp_path / "edited.nc", engine="scipy")
     del data.attrs["planarfriction_checksum"]
     data.to_netcdf(tmp_path / "stripped.nc", engine="scipy")
-    for name, reason in (("edited.nc", "changed by another program"), ("stripped.nc", "no checksum")):
-        with pytest.raises(FileError, match=rf"{name}: .*{reason}.*xarray.load_dataset"):
+    for name, reason in (
+        ("edited.nc", "changed by another program"),
+        ("stripped.nc", "no checksum"),
+    ):
+        with pytest.raises(
+            FileError, match=rf"{name}: .*{reason}.*xarray.load_dataset"
+        ):
             Solution.load(tmp_path / name)
     solution = Solution.load(path)  # the way to change a solution
     solution.data["x"] = 2.0 * solution.data["x"]
@@ -223,7 +256,11 @@ def test_a_file_rewritten_by_another_program_is_refused_with_a_remedy(tmp_path):
 
 
 def test_additions_that_no_file_can_hold_get_one_line(tmp_path):
-    for name, value in (("nested", {"a": 1}), ("object", object()), (3, "number as a name")):
+    for name, value in (
+        ("nested", {"a": 1}),
+        ("object", object()),
+        (3, "number as a name"),
+    ):
         solution = a_solution()
         solution.save(tmp_path / "run.nc")
         solution.data.attrs[name] = value
@@ -244,7 +281,11 @@ def test_what_is_no_file_is_no_solution(tmp_path, name):
 
 @pytest.mark.parametrize(
     ("make", "units"),
-    [(pf.ReducedModel, "m"), (pf.ReducedModelPublished, "m, m, m^2"), (pf.DistributedModel, "m")],
+    [
+        (pf.ReducedModel, "m"),
+        (pf.ReducedModelPublished, "m, m, m^2"),
+        (pf.DistributedModel, "m"),
+    ],
 )
 def test_recorded_states_have_the_units_of_their_model(make, units):
     model = make(pf.ContactPatch.disc(0.01, cells=5), pf.LuGre())

@@ -16,7 +16,9 @@ from planarfriction.errors import SolverError
 from planarfriction.sliding_body import BodyStep
 from tests.support.coupling_problems import SHAPES, random_law
 
-_METRIC = pf.ContactPatch.rectangle(0.02, 0.01, cells=7).with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
+_METRIC = pf.ContactPatch.rectangle(0.02, 0.01, cells=7).with_friction_metric(
+    [[1.0, 0.2], [0.2, 1.5]]
+)
 _POINTS = pf.ContactPatch.points([[0.0, 0.0], [0.01, 0.0], [0.002, 0.008]])
 _FEW = pf.ContactPatch.disc(radius=0.01, cells=5)
 
@@ -55,41 +57,69 @@ def models(seed: int) -> list[pf.models.FrictionModel]:
     ]
 
 
-def random_body(generator: np.random.Generator, kinds: list[pf.models.FrictionModel], patches: int) -> pf.SlidingBody:
+def random_body(
+    generator: np.random.Generator, kinds: list[pf.models.FrictionModel], patches: int
+) -> pf.SlidingBody:
     """Draw a body of 1 mg to 1000 t whose patches lie within 1 mm to 1 m; one at its centre, or about it."""
-    mass, size = 10.0 ** generator.uniform(-6.0, 6.0), 10.0 ** generator.uniform(-3.0, 0.0)
+    mass = 10.0 ** generator.uniform(-6.0, 6.0)
+    size = 10.0 ** generator.uniform(-3.0, 0.0)
     k = patches
     chosen = [kinds[i] for i in generator.choice(len(kinds), k)]
     if generator.uniform() < 0.5:
         chosen = [chosen[0]] * k
-    places = size * generator.uniform(-1.0, 1.0, (k, 2)) * (k > 1 or generator.uniform() < 0.5)
+    places = (
+        size
+        * generator.uniform(-1.0, 1.0, (k, 2))
+        * (k > 1 or generator.uniform() < 0.5)
+    )
     inertia = mass * max(size, 0.003) ** 2 * generator.uniform(0.1, 1.0)
-    return pf.SlidingBody(mass, inertia, chosen, places, generator.uniform(-3.0, 3.0, k))
+    return pf.SlidingBody(
+        mass, inertia, chosen, places, generator.uniform(-3.0, 3.0, k)
+    )
 
 
-def random_steps(generator: np.random.Generator, body: pf.SlidingBody, count: int, steps: int) -> Generator:
+def random_steps(
+    generator: np.random.Generator, body: pf.SlidingBody, count: int, steps: int
+) -> Generator:
     """Yield steps of `count` bodies from rest: kicked, pushed, loaded and let go. Send back what each came to."""
-    k, size = len(body.patches.models), max(np.abs(body.positions).max(), 0.003)
+    k = len(body.patches.models)
+    size = max(np.abs(body.positions).max(), 0.003)
     unit = np.array([1.0, 1.0, 1.0 / size])
-    wide, pressed = generator.uniform(size=count) < 0.5, generator.uniform(-2.0, 4.0, count)
-    weight = 9.81 * body.mass * 10.0 ** np.where(wide, pressed, generator.uniform(-1.0, 1.0, count))
+    wide = generator.uniform(size=count) < 0.5
+    pressed = generator.uniform(-2.0, 4.0, count)
+    weight = (
+        9.81
+        * body.mass
+        * 10.0 ** np.where(wide, pressed, generator.uniform(-1.0, 1.0, count))
+    )
     share = 10.0 ** generator.uniform(-1.0, 0.0, (count, k))
     load = weight[:, None] * share / share.sum(axis=1, keepdims=True)
-    dt, angle = 10.0 ** generator.uniform(-5.0, 0.0, count), generator.uniform(-3.0, 3.0, count)
+    dt = 10.0 ** generator.uniform(-5.0, 0.0, count)
+    angle = generator.uniform(-3.0, 3.0, count)
     fast = 10.0 ** generator.uniform(-4.0, 1.0, (count, 1))
-    state, twist, push = body.rest(count), np.zeros((count, 3)), np.zeros((count, 3))
+    state = body.rest(count)
+    twist = np.zeros((count, 3))
+    push = np.zeros((count, 3))
 
     for i in range(steps):
         kicked = generator.uniform(size=(count, 1)) < (0.5 if i == 0 else 0.1)
         twist = twist + kicked * fast * unit * generator.normal(size=(count, 3))
         pushed = generator.uniform(size=(count, 1)) < (0.7 if i == 0 else 0.2)
-        strength = generator.choice([0.0, 0.1, 0.3, 1.0, 2.0, 10.0], (count, 1)) * weight[:, None]
-        push = np.where(pushed, strength * generator.normal(size=(count, 3)) / unit, push)
+        strength = (
+            generator.choice([0.0, 0.1, 0.3, 1.0, 2.0, 10.0], (count, 1))
+            * weight[:, None]
+        )
+        push = np.where(
+            pushed, strength * generator.normal(size=(count, 3)) / unit, push
+        )
         jump = generator.uniform(size=(count, 1)) < 0.1
-        loads = load * np.where(jump, 10.0 ** generator.uniform(-2.0, 0.5, (count, k)), 1.0)
+        loads = load * np.where(
+            jump, 10.0 ** generator.uniform(-2.0, 0.5, (count, k)), 1.0
+        )
         loads = loads * (generator.uniform(size=(count, k)) > 0.01)
         end = yield Steps(state, twist, loads, dt, push, angle)
-        state, twist = end.state, end.twist
+        state = end.state
+        twist = end.twist
 
 
 def solved(body: pf.SlidingBody, given: Steps) -> tuple[BodyStep, np.ndarray]:
@@ -103,10 +133,16 @@ def solved(body: pf.SlidingBody, given: Steps) -> tuple[BodyStep, np.ndarray]:
 
 def failures(seed: int, total: int, count: int = 250, steps: int = 8) -> np.ndarray:
     """Return steps and failures of Python by the decades of mass and time step, `[12, 5, 2]`."""
-    generator, table = np.random.default_rng(seed), np.zeros((12, 5, 2), int)
+    generator = np.random.default_rng(seed)
+    table = np.zeros((12, 5, 2), int)
     while table[..., 0].sum() < total:
-        body = random_body(generator, models(int(generator.integers(20))), int(generator.integers(1, 7)))
-        run, end = random_steps(generator, body, count, steps), None
+        body = random_body(
+            generator,
+            models(int(generator.integers(20))),
+            int(generator.integers(1, 7)),
+        )
+        run = random_steps(generator, body, count, steps)
+        end = None
         for _ in range(steps):
             given = run.send(end)
             end, lost = solved(body, given)
@@ -117,7 +153,8 @@ def failures(seed: int, total: int, count: int = 250, steps: int = 8) -> np.ndar
 
 def tally(table: np.ndarray, mass: float, dt: np.ndarray, lost: np.ndarray) -> None:
     """Add steps and failures of bodies of one mass to a table `[12, 5, 2]` by decades."""
-    row, columns = int(np.floor(np.log10(mass))) + 6, np.clip(np.floor(np.log10(dt)).astype(int) + 5, 0, 4)
+    row = int(np.floor(np.log10(mass))) + 6
+    columns = np.clip(np.floor(np.log10(dt)).astype(int) + 5, 0, 4)
     np.add.at(table[row, :, 0], columns, 1)
     np.add.at(table[row, :, 1], columns, lost)
 
@@ -126,5 +163,8 @@ def shown(table: np.ndarray) -> str:
     """Return a table as text: a line for each decade of mass, failures of all steps by decades of the time step."""
     lines = [" " * 12 + "".join(f"{f'1e{d} s':>16}" for d in range(-5, 0))]
     for m, row in enumerate(table):
-        lines.append(f"1e{m - 6:<3} kg    " + "".join(f"{f'{lost} of {count}':>16}" for count, lost in row))
+        lines.append(
+            f"1e{m - 6:<3} kg    "
+            + "".join(f"{f'{lost} of {count}':>16}" for count, lost in row)
+        )
     return "\n".join(lines)

@@ -23,13 +23,19 @@ from tests.support.coupling_problems import random_bodies, random_run
 from tests.support.recorded import NUMBER, array
 from tests.support.walks import walk
 
-os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")  # most of the time goes into compilation
+os.environ.setdefault(
+    "JAX_DISABLE_MOST_OPTIMIZATIONS", "1"
+)  # most of the time goes into compilation
 
-LAW = pf.LuGre(mu_c=0.8, mu_s=1.1, v_s=2e-3, sigma_1=300.0, sigma_2=0.3, elasto_plastic=0.7)
+LAW = pf.LuGre(
+    mu_c=0.8, mu_s=1.1, v_s=2e-3, sigma_1=300.0, sigma_2=0.3, elasto_plastic=0.7
+)
 PLAIN = dataclasses.replace(LAW, elasto_plastic=None, gamma=1.3)
 FIXED = dataclasses.replace(LAW, reference_load=2.0)
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 1.0]], 0.005)
-SOFT = pf.ContactPatch.disc(0.012, cells=5, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012))
+SOFT = pf.ContactPatch.disc(
+    0.012, cells=5, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012)
+)
 METRIC = PATCH.with_friction_metric(friction_metric(0.4, 1.0, 1.6))
 LEAN = PATCH.with_friction_metric(friction_metric(0.4, 1.0, 1.6), (0.2, -0.1))
 CELLS = {
@@ -49,10 +55,21 @@ STEPS, DT = 6, 5e-4
 def motions() -> tuple[np.ndarray, ...]:
     """Return twists `[2, T, 3]`, loads `[2, T]` and moments `[2, T, 2]`: slip to and fro, one lifted for a step."""
     t = np.arange(STEPS)
-    twist = np.stack([4e-3 * np.sin(0.9 * t + 0.2), 3e-3 * np.cos(0.7 * t), 0.8 * np.sin(1.1 * t + 0.3)], -1)
+    twist = np.stack(
+        [
+            4e-3 * np.sin(0.9 * t + 0.2),
+            3e-3 * np.cos(0.7 * t),
+            0.8 * np.sin(1.1 * t + 0.3),
+        ],
+        -1,
+    )
     load = np.stack([2.0 + np.cos(t), 0.5 + 0.3 * np.sin(t)])
     load[0, 3] = 0.0
-    return np.stack([twist, -0.2 * twist[::-1]]), load, 2e-3 * load[..., None] * np.stack([np.cos(t), np.sin(t)], -1)
+    return (
+        np.stack([twist, -0.2 * twist[::-1]]),
+        load,
+        2e-3 * load[..., None] * np.stack([np.cos(t), np.sin(t)], -1),
+    )
 
 
 def torch() -> dict[str, Any]:
@@ -64,12 +81,17 @@ def torch() -> dict[str, Any]:
     double = {"dtype": torch.float64}
     weighed = ("mu_c", "mu_s", "sigma_1", "breakaway_ratio", "weights")
     made = {name: pt.DistributedModel(*each, **double) for name, each in CELLS.items()}
-    made |= {name: pt.ReducedModelPublished(*each, trainable=TRAINED, **double) for name, each in SURFACES.items()}
+    made |= {
+        name: pt.ReducedModelPublished(*each, trainable=TRAINED, **double)
+        for name, each in SURFACES.items()
+    }
     made |= {
         "weights": pt.DistributedModel(PATCH, LAW, trainable=weighed, **double),
         "planar": pt.ReducedPlanarLuGre(**double),
     }
-    return {name: of_torch(model) for name, model in made.items()} | {"scene": _scene_of_torch()}
+    return {name: of_torch(model) for name, model in made.items()} | {
+        "scene": _scene_of_torch()
+    }
 
 
 def of_torch(model: Any) -> dict[str, Any]:
@@ -78,11 +100,23 @@ def of_torch(model: Any) -> dict[str, Any]:
 
     import planarfriction.torch as pt
 
-    twist, load, moments = (torch.tensor(x, dtype=model.lever.dtype, requires_grad=True) for x in motions())
-    moves, leaves = not isinstance(model, pt.ReducedPlanarLuGre) and model.reference_load is None, [*model.parameters()]
-    state, wrenches = model.rest(2), []
+    twist, load, moments = (
+        torch.tensor(x, dtype=model.lever.dtype, requires_grad=True) for x in motions()
+    )
+    moves = (
+        not isinstance(model, pt.ReducedPlanarLuGre) and model.reference_load is None
+    )
+    leaves = [*model.parameters()]
+    state = model.rest(2)
+    wrenches = []
     for i in range(STEPS):
-        state, wrench = model.step(state, twist[:, i], load[:, i], DT, **({"moments": moments[:, i]} if moves else {}))
+        state, wrench = model.step(
+            state,
+            twist[:, i],
+            load[:, i],
+            DT,
+            **({"moments": moments[:, i]} if moves else {}),
+        )
         wrenches.append(wrench)
     given = [*leaves, twist, load, *[moments] * moves]
     found = {
@@ -90,13 +124,17 @@ def of_torch(model: Any) -> dict[str, Any]:
         "state": state,
         "wrenches": torch.stack(wrenches),
         "rate": model(state, twist[:, 1], load[:, 1]),
-        "gradient": torch.autograd.grad(wrench.square().sum() + 1e6 * state.square().sum(), given),
+        "gradient": torch.autograd.grad(
+            wrench.square().sum() + 1e6 * state.square().sum(), given
+        ),
         "values": model.physical(),
         "law": [*model._law_values().values()],
     }
     for method in ("eager", "adjoint"):
         run = pt.rollout(model, None, twist, load, DT, method=method)
-        loss = pt.tracking_loss(model, None, twist, load, DT, torch.zeros(STEPS, 3), method=method)
+        loss = pt.tracking_loss(
+            model, None, twist, load, DT, torch.zeros(STEPS, 3), method=method
+        )
         found[method] = [*run, loss, *torch.autograd.grad(loss, [*leaves, twist, load])]
     return _told(found, lambda each: each.detach().numpy())
 
@@ -104,7 +142,8 @@ def of_torch(model: Any) -> dict[str, Any]:
 def _scene() -> tuple[pf.Scene, np.ndarray, np.ndarray]:
     """Return a plate that slides and turns, knots [s] and loads there [N]."""
     body = pf.Body(0.4, 6e-4, velocity=(0.08, 0.03, 1.5), gravity=(0.0, 0.0))
-    load, knots = np.array([1.0, 1.2, 0.9]), np.array([0.0, 0.03, 0.06])
+    load = np.array([1.0, 1.2, 0.9])
+    knots = np.array([0.0, 0.03, 0.06])
     model = pf.ReducedModelPublished(PATCH, PLAIN, pf.LimitSurfaceEllipsoid(PATCH))
     contact = pf.Contact(model, pf.Signal(knots, load, "linear"), name="pad")
     return pf.Scene(body, [contact], 0.06, save_every=0.02), knots, load
@@ -116,11 +155,19 @@ def _scene_of_torch() -> Any:
     from planarfriction.torch import simulate_scene
 
     scene, knots, load = _scene()
-    given = [torch.tensor(each, dtype=torch.float64, requires_grad=True) for each in (1.2, load, 0.09)]
+    given = [
+        torch.tensor(each, dtype=torch.float64, requires_grad=True)
+        for each in (1.2, load, 0.09)
+    ]
     found = simulate_scene(
-        scene, {"mu": given[0]}, signals={"pad.normal_force": (knots, given[1])}, initial={"vx": given[2]}
+        scene,
+        {"mu": given[0]},
+        signals={"pad.normal_force": (knots, given[1])},
+        initial={"vx": given[2]},
     )
-    slopes = torch.autograd.grad(found.motion.square().sum() + found.wrenches.square().sum(), given)
+    slopes = torch.autograd.grad(
+        found.motion.square().sum() + found.wrenches.square().sum(), given
+    )
     return _told([*found, *slopes], lambda each: each.detach().numpy())
 
 
@@ -139,17 +186,26 @@ def jax() -> dict[str, Any]:
 
         @jax.jit
         def stepped(model: Any) -> Any:
-            state, wrench = pj.step(model, pj.rest(model, 2), twist[:, 1], load[:, 1], DT)
+            state, wrench = pj.step(
+                model, pj.rest(model, 2), twist[:, 1], load[:, 1], DT
+            )
             return state, wrench, pj.rate(model, state, twist[:, 2], load[:, 2])
 
         def loss(model: Any, parameters: Any, *given: Any) -> Any:
-            run = pj.rollout(model, None, *given, DT, parameters=parameters, method="adjoint")
+            run = pj.rollout(
+                model, None, *given, DT, parameters=parameters, method="adjoint"
+            )
             return (run.wrenches**2).sum() + 1e6 * (run.state**2).sum(), run
 
         table = pj.ReducedModelPublished(*SURFACES["table"])
         found: dict[str, Any] = {"table": stepped(table)}
-        for name, model in {"distributed": pj.DistributedModel(PATCH, LAW), "table": table}.items():
-            slopes, run = jax.grad(loss, (1, 2, 3), has_aux=True)(model, model.parameters, twist, load)
+        for name, model in {
+            "distributed": pj.DistributedModel(PATCH, LAW),
+            "table": table,
+        }.items():
+            slopes, run = jax.grad(loss, (1, 2, 3), has_aux=True)(
+                model, model.parameters, twist, load
+            )
             found[f"{name}, adjoint"] = [*run, *jax.tree.leaves(slopes)]
         return _told(found, np.asarray)
 
@@ -175,24 +231,46 @@ def warp() -> dict[str, Any]:
     shapes = [pf.ContactPatch.disc(0.01), pf.ContactPatch.rectangle(0.02, 0.01)]
     made = {
         "few": pf.ReducedModel(shapes[0], c_libraries.LAW),
-        "fixed": pf.ReducedModel(shapes[0], dataclasses.replace(c_libraries.LAW, reference_load=2.0)),
+        "fixed": pf.ReducedModel(
+            shapes[0], dataclasses.replace(c_libraries.LAW, reference_load=2.0)
+        ),
         "published": pf.ReducedModelPublished(shapes[0], c_libraries.LAW),
     }
     found: dict[str, Any] = {"coupled": _coupled(pw, wp)}
     for name, model in made.items():
-        runs = zip(*((v, n) for _, v, n, *_ in walk(model, 40, 3, np.float32)), strict=True)
+        runs = zip(
+            *((v, n) for _, v, n, *_ in walk(model, 40, 3, np.float32)), strict=True
+        )
         twist, load = map(np.array, runs)
-        moments = None if name == "fixed" else 2e-3 * load[..., None] * np.array([1.0, -0.6])
+        moments = (
+            None if name == "fixed" else 2e-3 * load[..., None] * np.array([1.0, -0.6])
+        )
         state, wrench = _rolled(pw, wp, wp.float64, model, twist, load, moments)
         single = _rolled(pw, wp, wp.float32, model, twist, load, moments)[1]
-        found[name] = [state, wrench, bool(abs(single - wrench).max() < 1e-3 * abs(wrench).max())]
+        found[name] = [
+            state,
+            wrench,
+            bool(abs(single - wrench).max() < 1e-3 * abs(wrench).max()),
+        ]
     return found
 
 
-def _rolled(pw: Any, wp: Any, dtype: Any, model: Any, twist: Any, load: Any, moments: Any) -> list[Any]:
-    kernel = pw.Model(model, contacts=40, parameters={"scale": np.linspace(0.8, 1.3, 40)}, device="cpu", dtype=dtype)
-    given = [None if each is None else wp.array(each, dtype=dtype, device="cpu") for each in (twist, load, moments)]
-    new, wrench = kernel.rest(), wp.zeros((3, 40, 3), dtype=dtype, device="cpu")
+def _rolled(
+    pw: Any, wp: Any, dtype: Any, model: Any, twist: Any, load: Any, moments: Any
+) -> list[Any]:
+    kernel = pw.Model(
+        model,
+        contacts=40,
+        parameters={"scale": np.linspace(0.8, 1.3, 40)},
+        device="cpu",
+        dtype=dtype,
+    )
+    given = [
+        None if each is None else wp.array(each, dtype=dtype, device="cpu")
+        for each in (twist, load, moments)
+    ]
+    new = kernel.rest()
+    wrench = wp.zeros((3, 40, 3), dtype=dtype, device="cpu")
     kernel.rollout(kernel.rest(), *given[:2], 1e-3, new, wrench, moments=given[2])
     kernel.check()
     return [new.numpy(), wrench.numpy()]
@@ -202,15 +280,35 @@ def _coupled(pw: Any, wp: Any) -> Any:
     law = pf.LuGre(mu_s=1.2, sigma_0=1e5, sigma_1=250.0, elasto_plastic=0.9)
     shapes = [pf.ContactPatch.disc(0.01), pf.ContactPatch.rectangle(0.02, 0.01)]
     models = [pf.ReducedModel(shapes[0], law), pf.ReducedModel(shapes[1], law)]
-    generator, patches = np.random.default_rng(5), CoupledPatches(models)
-    kernel, told = None, []
-    for state, host, dt, _ in random_run(generator, patches, random_bodies(generator, 8, 2, 0.05), 4):
+    generator = np.random.default_rng(5)
+    patches = CoupledPatches(models)
+    kernel = None
+    told = []
+    for state, host, dt, _ in random_run(
+        generator, patches, random_bodies(generator, 8, 2, 0.05), 4
+    ):
         if kernel is None:
             kernel = pw.CoupledPatches(models, worlds=8, dtype=wp.float64, device="cpu")
             results = kernel.results()
-        given = [None if x is None else wp.array(np.ascontiguousarray(x), dtype=wp.float64, device="cpu") for x in host]
-        kernel.step(wp.array(state, dtype=wp.float64, device="cpu"), HostStep(*given), dt[0], results)
-        told.append([results.state.numpy().copy(), results.wrench.numpy().copy(), results.converged.numpy().tolist()])
+        given = [
+            None
+            if x is None
+            else wp.array(np.ascontiguousarray(x), dtype=wp.float64, device="cpu")
+            for x in host
+        ]
+        kernel.step(
+            wp.array(state, dtype=wp.float64, device="cpu"),
+            HostStep(*given),
+            dt[0],
+            results,
+        )
+        told.append(
+            [
+                results.state.numpy().copy(),
+                results.wrench.numpy().copy(),
+                results.converged.numpy().tolist(),
+            ]
+        )
     return told
 
 
@@ -221,22 +319,38 @@ def mujoco() -> dict[str, Any]:
     """Take steps of scenes in MuJoCo, with parameters that differ and shapes that follow their contacts."""
     from planarfriction_studies.bench.mujoco_scenes import capsule, grip, plate, tray
 
-    scenes = {"Euler": grip(), "implicitfast": capsule(), "implicit": tray(), "plate": plate()}
-    return {name: _of_mujoco(scene, name.replace("plate", "Euler")) for name, scene in scenes.items()}
+    scenes = {
+        "Euler": grip(),
+        "implicitfast": capsule(),
+        "implicit": tray(),
+        "plate": plate(),
+    }
+    return {
+        name: _of_mujoco(scene, name.replace("plate", "Euler"))
+        for name, scene in scenes.items()
+    }
 
 
 def _of_mujoco(scene: Any, integrator: str) -> list[Any]:
     m, d, friction = scene.ours(integrator=integrator)
-    own, told = friction.parameters(m), []
+    own = friction.parameters(m)
+    told = []
     own["mu_c"][:] *= 0.9
-    own["scale"][0], own["centre_x"][0] = 1.1, 5e-4
+    own["scale"][0] = 1.1
+    own["centre_x"][0] = 5e-4
     for i in range(60):
         d.ctrl[:] = scene.control(2e-3 * i + 0.3 * (i > 40))
         friction.step(d)
         if i % 15 == 14:
-            report, rows = friction.report(d), (friction.wrenches(d), friction.twists(d), friction.loads(d))
+            report = friction.report(d)
+            rows = (friction.wrenches(d), friction.twists(d), friction.loads(d))
             numbers = [d.qpos, d.qvel, friction.state(d), *rows, *friction.frame(d, 0)]
-            told += [_told(numbers, np.copy), report.passes, report.converged, friction.misplaced(d)]
+            told += [
+                _told(numbers, np.copy),
+                report.passes,
+                report.converged,
+                friction.misplaced(d),
+            ]
     return told
 
 
@@ -247,7 +361,10 @@ def drake() -> dict[str, Any]:
     law = pf.LuGre(mu_s=1.0, sigma_2=0.0, elasto_plastic=0.9)
     box, pad = (
         pf.ReducedModel(each, law)
-        for each in (pf.ContactPatch.rectangle(0.1, cells=9), pf.ContactPatch.disc(0.01, cells=9))
+        for each in (
+            pf.ContactPatch.rectangle(0.1, cells=9),
+            pf.ContactPatch.disc(0.01, cells=9),
+        )
     )
     runs = {
         "box": sliding("box", "hydroelastic", 2e-3, box, tilt=0.6),
@@ -258,9 +375,15 @@ def drake() -> dict[str, Any]:
         told = []
         for i in range(1, 5):
             run.to(0.02 * i)
-            ports = run.friction.get_wrenches_output_port(), run.friction.get_loads_output_port()
-            motion, report = run.plant.GetPositionsAndVelocities(run.context), run.friction.GetReport(run.own)
-            numbers = np.concatenate([motion, *(each.Eval(run.own) for each in ports)])  # twists at rest are rounding
+            ports = (
+                run.friction.get_wrenches_output_port(),
+                run.friction.get_loads_output_port(),
+            )
+            motion = run.plant.GetPositionsAndVelocities(run.context)
+            report = run.friction.GetReport(run.own)
+            numbers = np.concatenate(
+                [motion, *(each.Eval(run.own) for each in ports)]
+            )  # twists at rest are rounding
             told.append([numbers, run.friction.GetBristles(run.own), report.converged])
         found[name] = told
     return found
@@ -280,11 +403,16 @@ def exported() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         files = [
             *pf.export_c(table, folder, name="table", precision="float"),
-            *pf.export_c(ellipsoid, folder, name="ellipsoid", casadi=True, controller=hold),
+            *pf.export_c(
+                ellipsoid, folder, name="ellipsoid", casadi=True, controller=hold
+            ),
         ]
         made = c_libraries.library("few", "double", "-O0", patches=2)
         steps = c_libraries.run(made, c_libraries.samples(made.model, float, 40))
-        return {**_texts([*files, *made.folder.glob("friction*.[hc]")]), "steps": [*steps]}
+        return {
+            **_texts([*files, *made.folder.glob("friction*.[hc]")]),
+            "steps": [*steps],
+        }
 
 
 def _texts(files: list[Path]) -> dict[str, Any]:
@@ -295,7 +423,10 @@ def _text(words: str) -> dict[str, Any]:
     """Tell a source by checksums of the words of its blocks of lines, and by its numbers."""
     words = re.sub(r"Digest of the model: \w+", "", words.replace(pf.__version__, ""))
     lines = NUMBER.sub("#", words).splitlines()
-    blocks = [zlib.crc32("\n".join(lines[i : i + BLOCK]).encode()) for i in range(0, len(lines), BLOCK)]
+    blocks = [
+        zlib.crc32("\n".join(lines[i : i + BLOCK]).encode())
+        for i in range(0, len(lines), BLOCK)
+    ]
     numbers = np.array([float(each) for each in NUMBER.findall(words)])
     numbers = array(np.arcsinh(1e4 * np.clip(numbers, -1e300, 1e300)))
     return {"blocks": " ".join(f"x{each:x}" for each in blocks), "numbers": numbers}

@@ -16,27 +16,43 @@ from tests.support import single_precision
 
 DISC = pf.ContactPatch.disc(0.01)
 FEW = pf.ContactPatch.disc(0.01, cells=5)
-METRIC = pf.ContactPatch.rectangle(0.02, 0.01).with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
+METRIC = pf.ContactPatch.rectangle(0.02, 0.01).with_friction_metric(
+    [[1.0, 0.2], [0.2, 1.5]]
+)
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 MODELS = {
     "few": lambda: pf.ReducedModel(DISC, LAW),
     "plain": lambda: pf.ReducedModel(DISC, pf.LuGre(mu_s=1.2)),
     "distributed": lambda: pf.DistributedModel(METRIC, LAW),
     "discs": lambda: pf.DistributedModel(FEW.discs(), LAW),
-    "turned discs": lambda: pf.DistributedModel(FEW.with_friction_metric([[1.0, 0.2], [0.2, 1.5]]).discs(), LAW),
+    "turned discs": lambda: pf.DistributedModel(
+        FEW.with_friction_metric([[1.0, 0.2], [0.2, 1.5]]).discs(), LAW
+    ),
     "table": lambda: pf.ReducedModelPublished(DISC, LAW),
-    "potential": lambda: pf.ReducedModelPublished(METRIC, LAW, surface=pf.LimitSurfaceTable(METRIC)),
-    "ellipsoid": lambda: pf.ReducedModelPublished(DISC, LAW, surface=pf.LimitSurfaceEllipsoid(DISC)),
+    "potential": lambda: pf.ReducedModelPublished(
+        METRIC, LAW, surface=pf.LimitSurfaceTable(METRIC)
+    ),
+    "ellipsoid": lambda: pf.ReducedModelPublished(
+        DISC, LAW, surface=pf.LimitSurfaceEllipsoid(DISC)
+    ),
     "plain ellipsoid": lambda: pf.ReducedModelPublished(
         DISC, pf.LuGre(mu_s=1.2), surface=pf.LimitSurfaceEllipsoid(DISC)
     ),
 }
-MAPS = {load: np.clip(np.add.outer(np.arange(-4, 5), load * np.arange(-4, 5)), 0.0, None) for load in (0.5, 1.0, 3.0)}
+MAPS = {
+    load: np.clip(np.add.outer(np.arange(-4, 5), load * np.arange(-4, 5)), 0.0, None)
+    for load in (0.5, 1.0, 3.0)
+}
 FOLLOWING = {
     "soft": lambda: pf.ReducedModel(
-        pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0), cells=15), LAW
+        pf.ContactPatch.disc(
+            0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0), cells=15
+        ),
+        LAW,
     ),
-    "maps": lambda: pf.DistributedModel(pf.ContactPatch.from_pressure(MAPS, cell_size=1e-3), LAW),
+    "maps": lambda: pf.DistributedModel(
+        pf.ContactPatch.from_pressure(MAPS, cell_size=1e-3), LAW
+    ),
 }
 """Models whose shape follows the load."""
 TURNED = {
@@ -47,7 +63,9 @@ TURNED = {
 _FIXED_LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=2.0)
 FIXED = {
     "fixed discs": lambda: pf.ReducedModel(DISC, _FIXED_LAW),
-    "fixed points": lambda: pf.DistributedModel(FEW, pf.LuGre(mu_s=1.2, reference_load=2.0)),
+    "fixed points": lambda: pf.DistributedModel(
+        FEW, pf.LuGre(mu_s=1.2, reference_load=2.0)
+    ),
     "fixed metric": lambda: pf.DistributedModel(METRIC, _FIXED_LAW),
 }
 """Models whose stiffness does not grow with the load."""
@@ -55,7 +73,13 @@ REDUCED = [name for name in MODELS if name != "distributed"]
 KINDS = {"double": np.float64, "float": np.float32}
 STRICT = "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"
 
-VECTOR = "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast"
+VECTOR = (
+    "-O3",
+    "-march=native",
+    "-fno-math-errno",
+    "-fno-trapping-math",
+    "-ffp-contract=fast",
+)
 """Options that a page recommends: cells in vectors."""
 
 DRIVER = """#include "friction.h"
@@ -109,14 +133,27 @@ def _folder() -> tempfile.TemporaryDirectory:
 
 
 @functools.cache
-def library(name: str, precision: str = "double", *options: str, patches: int = 1) -> Library:
+def library(
+    name: str, precision: str = "double", *options: str, patches: int = 1
+) -> Library:
     """Compile the model called `name` once, without a warning, and load it."""
     model = (MODELS | FOLLOWING | TURNED | FIXED)[name]()
     folder = Path(_folder().name) / "-".join([name, precision, str(patches), *options])
     pf.export_c(model, folder, precision=precision, patches=patches)
     (folder / "driver.c").write_text(DRIVER)
-    compiled = "gcc", *STRICT, *(options or ("-O1",)), "-fPIC", "-c", "friction.c", "driver.c"
-    for command in (compiled, ("gcc", "-shared", "-o", "friction.so", "friction.o", "driver.o", "-lm")):
+    compiled = (
+        "gcc",
+        *STRICT,
+        *(options or ("-O1",)),
+        "-fPIC",
+        "-c",
+        "friction.c",
+        "driver.c",
+    )
+    for command in (
+        compiled,
+        ("gcc", "-shared", "-o", "friction.so", "friction.o", "driver.o", "-lm"),
+    ):
         subprocess.run(command, cwd=folder, check=True)
     return Library(model, folder, KINDS[precision], ctypes.CDLL(folder / "friction.so"))
 
@@ -124,17 +161,34 @@ def library(name: str, precision: str = "double", *options: str, patches: int = 
 def samples(model: Any, kind: type, count: int, seed: int = 0) -> list[np.ndarray]:
     """Draw states, twists, loads and steps from rest to slip, rounded to a precision."""
     rng = np.random.default_rng(seed)
-    twist = rng.normal(size=(count, 3)) * [1.0, 1.0, 150.0] * 10.0 ** rng.uniform(-6.0, -0.5, (count, 1))
-    load, dt = 10.0 ** rng.uniform(-2.0, 2.0, count), 10.0 ** rng.uniform(-5.0, -2.0, count)
-    load[::50], twist[::70] = 0.0, 0.0
-    state, _ = model.step(np.broadcast_to(model.rest(), (count, *model.state_shape)), twist[::-1], 1.0, 1e-3)
-    state[1::2] *= rng.uniform(0.2, 1.1, (len(state[1::2]), *[1] * len(model.state_shape)))  # off the bound of slip
-    return [np.ascontiguousarray(each.astype(kind).astype(float)) for each in (state, twist, load, dt)]
+    twist = (
+        rng.normal(size=(count, 3))
+        * [1.0, 1.0, 150.0]
+        * 10.0 ** rng.uniform(-6.0, -0.5, (count, 1))
+    )
+    load = 10.0 ** rng.uniform(-2.0, 2.0, count)
+    dt = 10.0 ** rng.uniform(-5.0, -2.0, count)
+    load[::50] = 0.0
+    twist[::70] = 0.0
+    state, _ = model.step(
+        np.broadcast_to(model.rest(), (count, *model.state_shape)),
+        twist[::-1],
+        1.0,
+        1e-3,
+    )
+    state[1::2] *= rng.uniform(
+        0.2, 1.1, (len(state[1::2]), *[1] * len(model.state_shape))
+    )  # off the bound of slip
+    return [
+        np.ascontiguousarray(each.astype(kind).astype(float))
+        for each in (state, twist, load, dt)
+    ]
 
 
 def slopes_type(model: Any, kind: type) -> np.dtype:
     """Return the record of derivatives of a model."""
-    states, own = int(np.prod(model.state_shape)), model.state_shape[0]
+    states = int(np.prod(model.state_shape))
+    own = model.state_shape[0]
     count = 7 if model.law.elasto_plastic else 6
     shapes = {
         "wrench_state": (3, states), "wrench_twist": (3, 3), "wrench_load": (3,), "wrench_params": (3, count),
@@ -144,19 +198,35 @@ def slopes_type(model: Any, kind: type) -> np.dtype:
     return np.dtype([(name, kind, shape) for name, shape in shapes.items()])
 
 
-def run(made: Library, inputs: list[np.ndarray], slopes: bool = False) -> tuple[Any, ...]:
+def run(
+    made: Library, inputs: list[np.ndarray], slopes: bool = False
+) -> tuple[Any, ...]:
     """Return new states, wrenches and, if asked for, derivatives of steps in C."""
     state, twist, load, dt = (np.array(each, made.kind, order="C") for each in inputs)
     wrench = np.empty((len(load), 3), made.kind)
     found = np.empty(len(load) if slopes else 0, slopes_type(made.model, made.kind))
-    pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (state, twist, load, dt, wrench)]
-    assert made.functions.run(len(load), *pointers, found.ctypes.data_as(ctypes.c_void_p) if slopes else None) == 0
+    pointers = [
+        each.ctypes.data_as(ctypes.c_void_p)
+        for each in (state, twist, load, dt, wrench)
+    ]
+    assert (
+        made.functions.run(
+            len(load),
+            *pointers,
+            found.ctypes.data_as(ctypes.c_void_p) if slopes else None,
+        )
+        == 0
+    )
     return (state, wrench, found) if slopes else (state, wrench)
 
 
 def run_steady(made: Library, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Return the wrenches of steady sliding in C."""
-    twist, load, wrench = np.array(twist, made.kind), np.array(load, made.kind), np.empty(twist.shape, made.kind)
+    twist, load, wrench = (
+        np.array(twist, made.kind),
+        np.array(load, made.kind),
+        np.empty(twist.shape, made.kind),
+    )
     pointers = [each.ctypes.data_as(ctypes.c_void_p) for each in (twist, load, wrench)]
     assert made.functions.run_steady(len(load), *pointers) == 0
     return wrench

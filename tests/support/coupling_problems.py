@@ -31,11 +31,19 @@ def random_law(generator: np.random.Generator) -> pf.LuGre:
     )
 
 
-def random_patches(generator: np.random.Generator, count: int, kinds=(pf.ReducedModel,)) -> CoupledPatches:
+def random_patches(
+    generator: np.random.Generator, count: int, kinds=(pf.ReducedModel,)
+) -> CoupledPatches:
     """Patches of random shapes, laws and kinds of models."""
-    shapes, laws = generator.choice(len(SHAPES), count), [random_law(generator) for _ in range(count)]
+    shapes = generator.choice(len(SHAPES), count)
+    laws = [random_law(generator) for _ in range(count)]
     chosen = [kinds[i] for i in generator.choice(len(kinds), count)]
-    return CoupledPatches([kind(SHAPES[i], law) for kind, i, law in zip(chosen, shapes, laws, strict=True)])
+    return CoupledPatches(
+        [
+            kind(SHAPES[i], law)
+            for kind, i, law in zip(chosen, shapes, laws, strict=True)
+        ]
+    )
 
 
 class Bodies(NamedTuple):
@@ -57,80 +65,143 @@ class Bodies(NamedTuple):
     """`[E]`"""
 
 
-def random_bodies(generator: np.random.Generator, count: int, k: int, height: float = 0.0) -> Bodies:
+def random_bodies(
+    generator: np.random.Generator, count: int, k: int, height: float = 0.0
+) -> Bodies:
     """Bodies of 10 g to 10 kg, half of them with patches that give a little, with time steps from 0.1 to 10 ms.
 
     `height` of the centre of mass over the patches, in sizes: friction tilts the load from one patch to another.
     """
-    dt, size = 10.0 ** generator.uniform(-4.0, -2.0, count), 10.0 ** generator.uniform(-2.0, -0.5, count)
+    dt = 10.0 ** generator.uniform(-4.0, -2.0, count)
+    size = 10.0 ** generator.uniform(-2.0, -0.5, count)
     mass = 10.0 ** generator.uniform(-2.0, 1.0, (count, 1)) * np.ones(3)
     mass[:, 2] *= size**2 * generator.uniform(0.1, 1.0, count)
     places = generator.uniform(-1.0, 1.0, (count, k, 2)) * size[:, None, None]
     angle = generator.uniform(0.0, 2.0 * np.pi, (count, k))
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     x, y = np.moveaxis(places, -1, 0)
-    zero, one = np.zeros_like(c), np.ones_like(c)
+    zero = np.zeros_like(c)
+    one = np.ones_like(c)
     rows = [[c, s, x * s - y * c], [-s, c, x * c + y * s], [zero, zero, one]]
     jacobian = np.moveaxis(np.array(rows), (0, 1), (2, 3)).reshape(count, 3 * k, 3)
     response = np.einsum("eia,ea,eja->eij", jacobian, dt[:, None] / mass, jacobian)
-    own = np.where(generator.uniform(size=count) < 0.5, 10.0 ** generator.uniform(-3.0, 0.0, count), 0.0)
-    response += own[:, None, None] * np.eye(3 * k) * np.tile(dt[:, None] / mass, k)[:, None, :]
+    own = np.where(
+        generator.uniform(size=count) < 0.5,
+        10.0 ** generator.uniform(-3.0, 0.0, count),
+        0.0,
+    )
+    response += (
+        own[:, None, None] * np.eye(3 * k) * np.tile(dt[:, None] / mass, k)[:, None, :]
+    )
     centred = places - places.mean(axis=1, keepdims=True)
     tilt = np.linalg.pinv(np.moveaxis(centred, 1, 2), rcond=0.1)
     load_response = np.zeros((count, k, 3 * k))
     for p in range(k):
         turn = np.moveaxis(jacobian[:, 3 * p : 3 * p + 2, :2], 1, 2)
-        load_response[:, :, 3 * p : 3 * p + 2] = -height * size[:, None, None] * (tilt @ turn)
+        load_response[:, :, 3 * p : 3 * p + 2] = (
+            -height * size[:, None, None] * (tilt @ turn)
+        )
     load = 9.81 / k * mass[:, :1] * generator.uniform(0.3, 3.0, (count, k))
     return Bodies(jacobian, mass, size, response, load_response, load, dt)
 
 
-def random_run(generator: np.random.Generator, patches: CoupledPatches, bodies: Bodies, steps: int):
+def random_run(
+    generator: np.random.Generator, patches: CoupledPatches, bodies: Bodies, steps: int
+):
     """Slide, spin, stick, be pushed and lifted: yields `(state, host, dt, step)` of each step of all bodies."""
     count, k = bodies.load.shape
-    state, wrench = np.zeros((count, *patches.state_shape)), np.zeros((count, 3 * k))
+    state = np.zeros((count, *patches.state_shape))
+    wrench = np.zeros((count, 3 * k))
     unit = np.stack([np.ones(count), np.ones(count), 1.0 / bodies.size], 1)
     fast = unit * 10.0 ** generator.uniform(-3.0, 0.5, (count, 1))
 
     def kick(share: float) -> np.ndarray:
-        kicked = fast * generator.normal(size=(count, 3)) * (generator.uniform(size=(count, 1)) < share)
+        kicked = (
+            fast
+            * generator.normal(size=(count, 3))
+            * (generator.uniform(size=(count, 1)) < share)
+        )
         return np.einsum("eia,ea->ei", bodies.jacobian, kicked)
 
-    twist, force, weight = kick(0.5), np.zeros((count, 3)), bodies.load.sum(axis=1)[:, None] / unit
+    twist = kick(0.5)
+    force = np.zeros((count, 3))
+    weight = bodies.load.sum(axis=1)[:, None] / unit
     for _ in range(steps):
         pushed = generator.uniform(size=(count, 1)) < 0.15
-        pushes = weight * generator.normal(size=(count, 3)) * generator.choice([0.0, 0.3, 1.0, 2.0], (count, 1))
+        pushes = (
+            weight
+            * generator.normal(size=(count, 3))
+            * generator.choice([0.0, 0.3, 1.0, 2.0], (count, 1))
+        )
         force = np.where(pushed, pushes, force)
-        moved = np.einsum("eia,ea->ei", bodies.jacobian, bodies.dt[:, None] * force / bodies.mass)
-        free = twist + kick(0.05) + moved + np.einsum("eij,ej->ei", bodies.response, wrench)
+        moved = np.einsum(
+            "eia,ea->ei", bodies.jacobian, bodies.dt[:, None] * force / bodies.mass
+        )
+        free = (
+            twist
+            + kick(0.05)
+            + moved
+            + np.einsum("eij,ej->ei", bodies.response, wrench)
+        )
         changes = np.where(
             generator.uniform(size=(count, 1)) < 0.9,
             1.0 + 0.1 * generator.normal(size=(count, k)),
             10.0 ** generator.uniform(-2.0, 0.5, (count, k)),
         )
-        load = np.maximum(bodies.load * changes + np.einsum("epj,ej->ep", bodies.load_response, wrench), 0.0)
+        load = np.maximum(
+            bodies.load * changes
+            + np.einsum("epj,ej->ep", bodies.load_response, wrench),
+            0.0,
+        )
         host = HostStep(
-            free.reshape(count, k, 3), load, wrench.reshape(count, k, 3), bodies.response, bodies.load_response
+            free.reshape(count, k, 3),
+            load,
+            wrench.reshape(count, k, 3),
+            bodies.response,
+            bodies.load_response,
         )
         step = patches.step(state, host, bodies.dt)
         yield state, host, bodies.dt, step
-        state, wrench, twist = step.state, step.wrench.reshape(count, -1), step.twist.reshape(count, -1)
+        state = step.state
+        wrench = step.wrench.reshape(count, -1)
+        twist = step.twist.reshape(count, -1)
 
 
-def abrupt_run(generator: np.random.Generator, patches: CoupledPatches, count: int, height: float, steps: int):
+def abrupt_run(
+    generator: np.random.Generator,
+    patches: CoupledPatches,
+    count: int,
+    height: float,
+    steps: int,
+):
     """Yield as `random_run` does, with other bodies in each step: a host whose contacts jump."""
     k = len(patches.models)
-    state, wrench = np.zeros((count, *patches.state_shape)), np.zeros((count, 3 * k))
+    state = np.zeros((count, *patches.state_shape))
+    wrench = np.zeros((count, 3 * k))
     for _ in range(steps):
         bodies = random_bodies(generator, count, k, height)
         unit = np.stack([np.ones(count), np.ones(count), 1.0 / bodies.size], 1)
-        speed = unit * 10.0 ** generator.uniform(-3.0, 0.5, (count, 1)) * generator.normal(size=(count, 3))
-        free = np.einsum("eia,ea->ei", bodies.jacobian, speed) + np.einsum("eij,ej->ei", bodies.response, wrench)
+        speed = (
+            unit
+            * 10.0 ** generator.uniform(-3.0, 0.5, (count, 1))
+            * generator.normal(size=(count, 3))
+        )
+        free = np.einsum("eia,ea->ei", bodies.jacobian, speed) + np.einsum(
+            "eij,ej->ei", bodies.response, wrench
+        )
         tilted = np.einsum("epj,ej->ep", bodies.load_response, wrench)
-        load = np.maximum(bodies.load * (1.0 + 0.1 * generator.normal(size=(count, k))) + tilted, 0.0)
+        load = np.maximum(
+            bodies.load * (1.0 + 0.1 * generator.normal(size=(count, k))) + tilted, 0.0
+        )
         host = HostStep(
-            free.reshape(count, k, 3), load, wrench.reshape(count, k, 3), bodies.response, bodies.load_response
+            free.reshape(count, k, 3),
+            load,
+            wrench.reshape(count, k, 3),
+            bodies.response,
+            bodies.load_response,
         )
         step = patches.step(state, host, bodies.dt)
         yield state, host, bodies.dt, step
-        state, wrench = step.state, step.wrench.reshape(count, -1)
+        state = step.state
+        wrench = step.wrench.reshape(count, -1)

@@ -17,16 +17,22 @@ _FINGER = """<body pos="{out}0.045 0.012 0.58">
 """Driven link, finger with its pad, and the second link, whose end is connected to the finger."""
 
 _BAR = 'type="capsule" size="0.003" mass="0.02" contype="0" conaffinity="0"'
-_PAD = 'type="box" size="0.005 0.008862 0.008862" mass="0.03" contype="1" conaffinity="0"'
+_PAD = (
+    'type="box" size="0.005 0.008862 0.008862" mass="0.03" contype="1" conaffinity="0"'
+)
 
 
 def linkage() -> MujocoScene:
     """Build a block of 0.2 kg that two fingers on four-bar linkages hold 12 mm beside its centre of mass for 10 s."""
     sides = (("left", "-", "", -1), ("right", "", "-", 1))
     fingers = "".join(
-        _FINGER.format(side=side, out=out, back=back, turn=turn, bar=_BAR, pad=_PAD) for side, out, back, turn in sides
+        _FINGER.format(side=side, out=out, back=back, turn=turn, bar=_BAR, pad=_PAD)
+        for side, out, back, turn in sides
     )
-    loops = "".join(f'<connect site1="end {side}" site2="joint {side}" solref="0.004 1"/>' for side, *_ in sides)
+    loops = "".join(
+        f'<connect site1="end {side}" site2="joint {side}" solref="0.004 1"/>'
+        for side, *_ in sides
+    )
     motors = "".join(f'<motor joint="{side}"/>' for side, *_ in sides)
     held = grip("box")
     block = """<geom name="block" type="box" size="0.01 0.04 0.06" mass="0.2" contype="0" conaffinity="1"/>
@@ -35,5 +41,11 @@ def linkage() -> MujocoScene:
     <body name="block" pos="0 0 0.5"><freejoint/>{block}</body></worldbody>
     <equality>{loops}</equality><actuator>{motors}</actuator>"""
     return MujocoScene(
-        body, held.mu, held.torsion, held.patches, held.model, lambda t: (TORQUE, TORQUE), time=10.0
+        body,
+        held.mu,
+        held.torsion,
+        held.patches,
+        held.model,
+        lambda t: (TORQUE, TORQUE),
+        time=10.0,
     )  # gravity begins after the settling time, and the fingers yield to it

@@ -53,17 +53,35 @@ class Stream(NamedTuple):
 
 def push_streams(folder: Path | None = None) -> Iterator[Stream]:
     """Yield the pushes of `mlab_pushes`: friction is minus the wrench of the finger, as the object hardly speeds up."""
-    motion, force = ["vx_mps", "vy_mps", "wz_radps"], ["fx_N", "fy_N", "tau_Nm"]
-    table = read_table("series", ["push_id", "t_s", "yaw_rad", *motion, *force, "sliding"], ["run"], folder=folder)
+    motion = ["vx_mps", "vy_mps", "wz_radps"]
+    force = ["fx_N", "fy_N", "tau_Nm"]
+    table = read_table(
+        "series",
+        ["push_id", "t_s", "yaw_rad", *motion, *force, "sliding"],
+        ["run"],
+        folder=folder,
+    )
     patch = push_series.feet()
-    for (run, number), rows in table[~table["run"].isin(push_series.OTHER_FEET)].groupby(
-        ["run", "push_id"], sort=False
-    ):
-        yaw, time = rows["yaw_rad"].to_numpy(), rows["t_s"].to_numpy()
-        twist, wrench = (push_series.to_object(rows[names].to_numpy(), yaw) for names in (motion, force))
+    for (run, number), rows in table[
+        ~table["run"].isin(push_series.OTHER_FEET)
+    ].groupby(["run", "push_id"], sort=False):
+        yaw = rows["yaw_rad"].to_numpy()
+        time = rows["t_s"].to_numpy()
+        twist, wrench = (
+            push_series.to_object(rows[names].to_numpy(), yaw)
+            for names in (motion, force)
+        )
         sliding = rows["sliding"].to_numpy() > 0
         if sliding.any():
-            yield Stream(f"push {number:g} of {run}", time, -wrench, twist, sliding, push_series.WEIGHT, patch)
+            yield Stream(
+                f"push {number:g} of {run}",
+                time,
+                -wrench,
+                twist,
+                sliding,
+                push_series.WEIGHT,
+                patch,
+            )
 
 
 def slide_streams(folder: Path | None = None) -> Iterator[Stream]:
@@ -71,14 +89,32 @@ def slide_streams(folder: Path | None = None) -> Iterator[Stream]:
     motion = ["vx_mps", "vy_mps", "wz_radps"]
     columns = ["toss", "unique_id", "t_s", "yaw_rad", *motion, "sliding"]
     table = read_table("slides", columns, folder=folder)
-    for number, rows in table.drop_duplicates(["unique_id", "t_s"]).groupby("unique_id"):
-        time, sliding = rows["t_s"].to_numpy(), rows["sliding"].to_numpy() > 0
+    for number, rows in table.drop_duplicates(["unique_id", "t_s"]).groupby(
+        "unique_id"
+    ):
+        time = rows["t_s"].to_numpy()
+        sliding = rows["sliding"].to_numpy() > 0
         if sliding.sum() < LEAST_ROWS:
             continue
         world = rows[motion].to_numpy()
-        wrench = np.gradient(world, time, axis=0) * (slides.MASS, slides.MASS, slides.INERTIA)
-        twist, wrench = (push_series.to_object(each, rows["yaw_rad"].to_numpy()) for each in (world, wrench))
-        yield Stream(f"slide {number:g}", time, wrench, twist, sliding, slides.MASS * GRAVITY, slides.face())
+        wrench = np.gradient(world, time, axis=0) * (
+            slides.MASS,
+            slides.MASS,
+            slides.INERTIA,
+        )
+        twist, wrench = (
+            push_series.to_object(each, rows["yaw_rad"].to_numpy())
+            for each in (world, wrench)
+        )
+        yield Stream(
+            f"slide {number:g}",
+            time,
+            wrench,
+            twist,
+            sliding,
+            slides.MASS * GRAVITY,
+            slides.face(),
+        )
 
 
 def replay(stream: Stream) -> tuple[np.ndarray, np.ndarray, float]:
@@ -86,7 +122,8 @@ def replay(stream: Stream) -> tuple[np.ndarray, np.ndarray, float]:
 
     The fit is that of least squares of the sliding rows, `W = mu f_N h(V)`.
     """
-    patch, (length, _) = stream.patch, stream.twist.shape
+    patch = stream.patch
+    (length, _) = stream.twist.shape
     surface = pf.LimitSurfaceTable(patch)
     model = pf.ReducedModel(patch, pf.LuGre(mu_c=GUESS, mu_s=GUESS, sigma_2=0.0))
     sensors = Sensors(force_noise=FORCE_NOISE, torque_noise=FORCE_NOISE * surface.contact_radius, quantum=SPEED_ERROR,
@@ -94,11 +131,18 @@ def replay(stream: Stream) -> tuple[np.ndarray, np.ndarray, float]:
     observer = FrictionObserver(model, surface=surface, normal_force=stream.load, sensors=sensors, bias=NO_BIAS,
                                 radius_spread=RADIUS_SPREAD, mu_spread=MU_SPREAD, ratio_spread=RATIO_SPREAD,
                                 model_error=MODEL_ERROR)  # fmt: skip
-    mu, interval = np.empty(length), np.empty((length, 2))
+    mu = np.empty(length)
+    interval = np.empty((length, 2))
     for k in range(length):
         twist = stream.twist[k] * stream.sliding[k]
-        found = observer.update(Measurement(stream.time[k], stream.wrench[k], stream.load, twist))
+        found = observer.update(
+            Measurement(stream.time[k], stream.wrench[k], stream.load, twist)
+        )
         mu[k], interval[k] = found.mu_c, found.interval()[0]
     scale = np.array([1.0, 1.0, 1.0 / surface.contact_radius])
     unit = stream.load * surface.wrench(stream.twist[stream.sliding]) * scale
-    return mu, interval, float((unit * stream.wrench[stream.sliding] * scale).sum() / (unit**2).sum())
+    return (
+        mu,
+        interval,
+        float((unit * stream.wrench[stream.sliding] * scale).sum() / (unit**2).sum()),
+    )

@@ -24,15 +24,23 @@ def faults(figure: Any) -> list[str]:
     texts = list(_texts(figure, canvas.get_renderer()))
     width, height = figure.bbox.size
     found = [
-        f"{text!r} is cut off" for text, box, _ in texts if min(box.x0, box.y0, width - box.x1, height - box.y1) < -CUT
+        f"{text!r} is cut off"
+        for text, box, _ in texts
+        if min(box.x0, box.y0, width - box.x1, height - box.y1) < -CUT
     ]
-    found += [f"{text!r} has letters of {size:g} pt" for text, _, size in texts if size < SMALLEST]
+    found += [
+        f"{text!r} has letters of {size:g} pt"
+        for text, _, size in texts
+        if size < SMALLEST
+    ]
     for (one, first, _), (other, second, _) in itertools.combinations(texts, 2):
         both = Bbox.intersection(first, second)
         if both is not None and min(both.width, both.height) > CUT:
             found.append(f"{one!r} lies on {other!r}")
     for axes in figure.axes:
-        offsets = [axis.get_offset_text().get_text() for axis in (axes.xaxis, axes.yaxis)]
+        offsets = [
+            axis.get_offset_text().get_text() for axis in (axes.xaxis, axes.yaxis)
+        ]
         found += [f"ticks have the offset {offset!r}" for offset in offsets if offset]
         if not (axes.has_data() or axes.images or axes.artists or axes.texts):
             found.append("axes are empty")
@@ -41,10 +49,24 @@ def faults(figure: Any) -> list[str]:
 
 def _texts(figure: Any, renderer: Any) -> Iterator[tuple[str, Bbox, float]]:
     """Every text that is drawn, with its box [pixel] and its size [pt]."""
-    shown = {each for axes in figure.axes for axis in _axes_of(axes) for each in _ticks_shown(axis)}
-    ticks = {each for axes in figure.axes for axis in _axes_of(axes) for each in _all_ticks(axis)}
+    shown = {
+        each
+        for axes in figure.axes
+        for axis in _axes_of(axes)
+        for each in _ticks_shown(axis)
+    }
+    ticks = {
+        each
+        for axes in figure.axes
+        for axis in _axes_of(axes)
+        for each in _all_ticks(axis)
+    }
     for text in figure.findobj(Text):
-        if not text.get_visible() or not text.get_text().strip() or (text in ticks and text not in shown):
+        if (
+            not text.get_visible()
+            or not text.get_text().strip()
+            or (text in ticks and text not in shown)
+        ):
             continue
         box = text.get_window_extent(renderer)
         if box.width > 0.0 and box.height > 0.0:
@@ -65,4 +87,9 @@ def _ticks_shown(axis: Any) -> list[Text]:
     if not axis.axes.axison:
         return []
     drawn = axis._update_ticks()
-    return [label for tick in drawn for label in (tick.label1, tick.label2) if label.get_visible()]
+    return [
+        label
+        for tick in drawn
+        for label in (tick.label1, tick.label2)
+        if label.get_visible()
+    ]

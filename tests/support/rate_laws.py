@@ -25,7 +25,9 @@ class BoucWen(RateLaw):
         size = norm(z)
         stretch = ratio(dot(v, z), size)
         loss = xp.maximum(stretch, (1.0 - 2.0 * law.beta) * stretch)
-        return plus(v, -ratio(xp.power(size / law.largest_deflection, law.n) * loss, size), z)
+        return plus(
+            v, -ratio(xp.power(size / law.largest_deflection, law.n) * loss, size), z
+        )
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,9 @@ class Written(RateLaw):
 
     @staticmethod
     def bristle_traction(xp, law, z, zdot, v):
-        return times(-1.0, plus(plus(times(law.sigma_0, z), law.sigma_1, zdot), law.sigma_2, v))
+        return times(
+            -1.0, plus(plus(times(law.sigma_0, z), law.sigma_1, zdot), law.sigma_2, v)
+        )
 
 
 @dataclass(frozen=True)

@@ -50,28 +50,47 @@ def plain(value: Any) -> Any:
         return plain(value[()])
     if isinstance(value, (float, np.generic)):
         number = value.item() if isinstance(value, np.generic) else value
-        return number if not isinstance(number, float) or math.isfinite(number) else str(number)
+        return (
+            number
+            if not isinstance(number, float) or math.isfinite(number)
+            else str(number)
+        )
     if hasattr(value, "savefig"):
         return figure(value)
     if hasattr(value, "histories"):  # of a simulation
-        return {name: plain(np.asarray(each.values)) for name, each in value.histories.items()}
+        return {
+            name: plain(np.asarray(each.values))
+            for name, each in value.histories.items()
+        }
     if hasattr(value, "coords"):  # of xarray
-        return {str(name): [list(v.dims), dict(v.attrs), plain(v.to_numpy())] for name, v in value.variables.items()}
+        return {
+            str(name): [list(v.dims), dict(v.attrs), plain(v.to_numpy())]
+            for name, v in value.variables.items()
+        }
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if hasattr(value, "_asdict"):
         return plain(value._asdict())
     if dataclasses.is_dataclass(value):
-        return {each.name: plain(getattr(value, each.name)) for each in dataclasses.fields(value)}
+        return {
+            each.name: plain(getattr(value, each.name))
+            for each in dataclasses.fields(value)
+        }
     if not hasattr(value, "__iter__"):
         return type(value).__name__
     values = value if isinstance(value, np.ndarray) else [*value]
     numbers = np.asarray(values).dtype.kind in "biuf" if _even(values) else False
-    return array(values) if numbers and np.size(values) > 4 else [plain(each) for each in values]
+    return (
+        array(values)
+        if numbers and np.size(values) > 4
+        else [plain(each) for each in values]
+    )
 
 
 def _even(values: Any) -> bool:
-    return isinstance(values, np.ndarray) or all(isinstance(each, (int, float, np.number)) for each in values)
+    return isinstance(values, np.ndarray) or all(
+        isinstance(each, (int, float, np.number)) for each in values
+    )
 
 
 def array(values: Any) -> Any:
@@ -84,7 +103,9 @@ def array(values: Any) -> Any:
         return [array(column) for column in values.T]
     flat = values.ravel()
     places = np.flatnonzero(np.isfinite(flat))
-    shape = " x ".join(map(str, values.shape)) + ("" if len(places) == len(flat) else f", {len(places)} finite")
+    shape = " x ".join(map(str, values.shape)) + (
+        "" if len(places) == len(flat) else f", {len(places)} finite"
+    )
     flat = flat[places]
     sums = [float(flat @ np.cos(k * (places + 1.0))) for k in (1, 2)]
     return {"shape": shape, "sums": [float(np.linalg.norm(flat)), *sums]}
@@ -94,7 +115,11 @@ def text(words: str) -> dict[str, Any]:
     """Tell a long text by its different lines, without numbers, and by its numbers."""
     lines = NUMBER.sub("#", re.sub(r">\s*<", ">\n<", words)).splitlines()
     numbers = np.array([float(each) for each in NUMBER.findall(words)])
-    return {"lines": len(lines), "words": [*dict.fromkeys(lines)], "numbers": array(np.arcsinh(1e4 * numbers))}
+    return {
+        "lines": len(lines),
+        "words": [*dict.fromkeys(lines)],
+        "numbers": array(np.arcsinh(1e4 * numbers)),
+    }
 
 
 def figure(shown: Any) -> dict[str, Any]:
@@ -118,9 +143,18 @@ def look(artist: Any) -> list[Any]:
     from matplotlib.colors import to_hex
 
     if hasattr(artist, "get_marker"):
-        return [to_hex(artist.get_color()), artist.get_linestyle(), str(artist.get_marker())]
-    colours = (getattr(artist, name, list)() for name in ("get_facecolor", "get_edgecolor"))
-    return [[to_hex(each, keep_alpha=True) for each in np.reshape(colour, (-1, 4))[:3]] for colour in colours]
+        return [
+            to_hex(artist.get_color()),
+            artist.get_linestyle(),
+            str(artist.get_marker()),
+        ]
+    colours = (
+        getattr(artist, name, list)() for name in ("get_facecolor", "get_edgecolor")
+    )
+    return [
+        [to_hex(each, keep_alpha=True) for each in np.reshape(colour, (-1, 4))[:3]]
+        for colour in colours
+    ]
 
 
 def panel(axes: Any) -> dict[str, Any]:
@@ -150,7 +184,12 @@ def points(shown: Any) -> list[Any]:
     """Tell a set of markers or shapes by its colours, places, first outlines and values."""
     outlines = [array(path.vertices) for path in shown.get_paths()[:9]]
     values = shown.get_array()
-    return [*look(shown), array(shown.get_offsets()), outlines, None if values is None else array(values)]
+    return [
+        *look(shown),
+        array(shown.get_offsets()),
+        outlines,
+        None if values is None else array(values),
+    ]
 
 
 def faces(shown: Any) -> list[Any]:
@@ -175,7 +214,13 @@ def _lines(value: Any) -> str:
     if len(one) < 200 or not isinstance(value, (dict, list)):
         return one
     if isinstance(value, dict):
-        return "{\n" + ",\n".join(f"{json.dumps(name)}: {_lines(each)}" for name, each in value.items()) + "\n}"
+        return (
+            "{\n"
+            + ",\n".join(
+                f"{json.dumps(name)}: {_lines(each)}" for name, each in value.items()
+            )
+            + "\n}"
+        )
     return "[\n" + ",\n".join(map(_lines, value)) + "\n]"
 
 
@@ -186,16 +231,27 @@ def shared(one: Any, *others: Any) -> Any:
     """Return what all runs agree about, with `null` for other numbers and `#` for those of texts."""
     if isinstance(one, dict):
         if "sums" in one:
-            within, size = SCATTER * max(_apart(one, other) for other in others), one["sums"][0]
+            within = SCATTER * max(_apart(one, other) for other in others)
+            size = one["sums"][0]
             if within <= RTOL * size:
                 return one
-            return one | ({"within": within} if within < MOST * size else {"sums": None})
+            return one | (
+                {"within": within} if within < MOST * size else {"sums": None}
+            )
         if "tolerance" in one:
             return one
-        timed = "baseline_value" in one  # a line of a benchmark, whose numbers may be times
-        each = {name: (value, *(other[name] for other in others)) for name, value in one.items()}
+        timed = (
+            "baseline_value" in one
+        )  # a line of a benchmark, whose numbers may be times
+        each = {
+            name: (value, *(other[name] for other in others))
+            for name, value in one.items()
+        }
         return {
-            name: _same(*runs) if timed and isinstance(runs[0], float) else shared(*runs) for name, runs in each.items()
+            name: _same(*runs)
+            if timed and isinstance(runs[0], float)
+            else shared(*runs)
+            for name, runs in each.items()
         }
     if isinstance(one, list):
         return [shared(*runs) for runs in zip(one, *others, strict=True)]
@@ -207,21 +263,33 @@ def shared(one: Any, *others: Any) -> Any:
     if isinstance(one, float):
         within = SCATTER * max(abs(one - other) for other in others)
         return (
-            one if within <= RTOL * abs(one) else {"near": one, "within": within} if within < MOST * abs(one) else None
+            one
+            if within <= RTOL * abs(one)
+            else {"near": one, "within": within}
+            if within < MOST * abs(one)
+            else None
         )
-    return one if all(one == other for other in others) else None  # such as a number of steps
+    return (
+        one if all(one == other for other in others) else None
+    )  # such as a number of steps
 
 
 def _same(one: float, *others: float) -> float | None:
     """Return a number that all runs have in common, and no other one, which is a time."""
-    return one if all(math.isclose(one, other, rel_tol=1e-12) for other in others) else None
+    return (
+        one
+        if all(math.isclose(one, other, rel_tol=1e-12) for other in others)
+        else None
+    )
 
 
 def _shared_part(one: str, *others: str) -> str:
     if len({NUMBER.sub("#", each) for each in (one, *others)}) > 1:
         return "…"  # such as 10^{-17} beside 3 x 10^{-17}
     numbers = zip(*(NUMBER.findall(each) for each in others), strict=True)
-    return NUMBER.sub(lambda found: found[0] if {found[0]} == {*next(numbers)} else "#", one)
+    return NUMBER.sub(
+        lambda found: found[0] if {found[0]} == {*next(numbers)} else "#", one
+    )
 
 
 def _apart(one: Mapping[str, Any], other: Mapping[str, Any]) -> float:
@@ -241,11 +309,20 @@ def differences(found: Any, kept: Any, place: str = "") -> Iterator[str]:
     same = True
     if isinstance(kept, dict) and kept.keys() == {"near", "within"}:
         same = isinstance(found, float) and abs(found - kept["near"]) <= kept["within"]
-    elif isinstance(kept, dict) and "sums" in kept and isinstance(found, dict) and "sums" in found:
+    elif (
+        isinstance(kept, dict)
+        and "sums" in kept
+        and isinstance(found, dict)
+        and "sums" in found
+    ):
         same = found["shape"] == kept["shape"]
         if same and kept["sums"] is not None:
             same = _apart(found, kept) <= kept.get("within", RTOL * kept["sums"][0])
-    elif isinstance(kept, dict) and isinstance(found, dict) and found.keys() == kept.keys():
+    elif (
+        isinstance(kept, dict)
+        and isinstance(found, dict)
+        and found.keys() == kept.keys()
+    ):
         if "tolerance" in kept:
             yield from _comparison(found, kept, place)
         else:
@@ -264,7 +341,9 @@ def differences(found: Any, kept: Any, place: str = "") -> Iterator[str]:
         yield f"{place}: found {found!r:.300}, recorded {kept!r:.300}"
 
 
-def _comparison(found: dict[str, Any], kept: dict[str, Any], place: str) -> Iterator[str]:
+def _comparison(
+    found: dict[str, Any], kept: dict[str, Any], place: str
+) -> Iterator[str]:
     """Yield the differences of a comparison: its numbers are errors, of which only the size is known."""
     for name, value in kept.items():
         if isinstance(value, float) and isinstance(found[name], float):
@@ -280,7 +359,9 @@ def _alike(found: str, kept: str) -> bool:
     if kept == "…":
         return True
     parts = PARTS.split(found), PARTS.split(kept)
-    return len(parts[0]) == len(parts[1]) and all(b == "…" or _alike_part(a, b) for a, b in zip(*parts, strict=True))
+    return len(parts[0]) == len(parts[1]) and all(
+        b == "…" or _alike_part(a, b) for a, b in zip(*parts, strict=True)
+    )
 
 
 def _alike_part(found: str, kept: str) -> bool:
@@ -288,7 +369,10 @@ def _alike_part(found: str, kept: str) -> bool:
     if pattern.sub("#", found) != pattern.sub("#", kept):
         return False
     pairs = zip(pattern.findall(found), pattern.findall(kept), strict=True)
-    return all("#" in (a, b) or abs(float(a) - float(b)) <= 1.01 * _last_digit(b) for a, b in pairs)
+    return all(
+        "#" in (a, b) or abs(float(a) - float(b)) <= 1.01 * _last_digit(b)
+        for a, b in pairs
+    )
 
 
 def _last_digit(number: str) -> float:

@@ -20,9 +20,33 @@ NO_AVX2 = "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"
 NO_FMA = "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F"
 PROCESSORS = {
     "compiled for any": ("generic", "", "", "", "", "avx2", ""),
-    "any": ("generic", "", NO_AVX2, "Nehalem", "--xla_cpu_max_isa=SSE4_2", "default", NO_FMA),
-    "SSE": ("nehalem", "+sse4.2", NO_AVX2, "Prescott", "--xla_cpu_max_isa=SSE4_2", "default", NO_FMA),
-    "AVX": ("sandybridge", "+avx,+sse4.2", NO_AVX2, "Sandybridge", "--xla_cpu_max_isa=AVX", "default", NO_FMA),
+    "any": (
+        "generic",
+        "",
+        NO_AVX2,
+        "Nehalem",
+        "--xla_cpu_max_isa=SSE4_2",
+        "default",
+        NO_FMA,
+    ),
+    "SSE": (
+        "nehalem",
+        "+sse4.2",
+        NO_AVX2,
+        "Prescott",
+        "--xla_cpu_max_isa=SSE4_2",
+        "default",
+        NO_FMA,
+    ),
+    "AVX": (
+        "sandybridge",
+        "+avx,+sse4.2",
+        NO_AVX2,
+        "Sandybridge",
+        "--xla_cpu_max_isa=AVX",
+        "default",
+        NO_FMA,
+    ),
     "AVX2": (
         "haswell",
         "+avx2,+fma,+avx,+sse4.2",
@@ -34,7 +58,12 @@ PROCESSORS = {
     ),
 }
 NAMES = (
-    *("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE"),
+    *(
+        "NUMBA_CPU_NAME",
+        "NUMBA_CPU_FEATURES",
+        "NPY_DISABLE_CPU_FEATURES",
+        "OPENBLAS_CORETYPE",
+    ),
     *("XLA_FLAGS", "ATEN_CPU_CAPABILITY", "GLIBC_TUNABLES"),
 )
 """Values of environment variables of other runs, without some of the instructions that processors differ by."""
@@ -45,13 +74,28 @@ def main(names: list[str]) -> None:
     if names[:1] == ["--plain"]:
         (folder, *names), written = names[1:], lambda name, found: found
     else:
-        folder, others = None, [tempfile.mkdtemp() for _ in PROCESSORS]
+        folder = None
+        others = [tempfile.mkdtemp() for _ in PROCESSORS]
         for other, processor in zip(others, PROCESSORS.values(), strict=True):
-            command = [sys.executable, "-m", "tests.support.recording", "--plain", other, *names]
-            subprocess.run(command, check=True, env=os.environ | dict(zip(NAMES, processor, strict=True)))
+            command = [
+                sys.executable,
+                "-m",
+                "tests.support.recording",
+                "--plain",
+                other,
+                *names,
+            ]
+            subprocess.run(
+                command,
+                check=True,
+                env=os.environ | dict(zip(NAMES, processor, strict=True)),
+            )
 
         def written(name: str, found: Any) -> Any:
-            again = [json.loads((Path(other) / f"{name}.json").read_text(encoding="utf-8")) for other in others]
+            again = [
+                json.loads((Path(other) / f"{name}.json").read_text(encoding="utf-8"))
+                for other in others
+            ]
             return recorded.shared(found, *again)
 
     for name in names or [*subjects.SUBJECTS, *studied.SUBJECTS]:

@@ -60,26 +60,42 @@ _EXCHANGED: dict[int, Any] = {
 
 def exact(function: Any, exchanged: dict[Any, Callable] | None = None) -> Callable:
     """Return the function that a kernel was compiled from, with numbers of mpmath, and functions of it `exchanged`."""
-    return _exact(function, {**_EXCHANGED, **{id(key): value for key, value in (exchanged or {}).items()}})
+    return _exact(
+        function,
+        {**_EXCHANGED, **{id(key): value for key, value in (exchanged or {}).items()}},
+    )
 
 
 def _exact(function: Any, known: dict[int, Any]) -> Callable:
-    plain, names = getattr(function, "py_func", function), {}
+    plain = getattr(function, "py_func", function)
+    names = {}
     cells = [types.CellType() for _ in plain.__closure__ or ()]
-    known[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__, None, tuple(cells))
-    outer = dict(zip(plain.__code__.co_freevars, (each.cell_contents for each in plain.__closure__ or ()), strict=True))
+    known[id(function)] = found = types.FunctionType(
+        plain.__code__, names, plain.__name__, None, tuple(cells)
+    )
+    outer = dict(
+        zip(
+            plain.__code__.co_freevars,
+            (each.cell_contents for each in plain.__closure__ or ()),
+            strict=True,
+        )
+    )
     exchanged = _exchanged(outer, set(outer), known)
     for name, cell in zip(outer, cells, strict=True):
         cell.cell_contents = exchanged[name]
     used = set(plain.__code__.co_names)
     names.update(_exchanged(plain.__globals__, used, known))
     for name, value in names.items():
-        if isinstance(value, types.ModuleType) and value.__name__.startswith("planarfriction._engine"):
+        if isinstance(value, types.ModuleType) and value.__name__.startswith(
+            "planarfriction._engine"
+        ):
             names[name] = types.SimpleNamespace(**_exchanged(vars(value), used, known))
     return found
 
 
-def _exchanged(values: dict[str, Any], used: set[str], known: dict[int, Any]) -> dict[str, Any]:
+def _exchanged(
+    values: dict[str, Any], used: set[str], known: dict[int, Any]
+) -> dict[str, Any]:
     """Return those of some named values that a function uses, with kernels in exact numbers."""
     found = {}
     for name in used & set(values):
@@ -93,7 +109,8 @@ def derivative(function: Callable[[mpf], Sequence], x: float) -> list:
     """Return the derivative of each result of a function of one number, by central differences."""
     with mpmath.workdps(DIGITS):
         step = _STEP * (abs(mpf(x)) if x else mpf(1))
-        after, before = function(mpf(x) + step), function(mpf(x) - step)
+        after = function(mpf(x) + step)
+        before = function(mpf(x) - step)
         return [(b - a) / (2 * step) for a, b in zip(before, after, strict=True)]
 
 
@@ -106,7 +123,11 @@ def pulled(forth: Any, back: Any, arguments: tuple, bars: tuple) -> tuple:
 
 def flat(values: Any) -> list:
     """Return the numbers of nested tuples one behind the other."""
-    return [x for each in values for x in (flat(each) if isinstance(each, tuple) else (each,))]
+    return [
+        x
+        for each in values
+        for x in (flat(each) if isinstance(each, tuple) else (each,))
+    ]
 
 
 def _units(results: tuple) -> Iterator[tuple]:
@@ -115,7 +136,9 @@ def _units(results: tuple) -> Iterator[tuple]:
     for chosen, length in enumerate(kinds):
         for i in range(max(length, 1)):
             yield tuple(
-                tuple(float(at == chosen and k == i) for k in range(n)) if n else float(at == chosen)
+                tuple(float(at == chosen and k == i) for k in range(n))
+                if n
+                else float(at == chosen)
                 for at, n in enumerate(kinds)
             )
 
@@ -125,10 +148,16 @@ def _with(value: Any, path: str, i: int, x: Any) -> Any:
     if path:
         head, _, rest = path.partition(".")
         return value._replace(**{head: _with(getattr(value, head), rest, i, x)})
-    return tuple(x if k == i else each for k, each in enumerate(value)) if isinstance(value, tuple) else x
+    return (
+        tuple(x if k == i else each for k, each in enumerate(value))
+        if isinstance(value, tuple)
+        else x
+    )
 
 
-def jacobians(derivative_of: Derivative, arguments: tuple, function: Any = None) -> tuple[np.ndarray, np.ndarray]:
+def jacobians(
+    derivative_of: Derivative, arguments: tuple, function: Any = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return all results by all numbers of `by`, [results, numbers]: in compiled code, and in 60 digits.
 
     Each column is multiplied by the size of its number, or of the vector that it is a component of. `function`: another
@@ -136,9 +165,11 @@ def jacobians(derivative_of: Derivative, arguments: tuple, function: Any = None)
     """
     function = exact(derivative_of.function) if function is None else function
     rows = [
-        flat(pulled(derivative_of.forth, derivative_of.back, arguments, bars)) for bars in _units(function(*arguments))
+        flat(pulled(derivative_of.forth, derivative_of.back, arguments, bars))
+        for bars in _units(function(*arguments))
     ]
-    columns, sizes = [], []
+    columns = []
+    sizes = []
     for path in derivative_of.by:
         name, _, rest = path.partition(".")
         at = derivative_of.arguments.index(name)
@@ -149,7 +180,13 @@ def jacobians(derivative_of: Derivative, arguments: tuple, function: Any = None)
         for i, x in enumerate(value if isinstance(value, tuple) else (value,)):
 
             def change(x, at=at, rest=rest, i=i):
-                return flat(function(*arguments[:at], _with(arguments[at], rest, i, x), *arguments[at + 1 :]))
+                return flat(
+                    function(
+                        *arguments[:at],
+                        _with(arguments[at], rest, i, x),
+                        *arguments[at + 1 :],
+                    )
+                )
 
             columns.append(derivative(change, x))
             sizes.append(size)
@@ -160,4 +197,6 @@ def misfit(derivative_of: Derivative, arguments: tuple, function: Any = None) ->
     """Return the largest error of `jacobians`, each row in the largest of its numbers."""
     found, expected = jacobians(derivative_of, arguments, function)
     largest = np.abs(expected).max(axis=1, keepdims=True)
-    return float(np.max(np.abs(found - expected) / np.where(largest > 0.0, largest, 1.0)))
+    return float(
+        np.max(np.abs(found - expected) / np.where(largest > 0.0, largest, 1.0))
+    )

@@ -28,7 +28,15 @@ from planarfriction.identify import (
     identify_motion,
 )
 from planarfriction.joints import JointLog
-from planarfriction.online import FrictionObserver, Hinge, Hold, Measurement, Sensors, SlideBy, TurnBy
+from planarfriction.online import (
+    FrictionObserver,
+    Hinge,
+    Hold,
+    Measurement,
+    Sensors,
+    SlideBy,
+    TurnBy,
+)
 from planarfriction.planning import (
     Pusher,
     Slider,
@@ -42,13 +50,21 @@ from planarfriction.planning import (
 from planarfriction.sweeps.settings import Settable
 from tests.support.rate_laws import BoucWen
 
-PATCH, LAW = pf.ContactPatch.disc(0.01, cells=7), pf.LuGre(mu_c=0.5, mu_s=0.6, elasto_plastic=0.9)
-SOFT = pf.ContactPatch.disc(0.012, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+PATCH, LAW = (
+    pf.ContactPatch.disc(0.01, cells=7),
+    pf.LuGre(mu_c=0.5, mu_s=0.6, elasto_plastic=0.9),
+)
+SOFT = pf.ContactPatch.disc(
+    0.012, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
+)
 MODEL = pf.ReducedModel(PATCH, LAW)
 TIME, HALF = np.arange(300) / 100.0, np.radians(30.0)
 ANGLE = 3.0 * TIME
 LOG = Log(TIME, TIME[:, None] * [0.01, 0.0, 1.0], np.full((300, 3), -0.1), 2.0)
-FREE = Slide(TIME[:50], np.stack([TIME[:50] - TIME[:50] ** 2, 0.0 * TIME[:50], 0.0 * TIME[:50]], -1))
+FREE = Slide(
+    TIME[:50],
+    np.stack([TIME[:50] - TIME[:50] ** 2, 0.0 * TIME[:50], 0.0 * TIME[:50]], -1),
+)
 FIXED, BOUC = pf.LuGre(mu_c=0.5, reference_load=2.0), BoucWen()
 TILTED = pf.ContactPatch.disc(0.01, cells=7)
 LEANING = pf.ReducedModel(PATCH.with_friction_metric(None, (0.1, 0.0)), LAW)
@@ -83,12 +99,19 @@ def read(text: str, kind: Any = Log, **options: Any) -> Any:
 def fit(**given: Any) -> Any:
     """Fit the log with arguments and options."""
     names = {field.name for field in dataclasses.fields(FitOptions)} & given.keys()
-    return identify_lugre(LOG, PATCH, options=FitOptions(**{name: given.pop(name) for name in names}), **given)
+    return identify_lugre(
+        LOG,
+        PATCH,
+        options=FitOptions(**{name: given.pop(name) for name in names}),
+        **given,
+    )
 
 
 def plate(**changes: Any) -> pf.Scene:
     """Return a scene of a held plate with changes."""
-    scene = pf.scenes.in_hand(MODEL, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=1.0)
+    scene = pf.scenes.in_hand(
+        MODEL, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=1.0
+    )
     return dataclasses.replace(scene, **changes)
 
 
@@ -97,7 +120,9 @@ def gripped(goal: Any = {"angle": -HALF}, scene: Any = None, **options: Any) -> 
     return plan_grip(plate() if scene is None else scene, goal, **options)
 
 
-def pushed(slider: Any = None, pusher: Any = None, path: Any = None, **options: Any) -> Any:
+def pushed(
+    slider: Any = None, pusher: Any = None, path: Any = None, **options: Any
+) -> Any:
     """Push a square."""
     path = path or pf.Signal.sampled([0.0, 1.0], [[-0.06, 0.0], [0.0, 0.0]], "linear")
     return push(slider or Slider(SURFACE, SQUARE), pusher or Pusher(), path, **options)

@@ -163,26 +163,49 @@ PATCHES = (
 
 def replies() -> dict[str, Any]:
     """Tell what checks and readers return, or the line that they raise, for each of many inputs."""
-    told: dict[str, Any] = {name: [reply(check, each) for each in VALUES] for name, check in CHECKS.items()}
+    told: dict[str, Any] = {
+        name: [reply(check, each) for each in VALUES] for name, check in CHECKS.items()
+    }
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        Path("here.py").write_text("def measure(run):\n    return 1.0\nother = 3\n", encoding="utf-8")
+        Path("here.py").write_text(
+            "def measure(run):\n    return 1.0\nother = 3\n", encoding="utf-8"
+        )
         Path("broken.py").write_text("1 / 0\n", encoding="utf-8")
         for name, text in TABLES.items():
             Path(name).write_text(text, encoding="utf-8")
-        told |= {name: [reply(read, each) for each in WRITTEN] for name, read in TEXTS.items()}
+        told |= {
+            name: [reply(read, each) for each in WRITTEN]
+            for name, read in TEXTS.items()
+        }
         for name in TABLES:
             told[name] = [
                 reply(lambda path: reading.Table(path).names, name),
                 reply(lambda path: reading.Table(path).numbers(["t", "b"]), name),
-                reply(lambda path: reading.Table(path).numbers(["t", "a"], ["a"]), name),
+                reply(
+                    lambda path: reading.Table(path).numbers(["t", "a"], ["a"]), name
+                ),
                 reply(lambda path: reading.Table(path).numbers(["b"]), name),
                 reply(lambda path: [*reading.read_rows(path, "a table")], name),
                 reply(read_pressure_map, name),
-                reply(lambda path: read_pressure_map(path, header=False, index=False, frame=1), name),
-                reply(lambda path: read_pressure_map(path, header=True, index=True, threshold=0.5), name),
+                reply(
+                    lambda path: read_pressure_map(
+                        path, header=False, index=False, frame=1
+                    ),
+                    name,
+                ),
+                reply(
+                    lambda path: read_pressure_map(
+                        path, header=True, index=True, threshold=0.5
+                    ),
+                    name,
+                ),
                 reply(lambda path: pf.Signal.from_csv(path, time="t", value="b"), name),
             ]
-        told |= map_files() | stored_solutions() | {"patches": [reply(read_patch, each) for each in PATCHES]}
+        told |= (
+            map_files()
+            | stored_solutions()
+            | {"patches": [reply(read_patch, each) for each in PATCHES]}
+        )
         for number, (old, new) in enumerate(CHANGES):
             Path("scene.toml").write_text(SCENE.replace(old, new, 1), encoding="utf-8")
             told[f"scene {number}"] = reply(written, "scene.toml")
@@ -208,9 +231,11 @@ def map_files() -> dict[str, Any]:
     Path("pad.asf").write_text(TEKSCAN)
     Image.fromarray(pressures.astype(np.uint8)).save("pad.png")
     Image.fromarray((255.0 - pressures).astype(np.uint8)).save("print.png")
-    Image.fromarray(np.stack([pressures.astype(np.uint8)] * 2 + [0 * pressures.astype(np.uint8)], -1)).save(
-        "colour.png"
-    )
+    Image.fromarray(
+        np.stack(
+            [pressures.astype(np.uint8)] * 2 + [0 * pressures.astype(np.uint8)], -1
+        )
+    ).save("colour.png")
     Path("noise.png").write_bytes(b"noise")
     names = ("pad.npy", "frames.npy", "texts.npy", "pad.npz", "two.npz", "pad.mat", "pad.asf", "pad.png", "print.png",
              "colour.png", "noise.png", "pad.xyz", "none.csv")  # fmt: skip
@@ -219,13 +244,18 @@ def map_files() -> dict[str, Any]:
         {"frame_shape": (2, 3)}, {"frame_shape": 3},
     )  # fmt: skip
     return {
-        name: [reply(lambda each, name=name: read_pressure_map(name, **each), each) for each in given] for name in names
+        name: [
+            reply(lambda each, name=name: read_pressure_map(name, **each), each)
+            for each in given
+        ]
+        for name in names
     }
 
 
 def stored_solutions() -> dict[str, Any]:
     """Tell how solutions compare, and what loading says of files that are damaged or other ones."""
-    run, other = synthetic.solution(), synthetic.solution(scale=1.1)
+    run = synthetic.solution()
+    other = synthetic.solution(scale=1.1)
     content = run.save("run.nc").read_bytes()
     Path("damaged.nc").write_bytes(content.replace(b"success", b"failure"))
     Path("short.nc").write_bytes(content[:300])
@@ -234,15 +264,32 @@ def stored_solutions() -> dict[str, Any]:
     again = pf.Solution.load("run.nc")
     files_ = ("damaged.nc", "short.nc", "text.nc", "plain.nc", "none.nc")
     return {
-        "same": [again == run, run == other, run == 3, run != again, hash(run) == hash(again)],
-        "tables": [reply(read_json, each) for each in ('{"t_end": 1, "t_end": 2}', "[1]", '{"name": "a"}')],
-        "kinds": [reply(run.scene.to_file, f"run{kind}") for kind in (".toml", ".json", ".txt", "")],
-        "back": [pf.Scene.from_file(f"run{kind}") == run.scene for kind in (".toml", ".json")],
+        "same": [
+            again == run,
+            run == other,
+            run == 3,
+            run != again,
+            hash(run) == hash(again),
+        ],
+        "tables": [
+            reply(read_json, each)
+            for each in ('{"t_end": 1, "t_end": 2}', "[1]", '{"name": "a"}')
+        ],
+        "kinds": [
+            reply(run.scene.to_file, f"run{kind}")
+            for kind in (".toml", ".json", ".txt", "")
+        ],
+        "back": [
+            pf.Scene.from_file(f"run{kind}") == run.scene for kind in (".toml", ".json")
+        ],
         "loads": [reply(pf.Solution.load, each) for each in files_],
         "contacts": [reply(run.contact_index, each) for each in (None, "pad", "pud")],
-        "checks": [[each.words, each.expected, each.tolerance] for each in doctor.checks()],
+        "checks": [
+            [each.words, each.expected, each.tolerance] for each in doctor.checks()
+        ],
         "outcomes": [
-            doctor.Check("x", lambda each=each: each, 1.0, 0.1).outcome() for each in (1.0, 1.1, 1.2, "a", np.nan)
+            doctor.Check("x", lambda each=each: each, 1.0, 0.1).outcome()
+            for each in (1.0, 1.1, 1.2, "a", np.nan)
         ],
     }
 
@@ -283,25 +330,49 @@ def swept() -> dict[str, Any]:
     said: list[str] = []
 
     def make(mu: float, kind: str) -> pf.Scene:
-        model = {"few": pf.ReducedModel, "all": pf.DistributedModel}[kind](patch, pf.LuGre(mu_c=mu, mu_s=1.1))
-        return pf.scenes.free_slide(model, twist=(0.1, 0.0, 5.0), t_end=0.02 if mu == 0.4 else 1.0)
+        model = {"few": pf.ReducedModel, "all": pf.DistributedModel}[kind](
+            patch, pf.LuGre(mu_c=mu, mu_s=1.1)
+        )
+        return pf.scenes.free_slide(
+            model, twist=(0.1, 0.0, 5.0), t_end=0.02 if mu == 0.4 else 1.0
+        )
 
     def measured(run: pf.Solution) -> dict[str, Any]:
         x = run.histories["x"].values
-        return {"way": float(x[-1]), "end": run.status, "path": np.interp([0.0, 0.01], run.histories["time"].values, x)}
+        return {
+            "way": float(x[-1]),
+            "end": run.status,
+            "path": np.interp([0.0, 0.01], run.histories["time"].values, x),
+        }
 
     values = {"mu": [0.4, 0.8, 2.0], "kind": ["few", "all"]}
     with tempfile.TemporaryDirectory() as folder:
-        told["motion"] = without_runs(sweeps.sweep(make, {"mu": values["mu"][:2], "kind": ["few"]}, out=folder))
-        again = sweeps.sweep(make, values, out=folder, progress=lambda each: said.append(str(each._replace(left=None))))
-        told["more"], told["said"] = without_runs(again), said[-1]
-        told["found"] = without_runs(sweeps.finished_runs(make, values | {"mu": [0.4, 0.5]}, out=folder))
+        told["motion"] = without_runs(
+            sweeps.sweep(make, {"mu": values["mu"][:2], "kind": ["few"]}, out=folder)
+        )
+        again = sweeps.sweep(
+            make,
+            values,
+            out=folder,
+            progress=lambda each: said.append(str(each._replace(left=None))),
+        )
+        told["more"] = without_runs(again)
+        told["said"] = said[-1]
+        told["found"] = without_runs(
+            sweeps.finished_runs(make, values | {"mu": [0.4, 0.5]}, out=folder)
+        )
     told["measured"] = without_runs(sweeps.sweep(make, values, measure=measured))
-    plate, ways = ready.in_hand(pf.ReducedModel(patch, LAW, cells=4), t_end=0.05), {"body.mass": [-1.0, 0.1, 0.3]}
+    plate = ready.in_hand(pf.ReducedModel(patch, LAW, cells=4), t_end=0.05)
+    ways = {"body.mass": [-1.0, 0.1, 0.3]}
     told["of a scene"] = without_runs(
-        sweeps.sweep(plate, ways, measure=lambda run: float(run.histories["y"].values[-1]))
+        sweeps.sweep(
+            plate, ways, measure=lambda run: float(run.histories["y"].values[-1])
+        )
     )
-    told["times"] = [str(sweeps.Progress(9, 4, 1, 1, 2, left)) for left in (3.2, 89.6, 100.0, 9000.0, None)]
+    told["times"] = [
+        str(sweeps.Progress(9, 4, 1, 1, 2, left))
+        for left in (3.2, 89.6, 100.0, 9000.0, None)
+    ]
     scene = settings.Settable(ready.in_hand(pf.ReducedModel(patch, LAW), t_end=0.1))
     changes = (
         {"body.mass": 0.3}, {"fingers.law.mu_c": 0.5, "t_end": 0.2}, {"body.position.0": 0.1},
@@ -309,7 +380,9 @@ def swept() -> dict[str, Any]:
         {"body.position.5": 1.0}, {"body": 2.0},
         {"fingers.law.mu_x": 0.5}, {"fingers.count.a": 1}, {"": 1.0},
     )  # fmt: skip
-    told["settings"] = [reply(lambda each: as_arrays(scene(**each).to_dict()), each) for each in changes]
+    told["settings"] = [
+        reply(lambda each: as_arrays(scene(**each).to_dict()), each) for each in changes
+    ]
     return told
 
 
@@ -321,7 +394,9 @@ def without_runs(data: Any) -> Any:
 def explored() -> dict[str, Any]:
     """Tell answers, pictures, texts and code of states of the explorer."""
     told: dict[str, Any] = {}
-    painted = drawing.Drawing.published("Square").painted(0.004, 0.002, radius=0.003, pressure=0.4)
+    painted = drawing.Drawing.published("Square").painted(
+        0.004, 0.002, radius=0.003, pressure=0.4
+    )
     first = state.State()
     states = state.PRESETS | {
         "painted": first.changed(drawing=painted.scaled(2e-3), normal_force=2.0),
@@ -330,8 +405,11 @@ def explored() -> dict[str, Any]:
         "about": first.turning_about(0.003, -0.002),
     }
     for name, each in states.items():
-        found, map_ = state.answer(each), each.drawing
-        figure = pictures.moved(pictures.surface_figure(each, quick=name == "painted"), found)
+        found = state.answer(each)
+        map_ = each.drawing
+        figure = pictures.moved(
+            pictures.surface_figure(each, quick=name == "painted"), found
+        )
         told[name] = {
             "link": state.to_link(state.from_link(state.to_link(each))), "answer": found, "needed": each.needed_load,
             "centre": each.centre_of_rotation, "python": code.python(each), "toml": code.toml(each),
@@ -342,7 +420,9 @@ def explored() -> dict[str, Any]:
             "grid": pictures.grid_line(each), "size": [map_.width, map_.height, map_.name, map_.origin],
             "law": state.law_parameters(each.law), "motion": ladder.motion(each).to_dict(),
         }  # fmt: skip
-    told["ladder"] = [each._replace(seconds=0.0) for each in ladder.climb(states["painted"])]
+    told["ladder"] = [
+        each._replace(seconds=0.0) for each in ladder.climb(states["painted"])
+    ]
     told["looks"] = [looks.wrong('a "b"'), looks.grows(300), looks.grows(200, most=400)]
     told["cleared"] = [painted.cleared().pressures, painted.scaled(1e-3).name]
     return told

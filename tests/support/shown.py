@@ -102,18 +102,31 @@ COMMANDS = (
 
 def figures() -> dict[str, Any]:
     """Draw each kind of figure, most of them of motions with closed forms."""
-    patches = {name: PUBLISHED_PATCHES[name]() for name in ("LineGradX", "NonConvex1", "Square")}
-    run, other = synthetic.solution(), synthetic.solution(scale=1.3)
-    on_body = synthetic.solution(synthetic.scene(3, mounted_on="body", patch=patches["Square"]))
+    patches = {
+        name: PUBLISHED_PATCHES[name]()
+        for name in ("LineGradX", "NonConvex1", "Square")
+    }
+    run = synthetic.solution()
+    other = synthetic.solution(scale=1.3)
+    on_body = synthetic.solution(
+        synthetic.scene(3, mounted_on="body", patch=patches["Square"])
+    )
     legs = pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05), (0.1, -0.05)])
-    standing = synthetic.solution(synthetic.scene(mounted_on="body", patch=legs, outline=None))
+    standing = synthetic.solution(
+        synthetic.scene(mounted_on="body", patch=legs, outline=None)
+    )
     cells = pf.LimitSurfaceCells(patches["NonConvex1"])
     return {
-        **{f"patch {name}": plots.plot_patch(patch, normal_force=2.0) for name, patch in patches.items()},
+        **{
+            f"patch {name}": plots.plot_patch(patch, normal_force=2.0)
+            for name, patch in patches.items()
+        },
         "points": plots.plot_patch(legs, normal_force=3.0, size=(3.5, 3.0)),
         "discs": plots.plot_patch(patches["LineGradX"].discs(5), normal_force=2.0),
         "surface": plots.plot_limit_surface(cells),
-        "exact surface": plots.plot_limit_surface(pf.LimitSurfaceExact(PATCH), beside=cells),
+        "exact surface": plots.plot_limit_surface(
+            pf.LimitSurfaceExact(PATCH), beside=cells
+        ),
         "histories": plots.plot_histories({"one": run, "other": other}),
         "histories of pads": plots.plot_histories(on_body, size=(3.5, 3.0)),
         "motion": plots.plot_motion(run),
@@ -133,14 +146,26 @@ def identified(logs: int = 1, line: bool = False) -> Identification:
     given = [noisy(clean_log(*excitation(duration=0.5)), seed) for seed in range(logs)]
     if line:
         time = 5e-3 * np.arange(200)
-        log = clean_log(time, np.outer(0.05 * time * np.sin(11.0 * time), [1.0, 0.0, 0.0]))
+        log = clean_log(
+            time, np.outer(0.05 * time * np.sin(11.0 * time), [1.0, 0.0, 0.0])
+        )
         given = [
             Log(
-                time, log.twist, log.wrench * [1.02, 0.0, 0.0] + [[0.01, 0.0, 0.0]] * np.sin(300.0 * time)[:, None], 4.0
+                time,
+                log.twist,
+                log.wrench * [1.02, 0.0, 0.0]
+                + [[0.01, 0.0, 0.0]] * np.sin(300.0 * time)[:, None],
+                4.0,
             )
         ]
     options = FitOptions(nuisance=(), starts=1, refine=4, elasto_plastic=0.9)
-    return identify_lugre(given, PATCH, model="reduced-published", parameters=("mu_c", "mu_s"), options=options)
+    return identify_lugre(
+        given,
+        PATCH,
+        model="reduced-published",
+        parameters=("mu_c", "mu_s"),
+        options=options,
+    )
 
 
 def pushed(pusher: Pusher = Pusher(0.3)) -> Push:  # noqa: B008
@@ -150,7 +175,9 @@ def pushed(pusher: Pusher = Pusher(0.3)) -> Push:  # noqa: B008
         pf.LimitSurfaceEllipsoid(pf.ContactPatch.rectangle(2 * half, cells=5)),
         [(-half, -half), (half, -half), (half, half), (-half, half)],
     )
-    ends = np.array([(-0.06, 0.01, 0.0), (0.0, 0.03, 0.1)])[:, : 3 if pusher.width else 2]
+    ends = np.array([(-0.06, 0.01, 0.0), (0.0, 0.03, 0.1)])[
+        :, : 3 if pusher.width else 2
+    ]
     return push(slider, pusher, pf.Signal.sampled([0.0, 1.0], ends, "linear"))
 
 
@@ -163,20 +190,44 @@ def printed() -> dict[str, Any]:
         Path("many.csv").write_text(40 * (39 * "1," + "2\n"), encoding="utf-8")
         Path("pad.csv").write_text("1,2,1\n0,2,0\n", encoding="utf-8")
         log = noisy(clean_log(*excitation(duration=0.5)), 0)
-        rows = np.column_stack([log.time, log.twist, log.wrench, np.broadcast_to(log.normal_force, len(log.time))])
-        np.savetxt("log.csv", rows, "%.9g", ",", header="time,vx,vy,omega,fx,fy,tau,normal_force", comments="")
+        rows = np.column_stack(
+            [
+                log.time,
+                log.twist,
+                log.wrench,
+                np.broadcast_to(log.normal_force, len(log.time)),
+            ]
+        )
+        np.savetxt(
+            "log.csv",
+            rows,
+            "%.9g",
+            ",",
+            header="time,vx,vy,omega,fx,fy,tau,normal_force",
+            comments="",
+        )
         return called(COMMANDS)
 
 
 def called(commands: Sequence[str]) -> dict[str, Any]:
     """Call commands in this folder; returns exit codes and texts, and what the tables hold that they write."""
     found: dict[str, Any] = {}
-    with mock.patch.object(console, "EVERY", 1e6), mock.patch.object(running, "_BETWEEN", 1e6):
+    with (
+        mock.patch.object(console, "EVERY", 1e6),
+        mock.patch.object(running, "_BETWEEN", 1e6),
+    ):
         for call in commands:
-            out, err = io.StringIO(), io.StringIO()
+            out = io.StringIO()
+            err = io.StringIO()
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 code = main(call.split())
-            found[call] = [code, *(SPACED.sub(r"\1", LEFT_OUT.sub("", each.getvalue())) for each in (out, err))]
+            found[call] = [
+                code,
+                *(
+                    SPACED.sub(r"\1", LEFT_OUT.sub("", each.getvalue()))
+                    for each in (out, err)
+                ),
+            ]
         for path in sorted(Path().rglob("*.csv")):
             found[path.as_posix()] = recorded.text(path.read_text(encoding="utf-8"))
     return found

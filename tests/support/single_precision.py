@@ -11,17 +11,25 @@ import planarfriction as pf
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 
 
-def _grid(columns: int, rows: int, away: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
+def _grid(
+    columns: int, rows: int, away: tuple[float, float] = (0.0, 0.0)
+) -> np.ndarray:
     """Return points in rows of 20 mm and columns of 10 mm, turned: rows of points lie along no axis."""
-    x, y = np.meshgrid(np.linspace(-0.01, 0.01, columns), np.linspace(-0.005, 0.005, rows) if rows > 1 else [0.0])
-    c, s = np.cos(0.4), np.sin(0.4)
+    x, y = np.meshgrid(
+        np.linspace(-0.01, 0.01, columns),
+        np.linspace(-0.005, 0.005, rows) if rows > 1 else [0.0],
+    )
+    c = np.cos(0.4)
+    s = np.sin(0.4)
     return np.stack([c * x - s * y, s * x + c * y], -1).reshape(-1, 2) + away
 
 
 PATCHES = {
     "two feet": pf.ContactPatch.points([(0.0, 0.0), (0.01, 0.003)]),
     "three feet": pf.ContactPatch.points([(0.0, 0.0), (0.01, 0.0), (0.002, 0.008)]),
-    "three uneven feet": pf.ContactPatch.points([(0.0, 0.0), (0.01, 0.0), (0.002, 0.008)], [1.0, 3.0, 1e-3]),
+    "three uneven feet": pf.ContactPatch.points(
+        [(0.0, 0.0), (0.01, 0.0), (0.002, 0.008)], [1.0, 3.0, 1e-3]
+    ),
     "four feet": pf.ContactPatch.points(_grid(2, 2)),
     "feet on a line": pf.ContactPatch.points(_grid(7, 1)),
     "feet beside the origin": pf.ContactPatch.points(_grid(3, 3, (0.05, -0.03))),
@@ -31,7 +39,9 @@ PATCHES = {
     "discs with a metric": pf.ContactPatch.rectangle(0.02, 0.01)
     .with_friction_metric([[1.0, 0.2], [0.2, 1.5]])
     .discs(12),
-    "steep pressure": pf.ContactPatch.rectangle(0.04, 0.01, (9, 5), pressure=pf.LinearGradient((8.0, -20.0))),
+    "steep pressure": pf.ContactPatch.rectangle(
+        0.04, 0.01, (9, 5), pressure=pf.LinearGradient((8.0, -20.0))
+    ),
 }
 
 
@@ -46,10 +56,17 @@ def drawn(model: Any, count: int, seed: int) -> tuple[np.ndarray, ...]:
     A sixth of the centres of pressure each lies inside, on a line between two cells, at a cell, about the patch, beyond
     it, and far beyond; some contacts have no load.
     """
-    rng, places = np.random.default_rng(seed), model.patch.positions
-    middle, radius = model.patch.centre_of_pressure(1.0), model.patch.contact_radius(1.0)
-    twist = rng.normal(size=(count, 3)) * (1.0, 1.0, 100.0) * 10.0 ** rng.uniform(-5.0, -1.0, (count, 1))
-    load, away = 10.0 ** rng.uniform(-2.0, 2.0, count), radius * rng.normal(size=(count, 2))
+    rng = np.random.default_rng(seed)
+    places = model.patch.positions
+    middle = model.patch.centre_of_pressure(1.0)
+    radius = model.patch.contact_radius(1.0)
+    twist = (
+        rng.normal(size=(count, 3))
+        * (1.0, 1.0, 100.0)
+        * 10.0 ** rng.uniform(-5.0, -1.0, (count, 1))
+    )
+    load = 10.0 ** rng.uniform(-2.0, 2.0, count)
+    away = radius * rng.normal(size=(count, 2))
     load[::40] = 0.0
     one, other = places[rng.integers(0, len(places), (2, count))]
     share = rng.uniform(size=(count, 1))
@@ -62,9 +79,18 @@ def drawn(model: Any, count: int, seed: int) -> tuple[np.ndarray, ...]:
         middle + 10.0 ** rng.uniform(0.0, 2.0, (count, 1)) * away,
     )
     centre = np.choose(rng.integers(0, len(centres), count)[:, None], centres)
-    load, moments = rounded(load), rounded(load[:, None] * centre[:, ::-1] * (1.0, -1.0))
+    load, moments = (
+        rounded(load),
+        rounded(load[:, None] * centre[:, ::-1] * (1.0, -1.0)),
+    )
     state = rounded(1e-6 * rng.normal(size=(count, *model.state_shape)))
-    return state, rounded(twist), load, rounded(np.full(count, 10.0 ** rng.uniform(-4.0, -2.0))), moments
+    return (
+        state,
+        rounded(twist),
+        load,
+        rounded(np.full(count, 10.0 ** rng.uniform(-4.0, -2.0))),
+        moments,
+    )
 
 
 def reference(model: Any, inputs: tuple[np.ndarray, ...]) -> np.ndarray:
@@ -75,20 +101,31 @@ def reference(model: Any, inputs: tuple[np.ndarray, ...]) -> np.ndarray:
 
 def error(model: Any, inputs: tuple[np.ndarray, ...], found: Any) -> float:
     """Return the largest error of wrenches in the load, or the wrench where that is larger; torques over the radius."""
-    wanted, lever = reference(model, inputs), np.array([1.0, 1.0, 1.0 / np.abs(model.patch.positions).max()])
+    wanted = reference(model, inputs)
+    lever = np.array([1.0, 1.0, 1.0 / np.abs(model.patch.positions).max()])
     size = np.maximum(inputs[2], np.abs(wanted * lever).max(1))[:, None]
-    off = np.abs(np.asarray(found, float) - wanted) * lever / np.where(size > 0.0, size, 1.0)
+    off = (
+        np.abs(np.asarray(found, float) - wanted)
+        * lever
+        / np.where(size > 0.0, size, 1.0)
+    )
     return float(off.max())  # NaN stays
 
 
 def settled(model: Any, inputs: tuple[np.ndarray, ...]) -> np.ndarray:
     """Return True for loaded contacts whose cells that press stay the same within 1e-5 of the patch's size."""
-    load, moments = inputs[2], inputs[4]
+    load = inputs[2]
+    moments = inputs[4]
     near = 1e-5 * np.ptp(model.patch.positions, axis=0).max()
     angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
-    moved = load[:, None] * near * np.stack([np.cos(angles), np.sin(angles)], -1)[:, None]
+    moved = (
+        load[:, None] * near * np.stack([np.cos(angles), np.sin(angles)], -1)[:, None]
+    )
     loaded = load > 0.0
-    held = [model.patch.weights(load[loaded], moments=each[loaded]) > 0.0 for each in (moments, *(moments + moved))]
+    held = [
+        model.patch.weights(load[loaded], moments=each[loaded]) > 0.0
+        for each in (moments, *(moments + moved))
+    ]
     same = loaded.copy()
     same[loaded] = np.all([(each == held[0]).all(1) for each in held], 0)
     return same

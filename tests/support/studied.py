@@ -30,7 +30,9 @@ def told(name: str, found: Any) -> Any:
     for picture in kept["pictures"]:
         for panel in picture["figure"]["panels"]:
             panel.update(
-                limits=None, words=[each for each, *_ in panel["words"]], lines=[each[:4] for each in panel["lines"]]
+                limits=None,
+                words=[each for each, *_ in panel["words"]],
+                lines=[each[:4] for each in panel["lines"]],
             )
     for table in kept["tables"]:
         table["rows"] = [row[:1] for row in table["rows"]]
@@ -53,7 +55,9 @@ def beyond() -> Any:
 
     def solved(scene: Any, t_end: float = 1.0) -> Any:
         states = sum(np.prod(contact.model.state_shape) for contact in scene.contacts)
-        return SimpleNamespace(statistics=SimpleNamespace(wall_time=1e-5 * t_end * float(states)))
+        return SimpleNamespace(
+            statistics=SimpleNamespace(wall_time=1e-5 * t_end * float(states))
+        )
 
     ticks = itertools.count(1)
     clock = SimpleNamespace(process_time=lambda: 1e-6 * next(ticks) ** 2)
@@ -74,12 +78,24 @@ def measured() -> dict[str, Any]:
     models = {name: entry.make() for name, entry in LIBRARY.items() if not entry.needs}
     benchmark = Benchmark(models)
     for name, cases in benchmark.cases.items():
-        sides = [[case for case in cases if case.is_training is side] for side in (True, False)]
-        few = {"slides": (16, 6), "pushes": (3, 5), "series": (2, 8), "onsets": (3, 4)}[name]
-        benchmark.cases[name] = [case for side, count in zip(sides, few, strict=True) for case in _spread(side, count)]
-    with changed(contactnets, STEPS=2):  # further ones take other ways on other processors
+        sides = [
+            [case for case in cases if case.is_training is side]
+            for side in (True, False)
+        ]
+        few = {"slides": (16, 6), "pushes": (3, 5), "series": (2, 8), "onsets": (3, 4)}[
+            name
+        ]
+        benchmark.cases[name] = [
+            case
+            for side, count in zip(sides, few, strict=True)
+            for case in _spread(side, count)
+        ]
+    with changed(
+        contactnets, STEPS=2
+    ):  # further ones take other ways on other processors
         benchmark.run()
-    tasks, found = benchmark.results, to_dict(benchmark)
+    tasks = benchmark.results
+    found = to_dict(benchmark)
     for task in found["tasks"].values():
         for model in task["models"].values():
             assert model.pop("seconds") >= 0.0
@@ -88,7 +104,10 @@ def measured() -> dict[str, Any]:
         "all": found,
         "tables": {task: table(benchmark, task) for task in tasks},
         "pictures": {task: draw(benchmark, task) for task in tasks},
-        "answers": {task: {name: each.answers for name, each in found.items()} for task, found in tasks.items()},
+        "answers": {
+            task: {name: each.answers for name, each in found.items()}
+            for task, found in tasks.items()
+        },
         "tosses": _tosses(benchmark.cases["slides"]),
     }
 
@@ -98,15 +117,22 @@ def _tosses(cases: list[Any]) -> list[Any]:
     from planarfriction_studies.measured import contactnets
     from planarfriction_studies.measured.end_regions import EndRegions, moved_to
 
-    questions, begun = [case.question for case in cases], contactnets.TossModel()
+    questions = [case.question for case in cases]
+    begun = contactnets.TossModel()
     linear = begun.linear(questions)
     model = begun._with_usual(linear, cases)
     changes, spread, counts = model._estimate(linear, questions)
     ends = model.ends(questions)
-    moved, far = moved_to(questions, ends[0]), model.distances(cases)
+    moved = moved_to(questions, ends[0])
+    far = model.distances(cases)
     sized = replace(model, sized=EndRegions.fitted(moved, far))
     squares = contactnets._squares(np.array(model.spreads), linear, cases, counts)
-    fitted = model.fitted_values(), model.check(cases), sized.regions(questions, 0.8), sized.sized
+    fitted = (
+        model.fitted_values(),
+        model.check(cases),
+        sized.regions(questions, 0.8),
+        sized.sized,
+    )
     return [
         *linear,
         model.usual,
@@ -129,22 +155,42 @@ def _spread(cases: list[Any], count: int) -> list[Any]:
 def replayed() -> dict[str, Any]:
     """Read the measured pushes and the logs of the joint, and make joints like it."""
     from planarfriction.limit_surface import LimitSurfaceExact
-    from planarfriction_studies.measured import joints, replayed_pushes, synthetic_joints
+    from planarfriction_studies.measured import (
+        joints,
+        replayed_pushes,
+        synthetic_joints,
+    )
 
-    pushes = {"single": replayed_pushes.single_pushes(), "in time": replayed_pushes.pushes_in_time()}
+    pushes = {
+        "single": replayed_pushes.single_pushes(),
+        "in time": replayed_pushes.pushes_in_time(),
+    }
     logs = joints.read_logs()
     told = {
         name: [
-            [each.board, each.name, each.mu, each.path.times, each.path.values, each.start, each.end] for each in found
+            [
+                each.board,
+                each.name,
+                each.mu,
+                each.path.times,
+                each.path.values,
+                each.start,
+                each.end,
+            ]
+            for each in found
         ]
         for name, found in pushes.items()
     }
     return {
         **told,
-        "errors": [replayed_pushes.errors(found[::25], LimitSurfaceExact) for found in pushes.values()],
+        "errors": [
+            replayed_pushes.errors(found[::25], LimitSurfaceExact)
+            for found in pushes.values()
+        ],
         "logs": [_log(log) for log in logs],
         "made": [
-            [each.terms, [_log(log) for log in each.logs]] for each in map(_joint(synthetic_joints, logs), range(4))
+            [each.terms, [_log(log) for log in each.logs]]
+            for each in map(_joint(synthetic_joints, logs), range(4))
         ],
     }
 
@@ -185,16 +231,26 @@ def commands() -> dict[str, Any]:
 
     own = "def predict(question):\n    return [0.0, 0.0, 0.0]\ndef held(question):\n    return question.wrenches\n"
     made = {name: 0.123 * i for i, name in enumerate(WORDS)}
-    hold, stated = demo.record_hold, report.stated
-    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder), ExitStack() as stack:
+    hold = demo.record_hold
+    stated = report.stated
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        contextlib.chdir(folder),
+        ExitStack() as stack,
+    ):
         Path("own.py").write_text(own, encoding="utf-8")
-        told = lambda parts, seed, progress: {"parts": parts, "seed": seed} | made  # noqa: E731
+        told = lambda parts, seed, progress: {"parts": parts, "seed": seed} | made
         stack.enter_context(changed(trials, run_trials=told))
         stack.enter_context(changed(demo, record_hold=lambda seed: hold(seed, 100)))
-        stack.enter_context(changed(report, stated=lambda engines: stated(engines) | MACHINE))
+        stack.enter_context(
+            changed(report, stated=lambda engines: stated(engines) | MACHINE)
+        )
         stack.enter_context(changed(run, _fingerprint=lambda *_: "fingerprint"))
         found = shown.called(COMMANDS)
-        return found | {path.name: recorded.text(path.read_text(encoding="utf-8")) for path in Path().rglob("*.json")}
+        return found | {
+            path.name: recorded.text(path.read_text(encoding="utf-8"))
+            for path in Path().rglob("*.json")
+        }
 
 
 # ---------------------------------------------------------------------- benchmarks
@@ -209,7 +265,14 @@ SHORT: dict[str, dict[str, Any]] = {
 }  # fmt: skip
 """Numbers of benchmarks that make them long, by module."""
 
-LONG = ("export.step.reduced", "identify.", "mjx.", "mujoco_warp.", "sensitivities.", "warp.")
+LONG = (
+    "export.step.reduced",
+    "identify.",
+    "mjx.",
+    "mujoco_warp.",
+    "sensitivities.",
+    "warp.",
+)
 """Benchmarks that compile for long; of exported steps those of one model show what both share."""
 
 
@@ -232,15 +295,21 @@ def benchmark(name: str) -> list[Any] | None:
         found = whole_runs_simulate(scene, **options)
         if (now := [options, recorded.plain(found)]) not in returned:
             returned.append(now)
-        return replace(found, statistics=replace(found.statistics, wall_time=float(next(calls))))
+        return replace(
+            found, statistics=replace(found.statistics, wall_time=float(next(calls)))
+        )
 
     whole_runs_simulate = whole_runs.simulate
     with ExitStack() as stack:
-        for module in {each for each in vars(running).values() if isinstance(each, ModuleType)}:
+        for module in {
+            each for each in vars(running).values() if isinstance(each, ModuleType)
+        }:
             values = dict(SHORT.get(module.__name__.rpartition(".")[2], {}))
-            values |= {each: timed for each in ("median", "once") if hasattr(module, each)}
+            values |= {
+                each: timed for each in ("median", "once") if hasattr(module, each)
+            }
             stack.enter_context(changed(module, **values))
-        lsoda = lambda scene, t_end: timed(lambda: [type(scene).__name__, t_end])  # noqa: E731
+        lsoda = lambda scene, t_end: timed(lambda: [type(scene).__name__, t_end])
         stack.enter_context(changed(whole_runs, simulate=simulated, lsoda_time=lsoda))
         (found,) = bench.run([name])
     if name == "sweep":  # whose words have times and megabytes
@@ -268,14 +337,26 @@ def rig() -> dict[str, Any]:
         runs: dict[Any, Any] = {}
         for task in ("hold", "slide", "turn", "hinge"):
             parts, goal, _ = trials._task(task, base, 5, 1)
-            parts = replace(parts, tap_time=0.3, tilt_time=min(float(np.max(parts.tilt_time)), 0.4), tilt_duration=0.2)
+            parts = replace(
+                parts,
+                tap_time=0.3,
+                tilt_time=min(float(np.max(parts.tilt_time)), 0.4),
+                tilt_duration=0.2,
+            )
             for ours in (True, False):
                 run = trials.trial(task, parts, goal, 0.6, ours=ours, seed=3)
                 runs[task, ours] = run | {"goal": np.broadcast_to(goal, len(parts))}
-                found[f"{task}, {'ours' if ours else 'rule'}"] = [parts, runs[task, ours]]
+                found[f"{task}, {'ours' if ours else 'rule'}"] = [
+                    parts,
+                    runs[task, ours],
+                ]
         found["shares"] = trials._shares(runs)
     record = demo.record_hold(1, 500)
-    return found | {"record": record, "picture": pictures.plot_grip(record), "early": pictures.plot_grip(record, 20)}
+    return found | {
+        "record": record,
+        "picture": pictures.plot_grip(record),
+        "early": pictures.plot_grip(record, 20),
+    }
 
 
 # ---------------------------------------------------------------------- referee
@@ -287,15 +368,48 @@ def referee() -> dict[str, Any]:
     from planarfriction_studies.referee.run import Verdict
 
     cases = case.all_cases()
-    verdicts, engines = [], ("A", "A, best", "B")
+    verdicts = []
+    engines = ("A", "A, best", "B")
     for i, (each, engine) in enumerate(itertools.product(cases.values(), engines)):
         truth = each.truths[i % len(each.truths)]
-        about = truth.allowed, case.QUANTITIES[truth.quantity], f"{truth.quantity} of {truth.body}", 2e-3
+        about = (
+            truth.allowed,
+            case.QUANTITIES[truth.quantity],
+            f"{truth.quantity} of {truth.body}",
+            2e-3,
+        )
         path = tuple((0.001 * k * i, 0.002 * k, 0.01 * k * i) for k in range(16))
         verdicts += [
-            Verdict(each.name, engine, "ok", 0.01 * i * truth.allowed, *about, 1e-5 * (i + 1), 0.1 * i, path=path),
-            Verdict(each.name, engine, "off", (2.0 + 0.1 * i) * truth.allowed, *about, 2e-5, 0.3, path=path),
-            Verdict(each.name, engine, "fails", (20.0 + i) * truth.allowed, *about, 2e-4, None, path=path),
+            Verdict(
+                each.name,
+                engine,
+                "ok",
+                0.01 * i * truth.allowed,
+                *about,
+                1e-5 * (i + 1),
+                0.1 * i,
+                path=path,
+            ),
+            Verdict(
+                each.name,
+                engine,
+                "off",
+                (2.0 + 0.1 * i) * truth.allowed,
+                *about,
+                2e-5,
+                0.3,
+                path=path,
+            ),
+            Verdict(
+                each.name,
+                engine,
+                "fails",
+                (20.0 + i) * truth.allowed,
+                *about,
+                2e-4,
+                None,
+                path=path,
+            ),
             Verdict(each.name, engine, "-", None, *about, None, None, "no words"),
         ][i % 4 : i % 4 + 1]
     run = MACHINE | {"settings": {"A": "default"}}
@@ -303,16 +417,30 @@ def referee() -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         for name in ("push", "ramp", "in_hand", "anisotropic"):
             export.export_case(cases[name], Path(folder))
-        files = {path.name: recorded.text(path.read_text(encoding="utf-8")) for path in sorted(Path(folder).iterdir())}
+        files = {
+            path.name: recorded.text(path.read_text(encoding="utf-8"))
+            for path in sorted(Path(folder).iterdir())
+        }
     return {
         "cases": cases,
-        "moments": {name: [[body.name, body.moments] for body in each.moving] for name, each in cases.items()},
-        "wrenches": {name: [_wrenches(each, places, t) for t in (None, 0.1, 0.37)] for name, each in cases.items()},
+        "moments": {
+            name: [[body.name, body.moments] for body in each.moving]
+            for name, each in cases.items()
+        },
+        "wrenches": {
+            name: [_wrenches(each, places, t) for t in (None, 0.1, 0.37)]
+            for name, each in cases.items()
+        },
         "scenes": {name: pictures.scene(each) for name, each in cases.items()},
-        "films": {name: recorded.text(pictures.film(each, verdicts)) for name, each in cases.items()},
+        "films": {
+            name: recorded.text(pictures.film(each, verdicts))
+            for name, each in cases.items()
+        },
         "files": files,
         "pictures": {name: report.picture(name, verdicts) for name in ("stop", "disc")},
-        "page": recorded.text(report.page(verdicts, {name: cases[name] for name in ("stop", "disc")}, run)),
+        "page": recorded.text(
+            report.page(verdicts, {name: cases[name] for name in ("stop", "disc")}, run)
+        ),
         "table": report.table(verdicts),
         "simulators": report.simulators(verdicts),
     }
@@ -320,7 +448,9 @@ def referee() -> dict[str, Any]:
 
 def _wrenches(case: Any, places: np.ndarray, t: float | None) -> np.ndarray:
     count = len(case.moving)
-    return case.wrenches(t, np.resize(places, (count, 3)), np.tile(np.eye(3)[[1, 2, 0]], (count, 1, 1)))
+    return case.wrenches(
+        t, np.resize(places, (count, 3)), np.tile(np.eye(3)[[1, 2, 0]], (count, 1, 1))
+    )
 
 
 def mujoco() -> dict[str, Any]:
@@ -332,7 +462,11 @@ def mujoco() -> dict[str, Any]:
     for each in case.all_cases().values():
         for engine in ENGINES:
             reason = engine.cannot(each)
-            found[f"{each.name}, {engine.name}"] = [engine.settings, reason, None if reason else _steps(each, engine)]
+            found[f"{each.name}, {engine.name}"] = [
+                engine.settings,
+                reason,
+                None if reason else _steps(each, engine),
+            ]
     return found
 
 

@@ -13,18 +13,36 @@ UNITS = {"x": "m", "y": "m", "theta": "rad", "vx": "m/s", "vy": "m/s", "omega": 
 CONTACT_UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}
 
 
-def scene(contacts: int = 1, mounted_on: str = "world", patch=None, outline=PLATE, name: str = "in-hand") -> pf.Scene:
+def scene(
+    contacts: int = 1,
+    mounted_on: str = "world",
+    patch=None,
+    outline=PLATE,
+    name: str = "in-hand",
+) -> pf.Scene:
     """A plate with `contacts` pads in a row, 0.03 m apart."""
-    model = pf.DistributedModel(patch or pf.ContactPatch.disc_published(0.01), pf.LuGre(mu_s=1.2))
-    names = ["pad"] if contacts == 1 else [f"pad {number + 1}" for number in range(contacts)]
+    model = pf.DistributedModel(
+        patch or pf.ContactPatch.disc_published(0.01), pf.LuGre(mu_s=1.2)
+    )
+    names = (
+        ["pad"]
+        if contacts == 1
+        else [f"pad {number + 1}" for number in range(contacts)]
+    )
     pads = [
-        pf.Contact(model, 2.0, mounted_on=mounted_on, position=(0.03 * number, 0.0), name=each)
+        pf.Contact(
+            model, 2.0, mounted_on=mounted_on, position=(0.03 * number, 0.0), name=each
+        )
         for number, each in enumerate(names)
     ]
-    return pf.Scene(pf.Body(0.2, 5e-4, (0.002, 0.0), outline=outline), pads, 2.0, name=name)
+    return pf.Scene(
+        pf.Body(0.2, 5e-4, (0.002, 0.0), outline=outline), pads, 2.0, name=name
+    )
 
 
-def solution(of: pf.Scene | None = None, *, scale: float = 1.0, t_end: float = 2.0) -> pf.Solution:
+def solution(
+    of: pf.Scene | None = None, *, scale: float = 1.0, t_end: float = 2.0
+) -> pf.Solution:
     """The plate falls by `0.005 scale t^2` and turns by `-0.3 scale t^2`; forces are sines, contact i carries i + 1."""
     of = scene() if of is None else of
     time = np.linspace(0.0, t_end, round(100 * t_end) + 1)
@@ -44,11 +62,27 @@ def solution(of: pf.Scene | None = None, *, scale: float = 1.0, t_end: float = 2
         "normal_force": 2.0 + 0.0 * time,
     }
     data = xr.Dataset(
-        {name: ("time", values, {"units": UNITS[name]}) for name, values in body.items()}
+        {
+            name: ("time", values, {"units": UNITS[name]})
+            for name, values in body.items()
+        }
         | {
-            name: (("time", "contact"), values[:, None] * number, {"units": CONTACT_UNITS[name]})
+            name: (
+                ("time", "contact"),
+                values[:, None] * number,
+                {"units": CONTACT_UNITS[name]},
+            )
             for name, values in load.items()
         },
-        coords={"time": ("time", time, {"units": "s"}), "contact": [contact.name for contact in of.contacts]},
+        coords={
+            "time": ("time", time, {"units": "s"}),
+            "contact": [contact.name for contact in of.contacts],
+        },
     )
-    return pf.Solution(data, Statistics(steps=1234, rejections=56, wall_time=0.25), "success", "reached the end", of)
+    return pf.Solution(
+        data,
+        Statistics(steps=1234, rejections=56, wall_time=0.25),
+        "success",
+        "reached the end",
+        of,
+    )

@@ -75,9 +75,25 @@ MOTOR = 0.02
 @numba.njit(cache=True)
 def move(reference, speed, every, numbers, gap, out):
     """Write angle and motor torque of every so many steps into `out` `[N, 2]`."""
-    inertia, gravity, hangs, mu_c, rise, v_s, sigma_2, sigma_0, sigma_1, load, uneven, uneven_viscous = numbers
-    q, v = reference[0], 0.0
-    motor_q, motor_v, z = q, 0.0, 0.0
+    (
+        inertia,
+        gravity,
+        hangs,
+        mu_c,
+        rise,
+        v_s,
+        sigma_2,
+        sigma_0,
+        sigma_1,
+        load,
+        uneven,
+        uneven_viscous,
+    ) = numbers
+    q = reference[0]
+    v = 0.0
+    motor_q = q
+    motor_v = 0.0
+    z = 0.0
     moved = MOTOR if gap > 0.0 else inertia
     row = 0
     for i in range(len(reference)):
@@ -86,12 +102,20 @@ def move(reference, speed, every, numbers, gap, out):
         outside = weight
         if gap > 0.0:
             apart = motor_q - q
-            over = apart - gap if apart > gap else (apart + gap if apart < -gap else 0.0)
+            over = (
+                apart - gap if apart > gap else (apart + gap if apart < -gap else 0.0)
+            )
             outside = -(4e3 * over + 2.0 * (motor_v - v)) if over != 0.0 else 0.0
         side = 1.0 if motor_v >= 0.0 else -1.0
-        level = mu_c + uneven * side + rise * math.exp(-((motor_v / v_s) ** 2)) + load * abs(torque - outside)
+        level = (
+            mu_c
+            + uneven * side
+            + rise * math.exp(-((motor_v / v_s) ** 2))
+            + load * abs(torque - outside)
+        )
         if i % every == 0:
-            out[row, 0], out[row, 1] = q, torque
+            out[row, 0] = q
+            out[row, 1] = torque
             row += 1
         rate = sigma_0 * abs(motor_v) / level
         settled = side * level / sigma_0
@@ -105,40 +129,57 @@ def move(reference, speed, every, numbers, gap, out):
             v += STEP * (weight - outside) / (inertia - MOTOR)
             q += STEP * v
         else:
-            q, v = motor_q, motor_v
+            q = motor_q
+            v = motor_v
 
 
 def reference(kind: str, rng: np.random.Generator) -> np.ndarray:
     """Return the angle to follow: sums of sines, levels of speed in both directions, or slow waves with ripples."""
     t = np.arange(0.0, SECONDS, STEP)
     if kind == "sines":
-        frequencies, phases = rng.uniform(0.1, 2.0, 5), rng.uniform(0.0, 6.28, 5)
+        frequencies = rng.uniform(0.1, 2.0, 5)
+        phases = rng.uniform(0.0, 6.28, 5)
         sizes = 0.5 / np.arange(1, 6)
-        return np.clip(t, 0.0, 1.0) * (sizes @ np.sin(2.0 * np.pi * np.outer(frequencies, t) + phases[:, None]))
+        return np.clip(t, 0.0, 1.0) * (
+            sizes @ np.sin(2.0 * np.pi * np.outer(frequencies, t) + phases[:, None])
+        )
     if kind in ("levels", "one way"):
-        levels, speed, length = np.geomspace(0.01, 1.2, 6), np.zeros_like(t), SECONDS / 12.0
+        levels = np.geomspace(0.01, 1.2, 6)
+        speed = np.zeros_like(t)
+        length = SECONDS / 12.0
         for i in range(12):
             x = (t - i * length) / length
             side = 1.0 if i % 2 == 0 or kind == "one way" else -1.0
-            speed += side * levels[i // 2] * np.clip(np.minimum(x, 1.0 - x) / 0.1, 0.0, 1.0)
+            speed += (
+                side * levels[i // 2] * np.clip(np.minimum(x, 1.0 - x) / 0.1, 0.0, 1.0)
+            )
         return np.cumsum(speed) * STEP
     p = rng.uniform(0.0, 6.28, 2)
     return 0.3 * np.sin(1.57 * t + p[0]) + 0.006 * np.sin(14.5 * t + p[1])
 
 
 def recorded(
-    numbers: Numbers, kind: str, sensors: Sensors, rng: np.random.Generator, gap: float = 0.0
+    numbers: Numbers,
+    kind: str,
+    sensors: Sensors,
+    rng: np.random.Generator,
+    gap: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Move a joint along a reference; return times [s], angles [rad] and torques [N m] as its sensors see them."""
     goal = reference(kind, rng)
     every = round(1.0 / (sensors.rate * STEP))
     out = np.empty((-(-len(goal) // every), 2))
     move(goal, np.gradient(goal, STEP), every, tuple(numbers), gap, out)
-    t, torque = np.arange(len(out)) / sensors.rate, out[:, 1]
+    t = np.arange(len(out)) / sensors.rate
+    torque = out[:, 1]
     if sensors.filtered:
         keep = np.exp(-1.0 / (sensors.rate * sensors.filtered))
-        torque = np.array(list(itertools.accumulate(torque, lambda y, x: keep * y + (1.0 - keep) * x)))
-    torque = sensors.gain * np.interp(t - sensors.late, t, torque) + rng.normal(0.0, sensors.noise, len(t))
+        torque = np.array(
+            list(itertools.accumulate(torque, lambda y, x: keep * y + (1.0 - keep) * x))
+        )
+    torque = sensors.gain * np.interp(t - sensors.late, t, torque) + rng.normal(
+        0.0, sensors.noise, len(t)
+    )
     resolution = 2.0 * np.pi / 2**sensors.bits
     return t, np.round(out[:, 0] / resolution) * resolution, torque
 
@@ -147,30 +188,71 @@ def draw(seed: int) -> Joint:
     """Draw a joint: its terms by its number, all else at random."""
     rng = np.random.default_rng([28_112, seed])
     stribeck, load, bristles, gravity, asymmetry = SETS[seed % len(SETS)]
-    mu_c, sigma_2 = rng.uniform(0.2, 0.8), rng.uniform(0.05, 0.3)
+    mu_c = rng.uniform(0.2, 0.8)
+    sigma_2 = rng.uniform(0.05, 0.3)
     inertia = rng.uniform(0.03, 0.06) + 0.08 * gravity
-    rise, v_s = (rng.uniform(0.3, 0.8) * mu_c, 10.0 ** rng.uniform(-1.5, -0.5)) if stribeck else (0.0, 1.0)
+    rise, v_s = (
+        (rng.uniform(0.3, 0.8) * mu_c, 10.0 ** rng.uniform(-1.5, -0.5))
+        if stribeck
+        else (0.0, 1.0)
+    )
     share = rng.uniform(0.08, 0.25) if load else 0.0
-    moment, hangs = (rng.uniform(1.5, 2.5), rng.uniform(-0.5, 0.5)) if gravity else (0.0, 0.0)
+    moment, hangs = (
+        (rng.uniform(1.5, 2.5), rng.uniform(-0.5, 0.5)) if gravity else (0.0, 0.0)
+    )
     differs = rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.3, 2)
     uneven, uneven_viscous = differs * [mu_c, sigma_2] if asymmetry else (0.0, 0.0)
     bend = 10.0 ** rng.uniform(-2.5, -1.6) if bristles else 3e-5
     sigma_0 = mu_c / bend
     sigma_1 = (0.005 if bristles else 0.0005) * sigma_0
     gap = 0.004 if rng.random() < 0.1 else 0.0
-    bits, rate = int(rng.integers(10, 21)), int(rng.choice([200, 500, 1000, 2000]))
+    bits = int(rng.integers(10, 21))
+    rate = int(rng.choice([200, 500, 1000, 2000]))
     filtered = rng.choice([0.0, 0.004], p=[0.7, 0.3])
     late = rng.choice([0.0, rng.uniform(0.002, 0.02)], p=[0.7, 0.3])
-    gain, noise = rng.choice([1.0, 1.1], p=[0.8, 0.2]), 0.01 * rng.uniform(0.5, 2.0)
-    numbers = Numbers(inertia, moment, hangs, mu_c, rise, v_s, sigma_2, sigma_0, sigma_1, share, uneven, uneven_viscous)
+    gain = rng.choice([1.0, 1.1], p=[0.8, 0.2])
+    noise = 0.01 * rng.uniform(0.5, 2.0)
+    numbers = Numbers(
+        inertia,
+        moment,
+        hangs,
+        mu_c,
+        rise,
+        v_s,
+        sigma_2,
+        sigma_0,
+        sigma_1,
+        share,
+        uneven,
+        uneven_viscous,
+    )
     sensors = Sensors(rate, bits, noise, filtered, late, gain)
-    logs = [recorded(numbers, kind, sensors, rng, gap) for kind in ("sines", "levels", "sines", "ripples")]
-    terms = frozenset(name for name, there in zip(NAMES, SETS[seed % len(SETS)], strict=True) if there)
+    logs = [
+        recorded(numbers, kind, sensors, rng, gap)
+        for kind in ("sines", "levels", "sines", "ripples")
+    ]
+    terms = frozenset(
+        name for name, there in zip(NAMES, SETS[seed % len(SETS)], strict=True) if there
+    )
     truth = {"inertia": gain * inertia, "mu_c": gain * mu_c, "sigma_2": gain * sigma_2}
     truth |= {"rise": gain * rise, "v_s": v_s} if stribeck else {}
     truth |= {"load": share} if load else {}
     truth |= {"sigma_0": gain * sigma_0}
     truth |= {"gravity": gain * moment, "offset": hangs} if gravity else {}
-    truth |= {"asymmetry": gain * uneven, "viscous_asymmetry": gain * uneven_viscous} if asymmetry else {}
-    about = {"bits": bits, "rate": rate, "filtered": filtered, "late": late, "gain": gain, "gap": gap, "bend": bend}
-    return Joint(terms, {name: float(value) for name, value in truth.items()}, about, logs)
+    truth |= (
+        {"asymmetry": gain * uneven, "viscous_asymmetry": gain * uneven_viscous}
+        if asymmetry
+        else {}
+    )
+    about = {
+        "bits": bits,
+        "rate": rate,
+        "filtered": filtered,
+        "late": late,
+        "gain": gain,
+        "gap": gap,
+        "bend": bend,
+    }
+    return Joint(
+        terms, {name: float(value) for name, value in truth.items()}, about, logs
+    )

@@ -11,7 +11,9 @@ import planarfriction as pf
 RADIUS, HALF, MASS, DT = 0.05, 0.02, 0.5, 2e-3
 """Radius of a wheel and half of its width [m], mass [kg], step [s]."""
 
-LAW = pf.LuGre(mu_c=0.4, mu_s=0.4, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+LAW = pf.LuGre(
+    mu_c=0.4, mu_s=0.4, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9
+)
 TREAD = pf.ReducedModel(pf.ContactPatch.rectangle(2.0 * HALF, 0.0005, cells=9), LAW)
 """Patch under a wheel, x along the axle."""
 POINT = pf.ReducedModel(pf.ContactPatch.disc(radius=0.002, cells=5), LAW)
@@ -33,7 +35,12 @@ SHAPES = {
 ALONE = 'contype="0" conaffinity="0"'
 """Geoms that touch nothing but what they have a pair with."""
 
-SITES = {"centre": (0.0, 0.0), "hair": (1e-6, 0.0), "tread": (-0.5, math.sqrt(0.75)), "contact": (0.0, -1.0)}
+SITES = {
+    "centre": (0.0, 0.0),
+    "hair": (1e-6, 0.0),
+    "tread": (-0.5, math.sqrt(0.75)),
+    "contact": (0.0, -1.0),
+}
 """Sites in radii from the axle: on it, beside it, on the tread at 120 degrees from the floor, where it touches."""
 
 
@@ -55,12 +62,18 @@ def box(site: str = "", *, name: str = "box", y: float = 0.0) -> str:
 
 def face(mu: float) -> pf.ReducedModel:
     """Return a patch for the end of this box."""
-    law = pf.LuGre(mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+    law = pf.LuGre(
+        mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9
+    )
     return pf.ReducedModel(pf.ContactPatch.rectangle(2.0 * HALF, cells=9), law)
 
 
 def on_the_floor(*bodies: str, options: str = "") -> str:
     """Return a model of bodies on a floor."""
-    mesh = f'<asset><mesh name="wheel" vertex="{MESH}"/></asset>' if "mesh=" in "".join(bodies) else ""
+    mesh = (
+        f'<asset><mesh name="wheel" vertex="{MESH}"/></asset>'
+        if "mesh=" in "".join(bodies)
+        else ""
+    )
     return f"""<mujoco><option timestep="{DT}" {options}/>{mesh}
     <worldbody><geom name="floor" type="plane" size="9 9 .1"/>{"".join(bodies)}</worldbody></mujoco>"""

@@ -42,12 +42,18 @@ def grip(grip: float, mass: float = 0.2, t_end: float = 0.03) -> pf.Scene:
 
 
 def end(solution: pf.Solution) -> dict[str, float]:
-    return {name: each.values[-1] for name, each in solution.histories.items() if name in {"y", "theta"}}
+    return {
+        name: each.values[-1]
+        for name, each in solution.histories.items()
+        if name in {"y", "theta"}
+    }
 
 
 def crossed(grip: float, mass: float) -> pf.Scene:
     """Fails in the solver's input where both are large."""
-    return pf.scenes.in_hand(MODEL, normal_force=grip if grip + mass < 3.0 else -grip, t_end=0.02)
+    return pf.scenes.in_hand(
+        MODEL, normal_force=grip if grip + mass < 3.0 else -grip, t_end=0.02
+    )
 
 
 @functools.cache
@@ -65,10 +71,16 @@ def test_a_sweep_has_a_dimension_for_each_quantity_and_all_variables():
     assert data.grip.values.tolist() == GRIPS and data.mass.values.tolist() == MASSES
     for load in GRIPS:
         for mass in MASSES:
-            alone, there = pf.simulate(grip(load, mass)).data, data.sel(grip=load, mass=mass)
+            alone = pf.simulate(grip(load, mass)).data
+            there = data.sel(grip=load, mass=mass)
             for name in alone.data_vars:
-                np.testing.assert_array_equal(there[name].values, alone[name].values, err_msg=name)
-                assert there[name].attrs == alone[name].attrs and there[name].dims == alone[name].dims
+                np.testing.assert_array_equal(
+                    there[name].values, alone[name].values, err_msg=name
+                )
+                assert (
+                    there[name].attrs == alone[name].attrs
+                    and there[name].dims == alone[name].dims
+                )
     assert set(data.status.values.ravel()) == {"success"} and (data.failure == "").all()
     assert len(set(data.run.values.ravel().tolist())) == 6
 
@@ -76,24 +88,48 @@ def test_a_sweep_has_a_dimension_for_each_quantity_and_all_variables():
 def test_a_measurement_is_what_it_returns():
     values = {"grip": GRIPS}
     data = pf.sweep(grip, values, measure=end)
-    np.testing.assert_array_equal(data.y, [end(pf.simulate(grip(load)))["y"] for load in GRIPS])
+    np.testing.assert_array_equal(
+        data.y, [end(pf.simulate(grip(load)))["y"] for load in GRIPS]
+    )
     number = pf.sweep(grip, values, measure=lambda solution: solution.statistics.steps)
     assert number.measured.dims == ("grip",) and number.measured.dtype.kind == "i"
-    whole = pf.sweep(grip, values, measure=lambda solution: solution.data[["x", "fx"]].isel(time=slice(None, None, 3)))
-    assert whole.fx.dims == ("grip", "time", "contact") and whole.time.values.tolist() == [0.0, 0.03]
-    arrays = pf.sweep(grip, values, measure=lambda s: {"pair": np.arange(2.0), "how": s.status, "still": True})
-    assert arrays.pair.dims == ("grip", "pair_index") and arrays.how.values.tolist() == ["success"] * 3
+    whole = pf.sweep(
+        grip,
+        values,
+        measure=lambda solution: solution.data[["x", "fx"]].isel(
+            time=slice(None, None, 3)
+        ),
+    )
+    assert whole.fx.dims == (
+        "grip",
+        "time",
+        "contact",
+    ) and whole.time.values.tolist() == [0.0, 0.03]
+    arrays = pf.sweep(
+        grip,
+        values,
+        measure=lambda s: {"pair": np.arange(2.0), "how": s.status, "still": True},
+    )
+    assert (
+        arrays.pair.dims == ("grip", "pair_index")
+        and arrays.how.values.tolist() == ["success"] * 3
+    )
     assert arrays.still.dtype == bool
 
 
 def test_runs_of_different_length_share_their_instants():
     def slide(speed: float, t_end: float) -> pf.Scene:
-        return pf.scenes.free_slide(MODEL, twist=(speed, 0.0, 0.0), t_end=t_end, save_every=0.01)
+        return pf.scenes.free_slide(
+            MODEL, twist=(speed, 0.0, 0.0), t_end=t_end, save_every=0.01
+        )
 
     data = pf.sweep(slide, {"speed": [0.1, 1.0], "t_end": [0.05, 0.2]})
     np.testing.assert_allclose(data.time, 0.01 * np.arange(21), atol=1e-12)
-    fast, slow = data.sel(speed=1.0, t_end=0.05), data.sel(speed=0.1, t_end=0.2)
-    assert fast.status == "success" and fast.x.notnull().sum() == 6  # NaN where it has no instants
+    fast = data.sel(speed=1.0, t_end=0.05)
+    slow = data.sel(speed=0.1, t_end=0.2)
+    assert (
+        fast.status == "success" and fast.x.notnull().sum() == 6
+    )  # NaN where it has no instants
     alone = pf.simulate(slide(0.1, 0.2)).data
     assert slow.status == "at rest" and len(alone.time) < 21
     # what is at rest stays there: the end of every run is in the last instant that it was to record
@@ -104,12 +140,22 @@ def test_runs_of_different_length_share_their_instants():
 def test_values_of_any_kind_have_labels():
     def with_model(model: pf.ReducedModel, kind: str, load: int) -> pf.Scene:
         assert type(load) is int and isinstance(model, pf.ReducedModel)
-        return dataclasses.replace(pf.scenes.in_hand(model, normal_force=load, t_end=0.01), name=kind)
+        return dataclasses.replace(
+            pf.scenes.in_hand(model, normal_force=load, t_end=0.01), name=kind
+        )
 
     other = dataclasses.replace(MODEL, law=pf.LuGre())
-    values = {"model": {"sticky": MODEL, "plain": other}, "kind": ["a"], "load": np.array([1, 2])}
+    values = {
+        "model": {"sticky": MODEL, "plain": other},
+        "kind": ["a"],
+        "load": np.array([1, 2]),
+    }
     data = pf.sweep(with_model, values, measure=end)
-    assert data.model.values.tolist() == ["sticky", "plain"] and data.y.shape == (2, 1, 2)
+    assert data.model.values.tolist() == ["sticky", "plain"] and data.y.shape == (
+        2,
+        1,
+        2,
+    )
 
 
 # ---------------------------------------------------------------------- what a run is
@@ -119,7 +165,8 @@ def test_equal_scenes_are_one_run_and_others_are_others():
     def digest(scene: pf.Scene, measure=None) -> str:
         return keys.Keys(measure, kept=False).key(scene)
 
-    scene, rebuilt = grip(2.0), pf.Scene.from_dict(grip(2.0).to_dict())
+    scene = grip(2.0)
+    rebuilt = pf.Scene.from_dict(grip(2.0).to_dict())
     assert digest(scene) == digest(rebuilt) and len(digest(scene)) == 32
     pf.simulate(scene)  # what a model has built on the way is not part of it
     assert digest(scene) == digest(rebuilt)
@@ -129,14 +176,24 @@ def test_equal_scenes_are_one_run_and_others_are_others():
         dataclasses.replace(scene, rtol=2e-5),
         dataclasses.replace(scene, save_every=0.02),
         pf.scenes.in_hand(law, normal_force=2.0, t_end=0.03),
-        pf.scenes.in_hand(pf.DistributedModel(PATCH, LAW), normal_force=2.0, t_end=0.03),
+        pf.scenes.in_hand(
+            pf.DistributedModel(PATCH, LAW), normal_force=2.0, t_end=0.03
+        ),
         *(
-            pf.scenes.in_hand(dataclasses.replace(MODEL, patch=patch), normal_force=2.0, t_end=0.03)
-            for patch in (pf.ContactPatch.disc(0.01 + 1e-15, cells=7), pf.ContactPatch.disc(0.01, cells=7, name="pad"))
+            pf.scenes.in_hand(
+                dataclasses.replace(MODEL, patch=patch), normal_force=2.0, t_end=0.03
+            )
+            for patch in (
+                pf.ContactPatch.disc(0.01 + 1e-15, cells=7),
+                pf.ContactPatch.disc(0.01, cells=7, name="pad"),
+            )
         ),
     ]
     one = keys.Keys(None, kept=False)  # which has the digests of earlier parts
-    for found in (set(map(digest, [scene, *others])), set(map(one.key, [scene, *others, scene]))):
+    for found in (
+        set(map(digest, [scene, *others])),
+        set(map(one.key, [scene, *others, scene])),
+    ):
         assert len(found) == 8
     assert digest(scene, end) != digest(scene)
 
@@ -153,9 +210,17 @@ def measure_in(file: Path, lines: str):
 
 def test_a_measurement_counts_by_its_name_and_source(tmp_path):
     text = "def measure(solution):\n    return 1.0\n"
-    names = [keys.name_of(measure_in(tmp_path / "a.py", lines), kept=True) for lines in (text, "# moved\n\n" + text)]
+    names = [
+        keys.name_of(measure_in(tmp_path / "a.py", lines), kept=True)
+        for lines in (text, "# moved\n\n" + text)
+    ]
     assert names[0] == names[1] and names[0] != keys.name_of(end, kept=True)
-    assert keys.name_of(measure_in(tmp_path / "a.py", text.replace("1.0", "2.0")), kept=True) != names[0]
+    assert (
+        keys.name_of(
+            measure_in(tmp_path / "a.py", text.replace("1.0", "2.0")), kept=True
+        )
+        != names[0]
+    )
 
 
 def test_runs_of_a_nameless_measurement_are_not_kept(tmp_path):
@@ -165,10 +230,14 @@ def test_runs_of_a_nameless_measurement_are_not_kept(tmp_path):
         return lambda solution: float(solution.histories["y"].values[-1] < limit)
 
     for nameless in (near(1.0), functools.partial(end), lambda solution: 1.0):
-        with pytest.raises(pf.FrictionError, match="measure must be a function with a name") as caught:
+        with pytest.raises(
+            pf.FrictionError, match="measure must be a function with a name"
+        ) as caught:
             pf.sweep(grip, {"grip": [1.0]}, out=tmp_path, measure=nameless)
         assert "\n" not in str(caught.value)
-    assert pf.sweep(grip, {"grip": [1.0]}, measure=near(1.0)).measured.values.tolist() == [1.0]
+    assert pf.sweep(
+        grip, {"grip": [1.0]}, measure=near(1.0)
+    ).measured.values.tolist() == [1.0]
 
 
 def test_runs_of_a_model_that_files_do_not_know_are_not_kept(tmp_path):
@@ -178,7 +247,10 @@ def test_runs_of_a_model_that_files_do_not_know_are_not_kept(tmp_path):
     def make(grip: float) -> pf.Scene:
         return pf.scenes.in_hand(Mine(PATCH, LAW), normal_force=grip, t_end=0.01)
 
-    assert pf.sweep(make, {"grip": [1.0, 2.0]}, measure=end).status.values.tolist() == ["success"] * 2
+    assert (
+        pf.sweep(make, {"grip": [1.0, 2.0]}, measure=end).status.values.tolist()
+        == ["success"] * 2
+    )
     with pytest.raises(pf.FrictionError, match=r"model must be one of .*registered"):
         pf.sweep(make, {"grip": [1.0]}, out=tmp_path)
 
@@ -219,12 +291,20 @@ def test_a_sweep_goes_on_where_another_has_ended(tmp_path):
 
 
 def test_progress_is_told_twice_a_second_and_at_the_end(monkeypatch):
-    clock, told = [100.0], []
+    clock = [100.0]
+    told = []
     monkeypatch.setattr(running, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     going = running.Sweeping(grip, {"grip": np.arange(8.0)}, None, None, told.append)
     book = going.book
-    book.found, book.failed = 2, 1
-    for passed, at_once, count in ((0.4, False, 0), (0.2, False, 1), (0.4, False, 1), (0.1, False, 2), (0.1, True, 3)):
+    book.found = 2
+    book.failed = 1
+    for passed, at_once, count in (
+        (0.4, False, 0),
+        (0.2, False, 1),
+        (0.4, False, 1),
+        (0.1, False, 2),
+        (0.1, True, 3),
+    ):
         clock[0] += passed
         book.new += 1
         going._tell(at_once)
@@ -245,7 +325,11 @@ def test_damaged_files_do_not_count(tmp_path):
     (tmp_path / ".planarfriction-0123.part").write_bytes(whole.read_bytes()[:100])
     told: list[sweeps.Progress] = []
     again = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path, progress=told.append)
-    assert told[-1].found == 1 and told[-1].damaged == 2 and "2 damaged and done again" in str(told[-1])
+    assert (
+        told[-1].found == 1
+        and told[-1].damaged == 2
+        and "2 damaged and done again" in str(told[-1])
+    )
     assert again.identical(data)
     assert found(tmp_path, GRIPS) == 3 and not cut.exists() and not changed.exists()
 
@@ -270,7 +354,10 @@ def test_files_hold_what_runs_have_left_and_nothing_is_lost():
         "file": records.History(("n",), np.array(["a", "bcd"]), {}),
     }
     other = {**variables, "file": records.History(("n",), np.array(["a", "b"]), {})}
-    runs = {name: records.Record("success", "", each, 1.5) for name, each in (("a", variables), ("b", other))}
+    runs = {
+        name: records.Record("success", "", each, 1.5)
+        for name, each in (("a", variables), ("b", other))
+    }
     runs["c"] = runs["a"]._replace(status="at rest")
     content = records.pack(runs)
     back = records.unpack(content)
@@ -283,10 +370,18 @@ def test_files_hold_what_runs_have_left_and_nothing_is_lost():
 
 
 def test_failures_are_recorded_with_reason_and_scene_and_are_no_end(tmp_path):
-    data = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES}, out=tmp_path / "a", measure=end)
-    assert data.status.values.tolist() == [["success"] * 2, ["success"] * 2, ["failed"] * 2]
+    data = pf.sweep(
+        crossed, {"grip": GRIPS, "mass": MASSES}, out=tmp_path / "a", measure=end
+    )
+    assert data.status.values.tolist() == [
+        ["success"] * 2,
+        ["success"] * 2,
+        ["failed"] * 2,
+    ]
     assert data.y.isnull().values.tolist() == (data.status == "failed").values.tolist()
-    assert "normal_force of contact 'fingers' must be >= 0, got -3.0" in str(data.failure.values[2, 0])
+    assert "normal_force of contact 'fingers' must be >= 0, got -3.0" in str(
+        data.failure.values[2, 0]
+    )
 
     def picky(solution: pf.Solution) -> float:
         if solution.histories["normal_force"].values[-1, 0] == 2.0:
@@ -297,14 +392,17 @@ def test_failures_are_recorded_with_reason_and_scene_and_are_no_end(tmp_path):
     assert data.failure.values.tolist() == ["", "measure: ValueError: two is bad", ""]
     (file,) = (tmp_path / "b").glob("*.failed.json")
     kept = json.loads(file.read_text())
-    assert kept["reason"] == "measure: ValueError: two is bad" and pf.Scene.from_dict(kept["scene"]) == grip(2.0)
+    assert kept["reason"] == "measure: ValueError: two is bad" and pf.Scene.from_dict(
+        kept["scene"]
+    ) == grip(2.0)
     assert file.name == f"{data.run.values[1]}.failed.json"
     again = found(tmp_path / "b", GRIPS, measure=picky)
     assert again == 2  # the failure is tried again
 
 
 def test_a_run_that_worked_at_last_is_no_failure_any_more(tmp_path, monkeypatch):
-    values, simulate = {"grip": [1.0, 2.0]}, pf.scenes.simulate
+    values = {"grip": [1.0, 2.0]}
+    simulate = pf.scenes.simulate
 
     def full(scene, **options):
         if scene == grip(2.0):
@@ -312,7 +410,10 @@ def test_a_run_that_worked_at_last_is_no_failure_any_more(tmp_path, monkeypatch)
         return simulate(scene, **options)
 
     monkeypatch.setitem(vars(pf.scenes), "simulate", full)
-    assert pf.sweep(grip, values, out=tmp_path).failure.values.tolist() == ["", "MemoryError"]
+    assert pf.sweep(grip, values, out=tmp_path).failure.values.tolist() == [
+        "",
+        "MemoryError",
+    ]
     assert len(list(tmp_path.glob("*.failed.json"))) == 1
     monkeypatch.undo()
     assert (pf.sweep(grip, values, out=tmp_path).failure == "").all()
@@ -321,10 +422,18 @@ def test_a_run_that_worked_at_last_is_no_failure_any_more(tmp_path, monkeypatch)
 
 def test_what_does_not_fit_the_first_run_is_a_failure():
     def uneven(solution: pf.Solution) -> dict:
-        return {"a": np.zeros(2 if solution.histories["normal_force"].values[-1, 0] < 3.0 else 3)}
+        return {
+            "a": np.zeros(
+                2 if solution.histories["normal_force"].values[-1, 0] < 3.0 else 3
+            )
+        }
 
     data = pf.sweep(grip, {"grip": GRIPS}, measure=uneven)
-    assert data.failure.values.tolist() == ["", "", "a has shape [3] where the first run has [2]"]
+    assert data.failure.values.tolist() == [
+        "",
+        "",
+        "a has shape [3] where the first run has [2]",
+    ]
     assert data.a[2].isnull().all()
 
 
@@ -372,8 +481,14 @@ def kill_on_the_way(folder: Path, runs: int, after: int) -> int:
     That they are found afterwards shows too that digests are the same in every process.
     """
     paths = os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])
-    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONHASHSEED": str(runs + after)}
-    process = subprocess.Popen([sys.executable, "-c", KILLED, str(folder), str(runs)], env=environment)
+    environment = {
+        **os.environ,
+        "PYTHONPATH": paths,
+        "PYTHONHASHSEED": str(runs + after),
+    }
+    process = subprocess.Popen(
+        [sys.executable, "-c", KILLED, str(folder), str(runs)], env=environment
+    )
     try:
         limit = time.monotonic() + 300.0
         while len(kept(folder)) < after:
@@ -436,7 +551,11 @@ def test_a_ctrl_c_while_a_result_is_collected_ends_the_sweep(monkeypatch, tmp_pa
         return answer
 
     for name in ("result", "exception"):
-        monkeypatch.setattr(concurrent.futures.Future, name, pressed(getattr(concurrent.futures.Future, name)))
+        monkeypatch.setattr(
+            concurrent.futures.Future,
+            name,
+            pressed(getattr(concurrent.futures.Future, name)),
+        )
     with pytest.raises(SweepInterrupted):
         pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, out=tmp_path, measure=end)
 
@@ -460,7 +579,10 @@ class Handed(concurrent.futures.ThreadPoolExecutor):
 
     def submit(self, function, batch):
         self.batches.append(len(batch.scenes))
-        if any(scene.contacts[0].normal_force(0.0) == self._refused for scene in batch.scenes):
+        if any(
+            scene.contacts[0].normal_force(0.0) == self._refused
+            for scene in batch.scenes
+        ):
             future = concurrent.futures.Future()
             future.set_exception(TypeError("cannot pickle it"))
             return future
@@ -475,19 +597,33 @@ def late(solution: pf.Solution) -> dict[str, float]:
 
 
 def test_short_runs_are_handed_out_together_and_long_ones_alone():
-    short, long = np.linspace(1.0, 2.0, 40).tolist(), [3.0, 4.0, 5.0, 6.0]
-    for grips, most, again in ((short, range(2, 41), 0), (short + long, range(2, 45), 1), (long, [1], 0)):
+    short = np.linspace(1.0, 2.0, 40).tolist()
+    long = [3.0, 4.0, 5.0, 6.0]
+    for grips, most, again in (
+        (short, range(2, 41), 0),
+        (short + long, range(2, 45), 1),
+        (long, [1], 0),
+    ):
         with Handed() as pool:
             data = pf.sweep(grip, {"grip": grips}, executor=pool, measure=late)
         assert max(pool.batches) in most
         assert sum(pool.batches) >= len(grips) + again
-        np.testing.assert_array_equal(data.y, pf.sweep(grip, {"grip": grips}, measure=end).y)
+        np.testing.assert_array_equal(
+            data.y, pf.sweep(grip, {"grip": grips}, measure=end).y
+        )
 
 
 def test_batches_become_smaller_towards_the_end():
     with Handed() as pool:
-        pf.sweep(grip, {"grip": np.linspace(1.0, 2.0, 40).tolist()}, executor=pool, measure=end)
-    assert pool.batches[-1] <= 2 < max(pool.batches)  # two, if two are left: that hangs on how long the others took
+        pf.sweep(
+            grip,
+            {"grip": np.linspace(1.0, 2.0, 40).tolist()},
+            executor=pool,
+            measure=end,
+        )
+    assert (
+        pool.batches[-1] <= 2 < max(pool.batches)
+    )  # two, if two are left: that hangs on how long the others took
 
 
 class Silent(concurrent.futures.Executor):
@@ -511,7 +647,9 @@ class Silent(concurrent.futures.Executor):
             count = len(self.held)
             time.sleep(0.3)
         self.before = count
-        while not self.ended:  # what a slow machine leaves of a batch is handed out again
+        while (
+            not self.ended
+        ):  # what a slow machine leaves of a batch is handed out again
             if self.held:
                 future, function, batch = self.held.pop(0)
                 future.set_result(function(batch))
@@ -521,7 +659,9 @@ def test_an_executor_of_unknown_size_gets_single_runs_at_first():
     pool = Silent()
     worker = threading.Thread(target=pool.work, daemon=True)
     worker.start()
-    data = pf.sweep(grip, {"grip": np.linspace(1.0, 2.0, 300).tolist()}, executor=pool, measure=end)
+    data = pf.sweep(
+        grip, {"grip": np.linspace(1.0, 2.0, 300).tolist()}, executor=pool, measure=end
+    )
     pool.ended = True
     worker.join()
     assert pool.before == 64
@@ -530,7 +670,13 @@ def test_an_executor_of_unknown_size_gets_single_runs_at_first():
 
 
 def test_what_cannot_be_sent_fails_alone():
-    values = {"grip": [*np.linspace(1.0, 2.0, 40).tolist(), 3.0, *np.linspace(4.0, 5.0, 9).tolist()]}
+    values = {
+        "grip": [
+            *np.linspace(1.0, 2.0, 40).tolist(),
+            3.0,
+            *np.linspace(4.0, 5.0, 9).tolist(),
+        ]
+    }
     with Handed(refused=3.0) as pool:
         data = pf.sweep(grip, values, executor=pool, measure=end)
     assert max(pool.batches) > 1
@@ -546,7 +692,10 @@ def leave(solution: pf.Solution) -> float:
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_processes_give_the_same_bits_take_no_lambda_and_may_die(tmp_path):
     with concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool:
-        with pytest.raises(pf.FrictionError, match="measure must be a function that other processes can import"):
+        with pytest.raises(
+            pf.FrictionError,
+            match="measure must be a function that other processes can import",
+        ):
             pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
         data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
         with pytest.raises(SweepError, match="finished runs are kept"):
@@ -560,11 +709,16 @@ def test_a_run_is_what_its_scene_gives_alone():
     """Parts that are kept from run to run belong to the run that uses them."""
 
     def make(mu: float, size: float, load: float) -> pf.Scene:
-        model = pf.ReducedModel(pf.ContactPatch.disc(size, cells=11), pf.LuGre(mu_c=mu, mu_s=1.2 * mu))
-        return pf.scenes.in_hand(model, normal_force=pf.Signal([0.0, 0.015], [load, 0.5 * load]), t_end=0.03)
+        model = pf.ReducedModel(
+            pf.ContactPatch.disc(size, cells=11), pf.LuGre(mu_c=mu, mu_s=1.2 * mu)
+        )
+        return pf.scenes.in_hand(
+            model, normal_force=pf.Signal([0.0, 0.015], [load, 0.5 * load]), t_end=0.03
+        )
 
     values = {"mu": [0.6, 0.9], "size": [0.01, 0.012], "load": [2.0, 3.0]}
-    swept, seen = pf.sweep(make, values), set()
+    swept = pf.sweep(make, values)
+    seen = set()
     for mu, size, load in itertools.product(*values.values()):
         scene = pf.Scene.from_dict(make(mu, size, load).to_dict())
         alone = pf.simulate(scene).histories["y"].values
@@ -578,7 +732,9 @@ def test_models_are_built_once_for_equal_scenes():
     seen = set()
 
     def make(grip: float) -> pf.Scene:
-        return pf.scenes.in_hand(pf.ReducedModel(PATCH, LAW, cells=8), normal_force=grip, t_end=0.01)
+        return pf.scenes.in_hand(
+            pf.ReducedModel(PATCH, LAW, cells=8), normal_force=grip, t_end=0.01
+        )
 
     def look(solution: pf.Solution) -> float:
         seen.add(id(solution.scene.contacts[0].model))
@@ -589,10 +745,20 @@ def test_models_are_built_once_for_equal_scenes():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "words"), [(89.0, "89 s"), (90.0, "2 min"), (5300.0, "88 min"), (5400.0, "1.5 h"), (9000.0, "2.5 h")]
+    ("seconds", "words"),
+    [
+        (89.0, "89 s"),
+        (90.0, "2 min"),
+        (5300.0, "88 min"),
+        (5400.0, "1.5 h"),
+        (9000.0, "2.5 h"),
+    ],
 )
 def test_what_is_left_is_said_in_the_unit_that_one_would_use(seconds, words):
-    assert str(sweeps.Progress(10, 4, 1, 0, 0, seconds)) == f"4 of 10 runs (1 found), {words} left"
+    assert (
+        str(sweeps.Progress(10, 4, 1, 0, 0, seconds))
+        == f"4 of 10 runs (1 found), {words} left"
+    )
 
 
 def test_the_first_failure_is_that_of_the_grid_whatever_ends_first():

@@ -23,7 +23,9 @@ VALUES = {"grip": GRIPS, "mass": MASSES}
 
 def stored(data, path: Path):
     """Return a dataset as xarray reads it from the zarr store that it has written."""
-    pytest.importorskip("zarr", reason="needs zarr: pip install 'planarfriction[sweep]'")
+    pytest.importorskip(
+        "zarr", reason="needs zarr: pip install 'planarfriction[sweep]'"
+    )
     import xarray as xr
 
     data.to_zarr(path, zarr_format=2, consolidated=False)
@@ -35,7 +37,9 @@ def same(there, data) -> None:
     assert set(there.variables) == set(data.variables)
     for name, each in data.variables.items():
         assert there[name].dims == each.dims and there[name].attrs == each.attrs, name
-        np.testing.assert_array_equal(there[name].values.astype(each.dtype), each.values, err_msg=name)
+        np.testing.assert_array_equal(
+            there[name].values.astype(each.dtype), each.values, err_msg=name
+        )
 
 
 @pytest.mark.parametrize("measure", [None, end])
@@ -43,11 +47,17 @@ def test_a_folder_becomes_a_store_finished_or_not(tmp_path, measure):
     half = {"grip": GRIPS[:2], "mass": MASSES}
     pf.sweep(grip, half, out=tmp_path / "runs", measure=measure)
     some = sweeps.finished_runs(grip, VALUES, out=tmp_path / "runs", measure=measure)
-    assert some.status.values.tolist() == [["success"] * 2, ["success"] * 2, ["missing"] * 2]
+    assert some.status.values.tolist() == [
+        ["success"] * 2,
+        ["success"] * 2,
+        ["missing"] * 2,
+    ]
     same(stored(some, tmp_path / "some.zarr"), some)
     data = pf.sweep(grip, VALUES, out=tmp_path / "runs", measure=measure)
     same(stored(data, tmp_path / "all.zarr"), data)
-    assert data.identical(reference() if measure is None else pf.sweep(grip, VALUES, measure=measure))
+    assert data.identical(
+        reference() if measure is None else pf.sweep(grip, VALUES, measure=measure)
+    )
 
 
 def slow_end(solution: pf.Solution) -> dict[str, float]:
@@ -56,7 +66,9 @@ def slow_end(solution: pf.Solution) -> dict[str, float]:
 
 
 def test_a_dask_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path):
-    distributed = pytest.importorskip("distributed", reason="needs dask: pip install 'planarfriction[sweep]'")
+    distributed = pytest.importorskip(
+        "distributed", reason="needs dask: pip install 'planarfriction[sweep]'"
+    )
     values = {"grip": np.linspace(1.0, 3.0, 60)}
     killed: list[int] = []
 
@@ -66,14 +78,30 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path):
             os.kill(killed[0], signal.SIGKILL)
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # dask's own, about sockets and processes that end
+        warnings.simplefilter(
+            "ignore"
+        )  # dask's own, about sockets and processes that end
         with (
-            distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+            distributed.LocalCluster(
+                n_workers=2, threads_per_worker=1, dashboard_address=None
+            ) as cluster,
             distributed.Client(cluster) as client,
         ):
             client.run(os.chdir, str(Path(__file__).parents[2]))
-            data = pf.sweep(grip, values, out=tmp_path, executor=client.get_executor(), measure=slow_end, progress=kill)
+            data = pf.sweep(
+                grip,
+                values,
+                out=tmp_path,
+                executor=client.get_executor(),
+                measure=slow_end,
+                progress=kill,
+            )
     assert killed and set(data.status.values.tolist()) == {"success"}
-    assert data.identical(pf.sweep(grip, values, out=tmp_path / "alone", measure=slow_end))
-    here, alone = (records.pack(dict(sorted(kept(folder).items()))) for folder in (tmp_path, tmp_path / "alone"))
+    assert data.identical(
+        pf.sweep(grip, values, out=tmp_path / "alone", measure=slow_end)
+    )
+    here, alone = (
+        records.pack(dict(sorted(kept(folder).items())))
+        for folder in (tmp_path, tmp_path / "alone")
+    )
     assert here == alone

@@ -12,17 +12,28 @@ from tests.tensors.test_discs import DT, assert_close, front, patch, samples  # 
 REFERENCE = 1.5
 LAWS = {
     "plain": pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7, reference_load=REFERENCE),
-    "elasto-plastic": pf.LuGre(mu_s=1.2, sigma_1=30.0, elasto_plastic=0.9, reference_load=REFERENCE),
+    "elasto-plastic": pf.LuGre(
+        mu_s=1.2, sigma_1=30.0, elasto_plastic=0.9, reference_load=REFERENCE
+    ),
     "dahl": pf.Dahl(mu_c=0.8, reference_load=REFERENCE),
 }
 
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(
-    "kind", ["points", "turned points", "leaning points", "discs", "turned discs", "leaning discs"]
+    "kind",
+    [
+        "points",
+        "turned points",
+        "leaning points",
+        "discs",
+        "turned discs",
+        "leaning discs",
+    ],
 )
 def test_values_are_those_of_numpy(front, kind, law):  # noqa: F811
-    model, ours = pf.DistributedModel(patch(kind), LAWS[law]), front.model(patch(kind), LAWS[law])
+    model = pf.DistributedModel(patch(kind), LAWS[law])
+    ours = front.model(patch(kind), LAWS[law])
     z, v, f = samples(model.state_shape)
     f[30:35] = 1e-3  # bristles far beyond their limit
     at = front.arrays(z, v, f)
@@ -38,10 +49,13 @@ def test_values_are_those_of_numpy(front, kind, law):  # noqa: F811
 )
 def test_rollouts_are_steps_of_numpy_whose_slopes_are_differences(front, kind, method):  # noqa: F811
     law = LAWS["elasto-plastic"]
-    model, ours = pf.DistributedModel(patch(kind), law), front.model(patch(kind), law)
+    model = pf.DistributedModel(patch(kind), law)
+    ours = front.model(patch(kind), law)
     rng = np.random.default_rng(5)
-    z, bars = 3e-7 * rng.normal(size=model.state_shape), rng.normal(size=(8, 3)) * [1.0, 1.0, 300.0]
-    v, f = rng.normal(size=(8, 3)) * [1e-3, 1e-3, 0.2], rng.uniform(0.4, 3.0, 8)
+    z = 3e-7 * rng.normal(size=model.state_shape)
+    bars = rng.normal(size=(8, 3)) * [1.0, 1.0, 300.0]
+    v = rng.normal(size=(8, 3)) * [1e-3, 1e-3, 0.2]
+    f = rng.uniform(0.4, 3.0, 8)
 
     def numpy(z, v, f):
         total = 0.0
@@ -53,14 +67,19 @@ def test_rollouts_are_steps_of_numpy_whose_slopes_are_differences(front, kind, m
     weight, *_ = front.arrays(bars)
 
     def power(z, v, f):
-        return (front.models.rollout(ours, z, v, f, DT, method=method).wrenches * weight).sum()
+        return (
+            front.models.rollout(ours, z, v, f, DT, method=method).wrenches * weight
+        ).sum()
 
     at = front.arrays(z, v, f)
     assert abs(front.plain(power(*at)) / numpy(z, v, f) - 1.0) < 1e-12
     slopes = front.slopes(power, *(each[None] for each in at))
     for i, (slope, value) in enumerate(zip(slopes, (z, v, f), strict=True)):
         step = 1e-6 * rng.normal(size=value.shape) * np.abs(value).max()
-        ends = ([each if j != i else each + side * step for j, each in enumerate((z, v, f))] for side in (0.5, -0.5))
+        ends = (
+            [each if j != i else each + side * step for j, each in enumerate((z, v, f))]
+            for side in (0.5, -0.5)
+        )
         more, less = (numpy(*end) for end in ends)
         # kinks apart, differences over 1e-6 of the inputs have errors of about 1e-9
         assert abs((front.plain(slope)[0] * step).sum() / (more - less) - 1.0) < 1e-6
@@ -80,11 +99,17 @@ def test_without_load_slopes_are_zero_and_at_rest_they_are_finite(front, single)
 
 def test_a_fixed_stiffness_is_part_of_the_model(front):  # noqa: F811
     law = LAWS["elasto-plastic"]
-    model, (z, v, f) = front.model(patch("points"), law), samples((2, 30))
+    model = front.model(patch("points"), law)
+    (z, v, f) = samples((2, 30))
     at = front.arrays(z, v, f)
-    with pytest.raises(InvalidValueError, match="moments must be None for a law with a reference_load"):
+    with pytest.raises(
+        InvalidValueError, match="moments must be None for a law with a reference_load"
+    ):
         model.step(*at, DT, moments=front.arrays(v[:, :2])[0])
-    with pytest.raises(InvalidValueError, match="law must have no reference_load for ReducedModelPublished"):
+    with pytest.raises(
+        InvalidValueError,
+        match="law must have no reference_load for ReducedModelPublished",
+    ):
         front.model(patch("points"), law, "ReducedModelPublished")
     if front.name == "torch":
         assert model.law().reference_load == REFERENCE

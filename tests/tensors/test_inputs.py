@@ -8,7 +8,9 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 
-PATCH = pf.ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0])
+PATCH = pf.ContactPatch.points(
+    [(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0]
+)
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 TWIST, LOAD, DT = [2e-3, -1e-3, 0.3], 2.0, 1e-3
 KINDS = ("DistributedModel", "ReducedModel", "ReducedModelPublished")
@@ -23,7 +25,10 @@ WRONG = {
         ([np.inf, 0.0, 0.0], "be finite"),
         ([1e60, 0.0, 0.0], "be between|be finite"),
         (np.array([1.0, 2.0, 3.0j]), "be an array of numbers and not complex"),
-        (np.ma.masked_array([1.0, 2.0, 3.0], [0, 1, 0]), "be an array of numbers and not masked"),
+        (
+            np.ma.masked_array([1.0, 2.0, 3.0], [0, 1, 0]),
+            "be an array of numbers and not masked",
+        ),
         (None, "be an array of numbers"),
         ([10**400, 0.0, 0.0], "be"),
     ],
@@ -34,7 +39,12 @@ WRONG = {
         (None, "be an array of numbers"),
         (1j, "be an array of numbers"),
     ],
-    "dt": [(-1e-3, "be >= 0, got -0.001"), (np.nan, "be finite"), ("now", "be an array"), (None, "be an array")],
+    "dt": [
+        (-1e-3, "be >= 0, got -0.001"),
+        (np.nan, "be finite"),
+        ("now", "be an array"),
+        (None, "be an array"),
+    ],
     "state": [
         ([0.0], "have shape"),
         (0.0, "have shape"),
@@ -115,7 +125,12 @@ def front(request):
 
 def arguments(front, model, **changed):
     """Return legal arguments of a step, some of them changed."""
-    usual = {"state": model.rest(), "twist": front.array(TWIST), "normal_force": front.array(LOAD), "dt": DT}
+    usual = {
+        "state": model.rest(),
+        "twist": front.array(TWIST),
+        "normal_force": front.array(LOAD),
+        "dt": DT,
+    }
     return {**usual, **changed}
 
 
@@ -142,7 +157,11 @@ def test_a_roll_out_refuses(front, kind, method, name, value, rule):
     if name == "twist":
         if np.ndim(value) != 1 or len(value) != 3:
             return  # the shapes of rollouts have tests of their own
-        value = np.ma.stack([value] * 4) if isinstance(value, np.ma.MaskedArray) else [value] * 4
+        value = (
+            np.ma.stack([value] * 4)
+            if isinstance(value, np.ma.MaskedArray)
+            else [value] * 4
+        )
     given[name] = value
     if name == "state" and method == "adjoint":
         rule += "|be None"
@@ -152,7 +171,12 @@ def test_a_roll_out_refuses(front, kind, method, name, value, rule):
 @every_kind
 def test_batches_that_do_not_match(front, kind):
     model = front.model(kind)
-    given = arguments(front, model, twist=front.array(np.zeros((4, 3))), normal_force=front.array(np.ones(5)))
+    given = arguments(
+        front,
+        model,
+        twist=front.array(np.zeros((4, 3))),
+        normal_force=front.array(np.ones(5)),
+    )
     with pytest.raises(InvalidValueError, match="batch axes must broadcast"):
         model.step(**given)
 
@@ -177,7 +201,9 @@ def test_where_values_are_unseen_friction_never_drives(front, kind):
         return model.step(given["state"], given["twist"], load, given["dt"])[1]
 
     assert not front.plain(front.traced(wrench, -1.0)).any()
-    np.testing.assert_allclose(front.plain(front.traced(wrench, LOAD)), front.plain(wrench(LOAD)), rtol=1e-12)
+    np.testing.assert_allclose(
+        front.plain(front.traced(wrench, LOAD)), front.plain(wrench(LOAD)), rtol=1e-12
+    )
 
     def moved(dt):
         return model.step(given["state"], given["twist"], given["normal_force"], dt)[0]
@@ -186,12 +212,16 @@ def test_where_values_are_unseen_friction_never_drives(front, kind):
 
     def last(load):
         sequence = front.array([TWIST] * 4)
-        return front.front.rollout(model, given["state"], sequence, load, DT, method="eager").wrenches
+        return front.front.rollout(
+            model, given["state"], sequence, load, DT, method="eager"
+        ).wrenches
 
     assert not front.plain(front.traced(last, -1.0)).any()
     # at zero the slope is that of the smallest load
     at_zero = front.slope(lambda load: wrench(load)[0], 0.0)
-    np.testing.assert_allclose(front.plain(at_zero), front.plain(wrench(LOAD))[0] / LOAD, rtol=1e-12)
+    np.testing.assert_allclose(
+        front.plain(at_zero), front.plain(wrench(LOAD))[0] / LOAD, rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", ["twist", "normal_force", "dt"])
@@ -200,17 +230,24 @@ def test_where_values_are_unseen_friction_never_drives(front, kind):
 def test_nan_in_traced_values_stays_and_spoils_no_other_contact(kind, method, name):
     """Inside `jit` a load of NaN counted as none, and any NaN ended the adjoint in an error of its callback."""
     front = Jax()
-    jax, model = front.jax, front.model(kind)
+    jax = front.jax
+    model = front.model(kind)
     sequences = front.array(np.multiply.outer([1.0, 2.0, 3.0], [TWIST] * 4))
     bad = {
         "twist": sequences.at[1, 2, 0].set(np.nan),
         "normal_force": front.array([[LOAD], [np.nan], [LOAD]]),
         "dt": front.array(np.nan),
     }
-    right = {"twist": sequences, "normal_force": front.array([[LOAD]] * 3), "dt": front.array(DT)}
+    right = {
+        "twist": sequences,
+        "normal_force": front.array([[LOAD]] * 3),
+        "dt": front.array(DT),
+    }
 
     def wrenches(twist, normal_force, dt):
-        return front.front.rollout(model, None, twist, normal_force, dt, method=method).wrenches
+        return front.front.rollout(
+            model, None, twist, normal_force, dt, method=method
+        ).wrenches
 
     def finite(array):
         return np.isfinite(front.plain(array)).all(axis=(1, 2))
@@ -218,30 +255,52 @@ def test_nan_in_traced_values_stays_and_spoils_no_other_contact(kind, method, na
     spoilt = finite(jax.jit(wrenches)(**{**right, name: bad[name]}))
     np.testing.assert_array_equal(spoilt, [name != "dt", False, name != "dt"])
     if name == "twist":
-        gradient = jax.jit(jax.grad(lambda twist: wrenches(twist, right["normal_force"], DT).sum()))
-        slope, alone = gradient(bad["twist"]), gradient(sequences)
+        gradient = jax.jit(
+            jax.grad(lambda twist: wrenches(twist, right["normal_force"], DT).sum())
+        )
+        slope = gradient(bad["twist"])
+        alone = gradient(sequences)
         np.testing.assert_array_equal(finite(slope), [True, False, True])
-        np.testing.assert_allclose(front.plain(slope)[::2], front.plain(alone)[::2], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            front.plain(slope)[::2], front.plain(alone)[::2], rtol=1e-9, atol=1e-12
+        )
 
 
 def test_parameters_are_as_many_as_their_names(front):
     model = front.model("DistributedModel")
     assert model.names[0] == "sigma_0" and len(model.names) == 8
-    with pytest.raises(InvalidValueError, match=r"parameters must have shape \[..., 8\] \(sigma_0, .*got shape \[3\]"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"parameters must have shape \[..., 8\] \(sigma_0, .*got shape \[3\]",
+    ):
         model.rate(**{name: value for name, value in arguments(front, model).items() if name != "dt"},
                    parameters=front.array([1.0, 2.0, 3.0]))  # fmt: skip
 
 
-OUT_OF_RANGE = {"sigma_0": (0.0, "> 0"), "sigma_2": (-0.1, ">= 0"), "breakaway_ratio": (1.0, r"in \[0, 1\)")}
+OUT_OF_RANGE = {
+    "sigma_0": (0.0, "> 0"),
+    "sigma_2": (-0.1, ">= 0"),
+    "breakaway_ratio": (1.0, r"in \[0, 1\)"),
+}
 
 
 @every_kind
 @pytest.mark.parametrize("name", OUT_OF_RANGE)
 def test_parameters_have_the_ranges_of_compiled_rollouts(front, kind, name):
-    model, (value, rule) = front.model(kind), OUT_OF_RANGE[name]
-    numbers = LAW.numbers._asdict() | {"contact_radius": 0.01, "second_moment": 1e-4, "centre_x": 0.0, "centre_y": 0.0}
+    model = front.model(kind)
+    (value, rule) = OUT_OF_RANGE[name]
+    numbers = LAW.numbers._asdict() | {
+        "contact_radius": 0.01,
+        "second_moment": 1e-4,
+        "centre_x": 0.0,
+        "centre_y": 0.0,
+    }
     whole = front.array([(numbers | {name: value})[each] for each in model.names])
-    refuses(lambda: model.step(**arguments(front, model), parameters=whole), name, f"be {rule}")
+    refuses(
+        lambda: model.step(**arguments(front, model), parameters=whole),
+        name,
+        f"be {rule}",
+    )
     if isinstance(front, Jax):
         record = type(model.parameters)(*whole)
         refuses(lambda: model.replace(parameters=record), name, f"be {rule}")

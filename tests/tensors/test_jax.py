@@ -56,11 +56,13 @@ def double_precision():
 def pairs(kind: str, law: str):
     """The same model in NumPy and in JAX."""
     if kind == "distributed":
-        return pf.DistributedModel(PATCH, LAWS[law]), pj.DistributedModel(PATCH, LAWS[law])
+        return pf.DistributedModel(PATCH, LAWS[law]), pj.DistributedModel(
+            PATCH, LAWS[law]
+        )
     surface = SURFACES[kind](PATCH)
-    return pf.ReducedModelPublished(PATCH, LAWS[law], surface=surface), pj.ReducedModelPublished(
-        PATCH, LAWS[law], surface
-    )
+    return pf.ReducedModelPublished(
+        PATCH, LAWS[law], surface=surface
+    ), pj.ReducedModelPublished(PATCH, LAWS[law], surface)
 
 
 def states(model, count: int, seed: int = 0) -> np.ndarray:
@@ -75,7 +77,11 @@ def states(model, count: int, seed: int = 0) -> np.ndarray:
 def twists(count: int, seed: int = 0) -> np.ndarray:
     """Twists around the Stribeck speed; some at rest, pure spins, pure slides, and along the axes."""
     twist = np.random.default_rng(seed).normal(size=(count, 3)) * (1e-3, 1e-3, 0.3)
-    twist[0], twist[1:5, :2], twist[5:9, 2], twist[9:12, 0], twist[12:15, 1:] = 0.0, 0.0, 0.0, 0.0, 0.0
+    twist[0] = 0.0
+    twist[1:5, :2] = 0.0
+    twist[5:9, 2] = 0.0
+    twist[9:12, 0] = 0.0
+    twist[12:15, 1:] = 0.0
     return twist
 
 
@@ -83,7 +89,12 @@ def sway(count: int, dt: float, omega: float = 0.3) -> np.ndarray:
     """A motion to and fro, with spin, that sticks and slides and is never at rest."""
     t = np.arange(count) * dt
     return np.stack(
-        [2e-3 * np.sin(300.0 * t) + 1e-4, 1e-3 * np.cos(200.0 * t), omega * np.sin(150.0 * t) + 0.02], axis=-1
+        [
+            2e-3 * np.sin(300.0 * t) + 1e-4,
+            1e-3 * np.cos(200.0 * t),
+            omega * np.sin(150.0 * t) + 0.02,
+        ],
+        axis=-1,
     )
 
 
@@ -100,30 +111,46 @@ def close(actual, expected, tolerance: float = 1e-12):
 
 def test_steady_sliding_depends_on_mu_c_and_the_load_alone():
     # Far above v_s: f = -(mu_c + sigma_2 v) f_N, and the shape of the patch has no say in a slide.
-    model, speed, load = pairs("table", "elasto-plastic")[1], 0.05, 2.0
+    model = pairs("table", "elasto-plastic")[1]
+    speed = 0.05
+    load = 2.0
 
     def force(parameters, twist, load):
         slide = jnp.tile(twist, (20, 1))
-        return pj.rollout(model.replace(parameters=parameters), None, slide, load, 1e-2).wrenches[-1, 0]
+        return pj.rollout(
+            model.replace(parameters=parameters), None, slide, load, 1e-2
+        ).wrenches[-1, 0]
 
-    slopes = jax.jit(jax.grad(force, argnums=(0, 1, 2)))(model.parameters, jnp.array([speed, 0.0, 0.0]), load)
+    slopes = jax.jit(jax.grad(force, argnums=(0, 1, 2)))(
+        model.parameters, jnp.array([speed, 0.0, 0.0]), load
+    )
     by_parameter = slopes[0]._asdict()
-    assert by_parameter.pop("mu_c") == pytest.approx(-load, rel=1e-9)  # rounding and what is left of the transient
+    assert by_parameter.pop("mu_c") == pytest.approx(
+        -load, rel=1e-9
+    )  # rounding and what is left of the transient
     assert by_parameter.pop("sigma_2") == pytest.approx(-speed * load, rel=1e-9)
     assert slopes[1][0] == pytest.approx(-0.2 * load, rel=1e-9)
     assert slopes[2] == pytest.approx(-(1.0 + 0.2 * speed), rel=1e-9)
     sizes = model.parameters._asdict()
-    for name, slope in by_parameter.items():  # relative sensitivities; of |h| only rounding is left
+    for (
+        name,
+        slope,
+    ) in by_parameter.items():  # relative sensitivities; of |h| only rounding is left
         assert abs(slope * sizes[name]) < 1e-9, name
 
 
 def test_a_stuck_contact_is_a_spring():
     # Elasto-plastic and far from breakaway: f = -(sigma_0 x + (sigma_1 + sigma_2) v) f_N, whatever mu is.
-    model, load, dt, count = pairs("ellipsoid", "elasto-plastic")[1], 2.0, 1e-4, 100
+    model = pairs("ellipsoid", "elasto-plastic")[1]
+    load = 2.0
+    dt = 1e-4
+    count = 100
     slow = np.tile([1e-5, 0.0, 0.0], (count, 1))
 
     def force(parameters):
-        return pj.rollout(model.replace(parameters=parameters), None, slow, load, dt).wrenches[-1, 0]
+        return pj.rollout(
+            model.replace(parameters=parameters), None, slow, load, dt
+        ).wrenches[-1, 0]
 
     slopes = jax.jit(jax.grad(force))(model.parameters)
     assert slopes.sigma_0 == pytest.approx(-1e-5 * count * dt * load, rel=1e-12)
@@ -134,7 +161,8 @@ def test_a_stuck_contact_is_a_spring():
 
 def test_wrench_is_linear_in_the_weights_of_the_cells():
     numpy_model, model = pairs("distributed", "wide")
-    state, twist = states(numpy_model, 1, seed=3)[0] + 1e-7, twists(20)[-1]
+    state = states(numpy_model, 1, seed=3)[0] + 1e-7
+    twist = twists(20)[-1]
 
     @jax.jit
     @jax.jacobian
@@ -153,20 +181,29 @@ def test_wrench_is_linear_in_the_weights_of_the_cells():
 def test_forward_values_are_those_of_numpy(kind, law):
     numpy_model, model = pairs(kind, law)
     count = 200
-    z, twist, load = states(numpy_model, count), twists(count), np.random.default_rng(1).uniform(0.0, 2.0, count)
+    z = states(numpy_model, count)
+    twist = twists(count)
+    load = np.random.default_rng(1).uniform(0.0, 2.0, count)
     load[5::9] = 0.0
     close(jax.jit(pj.rate)(model, z, twist, load), numpy_model.rate(z, twist, load))
     close(jax.jit(pj.wrench)(model, z, twist, load), numpy_model.wrench(z, twist, load))
     step = jax.jit(pj.step)
     for dt in (1e-6, 1e-4, 1e-2):
-        for actual, expected in zip(step(model, z, twist, load, dt), numpy_model.step(z, twist, load, dt), strict=True):
+        for actual, expected in zip(
+            step(model, z, twist, load, dt),
+            numpy_model.step(z, twist, load, dt),
+            strict=True,
+        ):
             close(actual, expected)
 
 
 @every_model
 def test_rollouts_are_those_of_numpy(kind):
     numpy_model, model = pairs(kind, "elasto-plastic")
-    motion, loads, state, expected = sway(300, 1e-4), np.linspace(0.5, 2.0, 300), numpy_model.rest(), []
+    motion = sway(300, 1e-4)
+    loads = np.linspace(0.5, 2.0, 300)
+    state = numpy_model.rest()
+    expected = []
     loads[100:110] = 0.0
     for twist, load in zip(motion, loads, strict=True):
         state, wrench = numpy_model.step(state, twist, load, 1e-4)
@@ -176,7 +213,12 @@ def test_rollouts_are_those_of_numpy(kind):
     close(actual.state, state, 1e-11)  # 300 steps of rounding
 
 
-EDGES = [[x, y, s] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) for s in (-1.0, -0.0, 0.0, 1.0)]
+EDGES = [
+    [x, y, s]
+    for x in (-1.0, 0.0, 1.0)
+    for y in (-1.0, 0.0, 1.0)
+    for s in (-1.0, -0.0, 0.0, 1.0)
+]
 NEAR_THE_AXIS = [[1e-6, 0.0, 1.0], [2e-6, -1e-6, -1.0], [-1e-7, 1e-9, -1.0]]
 
 
@@ -184,24 +226,39 @@ NEAR_THE_AXIS = [[1e-6, 0.0, 1.0], [2e-6, -1e-6, -1.0], [-1e-7, 1e-9, -1.0]]
 def test_derivative_of_sliding_is_that_of_the_kernel(kind):
     numpy_model, model = pairs(kind, "plain")
     surface = model.surface
-    sliding = functools.partial(surfaces.sliding, xp, surface.kind, surface.size, surface.data)
-    slope = jax.jit(jax.vmap(jax.jacrev(lambda twist: sliding(twist, xp.norm(twist, -1)))))
+    sliding = functools.partial(
+        surfaces.sliding, xp, surface.kind, surface.size, surface.data
+    )
+    slope = jax.jit(
+        jax.vmap(jax.jacrev(lambda twist: sliding(twist, xp.norm(twist, -1))))
+    )
     scaled = np.concatenate([twists(60)[20:] * (1.0, 1.0, 0.005), EDGES, NEAR_THE_AXIS])
-    speed, wanted = np.linalg.norm(scaled, axis=-1), np.tile(np.eye(3), (len(scaled), 1, 1))  # at rest
+    speed = np.linalg.norm(scaled, axis=-1)
+    wanted = np.tile(np.eye(3), (len(scaled), 1, 1))  # at rest
     units = scaled[speed > 0.0] / speed[speed > 0.0, None]
     along = np.einsum("mi,mj->mij", numpy_model.surface.direction(units), units)
     wanted[speed > 0.0] = numpy_model.surface.direction_slope(units) + along
     assert np.abs(slope(scaled) - wanted).max() < 1e-11
 
 
-@pytest.mark.parametrize(("kind", "law"), [("ellipsoid", "plain"), ("table", "wide"), ("distributed", "wide")])
+@pytest.mark.parametrize(
+    ("kind", "law"),
+    [("ellipsoid", "plain"), ("table", "wide"), ("distributed", "wide")],
+)
 def test_gradients_are_central_differences(kind, law):
     numpy_model, model = pairs(kind, law)
-    count, dt = 40, 1e-4
-    motion, loads = sway(count, dt), np.linspace(0.5, 2.0, count)
+    count = 40
+    dt = 1e-4
+    motion = sway(count, dt)
+    loads = np.linspace(0.5, 2.0, count)
     z0 = states(numpy_model, 2, seed=5)[1] * 0.2
     weights = np.random.default_rng(2).normal(size=(count, 3)) * (1.0, 1.0, 100.0)
-    sizes = (model.parameters, 1e-6 * np.ones_like(z0), 1e-3 * np.ones_like(motion), np.ones_like(loads))
+    sizes = (
+        model.parameters,
+        1e-6 * np.ones_like(z0),
+        1e-3 * np.ones_like(motion),
+        np.ones_like(loads),
+    )
     if z0.ndim == 1:
         sizes[1][2] *= numpy_model.surface.contact_radius
     flat_sizes, unravel = ravel_pytree(sizes)
@@ -215,12 +272,17 @@ def test_gradients_are_central_differences(kind, law):
 
     gradient = jax.jit(jax.grad(loss))(np.zeros_like(start))
     random = np.random.default_rng(4)
-    directions = [*np.eye(len(start))[: len(model.parameters)], *random.normal(size=(5, len(start)))]
+    directions = [
+        *np.eye(len(start))[: len(model.parameters)],
+        *random.normal(size=(5, len(start))),
+    ]
     for direction in directions:
         h = 1e-5  # error of the difference: 1e-10 of curvature, 1e-11 of rounding
         expected = (loss(h * direction) - loss(-h * direction)) / (2.0 * h)
         small = 1e-7 * np.linalg.norm(gradient)
-        assert float(gradient @ direction) == pytest.approx(float(expected), rel=1e-5, abs=small)
+        assert float(gradient @ direction) == pytest.approx(
+            float(expected), rel=1e-5, abs=small
+        )
 
 
 # ---------------------------------------------------------------------- kinks
@@ -228,19 +290,31 @@ def test_gradients_are_central_differences(kind, law):
 
 def hard(model) -> tuple[np.ndarray, np.ndarray]:
     """Twists and loads that meet every kink: rest, no load, edges and corners of table cells, steady sliding."""
-    x, y, r = 0.0, 0.0, 0.005
+    x = 0.0
+    y = 0.0
+    r = 0.005
     if isinstance(model, pj.ReducedModelPublished):
-        x, y, r = (float(getattr(model.parameters, name)) for name in ("centre_x", "centre_y", "contact_radius"))
+        x, y, r = (
+            float(getattr(model.parameters, name))
+            for name in ("centre_x", "centre_y", "contact_radius")
+        )
     edges = np.array([*EDGES, *NEAR_THE_AXIS]) * (1.0, 1.0, 1.0 / r)
-    edges[:, :2] += edges[:, 2:] * (y, -x)  # these twists are scaled ones about the centre of pressure
+    edges[:, :2] += edges[:, 2:] * (
+        y,
+        -x,
+    )  # these twists are scaled ones about the centre of pressure
     slide = np.tile([0.05, 0.0, 0.0], (20, 1))
-    motion = np.concatenate([1e-3 * edges, np.zeros((3, 3)), 1e-200 * edges, 5e-4 * edges, slide])
+    motion = np.concatenate(
+        [1e-3 * edges, np.zeros((3, 3)), 1e-200 * edges, 5e-4 * edges, slide]
+    )
     loads = np.ones(len(motion))
     loads[:-20:5] = 0.0
     return motion, loads
 
 
-@pytest.mark.parametrize(("kind", "law"), [("distributed", "plain"), ("distributed", "elasto-plastic")])
+@pytest.mark.parametrize(
+    ("kind", "law"), [("distributed", "plain"), ("distributed", "elasto-plastic")]
+)
 def test_gradients_are_finite_at_kinks(kind, law):
     model = pairs(kind, law)[1]
 
@@ -248,7 +322,9 @@ def test_gradients_are_finite_at_kinks(kind, law):
         run = pj.rollout(model, state, motion, loads, 1e-4)
         return run.wrenches.sum() + run.state.sum()
 
-    full = jnp.zeros_like(model.rest()).at[0].set(1e-6)  # largest deflection of a slide far above v_s
+    full = (
+        jnp.zeros_like(model.rest()).at[0].set(1e-6)
+    )  # largest deflection of a slide far above v_s
     gradient = jax.jit(jax.grad(loss, argnums=(0, 1, 2, 3)))
     for state in (model.rest(), full):
         for part in jax.tree.leaves(gradient(model, state, *hard(model))):
@@ -257,12 +333,19 @@ def test_gradients_are_finite_at_kinks(kind, law):
 
 @pytest.mark.parametrize(
     ("kind", "law"),
-    [("ellipsoid", "plain"), ("published", "elasto-plastic"), ("table", "wide"), ("cells", "elasto-plastic")],
+    [
+        ("ellipsoid", "plain"),
+        ("published", "elasto-plastic"),
+        ("table", "wide"),
+        ("cells", "elasto-plastic"),
+    ],
 )
 def test_eager_and_adjoint_agree_at_kinks_too(kind, law):
     model = pairs(kind, law)[1]
     # centre and radius without rounding: else that, and not the model, says on which side of a kink a twist is
-    whole = model.parameters._replace(centre_x=0.0, centre_y=0.0, contact_radius=2.0**-8)
+    whole = model.parameters._replace(
+        centre_x=0.0, centre_y=0.0, contact_radius=2.0**-8
+    )
     model = model.replace(parameters=whole)
     motion, loads = hard(model)
     sides = np.random.default_rng(0).normal(size=motion.shape) * (1.0, 1.0, 100.0)
@@ -270,19 +353,28 @@ def test_eager_and_adjoint_agree_at_kinks_too(kind, law):
     def loss(parameters, state, motion, loads, method):
         changed = model.replace(parameters=parameters)
         run = pj.rollout(changed, state, motion, loads, 1e-4, method=method)
-        return (run.wrenches * sides).sum() + (run.state * jnp.array([1e6, 1e6, 1e8])).sum()
+        return (run.wrenches * sides).sum() + (
+            run.state * jnp.array([1e6, 1e6, 1e8])
+        ).sum()
 
     slopes = jax.jit(jax.value_and_grad(loss, argnums=(0, 1, 2, 3)), static_argnums=4)
     for state, twist, load in (
         (np.array([1e-6, 0.0, 0.0]), motion, loads),
-        (np.zeros(3), np.resize(sway(300, 1e-4), motion.shape), np.linspace(0.5, 2.0, len(loads))),
+        (
+            np.zeros(3),
+            np.resize(sway(300, 1e-4), motion.shape),
+            np.linspace(0.5, 2.0, len(loads)),
+        ),
     ):
         (value, eager), (same, adjoint) = (
-            slopes(model.parameters, state, twist, load, method) for method in ("eager", "adjoint")
+            slopes(model.parameters, state, twist, load, method)
+            for method in ("eager", "adjoint")
         )
         assert float(value) == pytest.approx(float(same), rel=1e-11)
         sizes = [*(abs(p) for p in model.parameters), 1e-6, 1e-3, 1.0]
-        for size, first, second in zip(sizes, jax.tree.leaves(eager), jax.tree.leaves(adjoint), strict=True):
+        for size, first, second in zip(
+            sizes, jax.tree.leaves(eager), jax.tree.leaves(adjoint), strict=True
+        ):
             assert np.isfinite(first).all() and np.isfinite(second).all()
             # 1e-9 of the gradient, or where it is zero 1e-12 of the value per share of the parameter
             scale = np.abs(second).max() + 1e-3 * abs(same) / (size + 1e-3)
@@ -296,16 +388,30 @@ def test_adjoint_under_vmap_and_in_single_precision():
 
     def loss(mu, dt, load, motion, method):
         changed = model.replace(parameters=model.parameters._replace(mu_c=mu))
-        return (pj.rollout(changed, None, motion, load, dt, method=method).wrenches ** 2).sum()
+        return (
+            pj.rollout(changed, None, motion, load, dt, method=method).wrenches ** 2
+        ).sum()
 
     several = jnp.linspace(0.5, 1.1, 3)
-    for axes in ((0, None, None, None), (0, None, 0, None), (0, 0, None, None), (None, None, None, 0)):
+    for axes in (
+        (0, None, None, None),
+        (0, None, 0, None),
+        (0, 0, None, None),
+        (None, None, None, 0),
+    ):
         arguments = [
-            value if axis is None else (several if i < 3 else jnp.stack([motion, 2.0 * motion])) * (1e-4, 1.0)[i != 1]
-            for i, (axis, value) in enumerate(zip(axes, (0.8, 1e-4, 1.0, motion), strict=True))
+            value
+            if axis is None
+            else (several if i < 3 else jnp.stack([motion, 2.0 * motion]))
+            * (1e-4, 1.0)[i != 1]
+            for i, (axis, value) in enumerate(
+                zip(axes, (0.8, 1e-4, 1.0, motion), strict=True)
+            )
         ]
         by_method = [
-            jax.jit(jax.vmap(jax.grad(functools.partial(loss, method=method)), axes))(*arguments)
+            jax.jit(jax.vmap(jax.grad(functools.partial(loss, method=method)), axes))(
+                *arguments
+            )
             for method in ("eager", "adjoint")
         ]
         close(by_method[0], by_method[1], 1e-9)
@@ -314,7 +420,14 @@ def test_adjoint_under_vmap_and_in_single_precision():
     slopes = [slope(0.8, 1e-4, 1.0, pair, method) for method in ("eager", "adjoint")]
     assert float(slopes[0]) == pytest.approx(float(slopes[1]), rel=1e-9)
     single = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), model)
-    run = pj.rollout(single, None, motion.astype(np.float32), np.float32(1.0), np.float32(1e-4), method="adjoint")
+    run = pj.rollout(
+        single,
+        None,
+        motion.astype(np.float32),
+        np.float32(1.0),
+        np.float32(1e-4),
+        method="adjoint",
+    )
     assert run.wrenches.dtype == run.state.dtype == jnp.float32
     close(run.wrenches, pj.rollout(model, None, motion, 1.0, 1e-4).wrenches, 1e-4)
 
@@ -322,18 +435,29 @@ def test_adjoint_under_vmap_and_in_single_precision():
 def test_adjoint_says_what_it_cannot_differentiate():
     model = pairs("published", "wide")[1]
     motion = sway(5, 1e-4)
-    with pytest.raises(InvalidValueError, match="surface must be held fixed with method='adjoint'"):
-        jax.grad(lambda m: pj.rollout(m, None, motion, 1.0, 1e-4, method="adjoint").wrenches.sum())(model)
-    with pytest.raises(InvalidValueError, match="positions must be held fixed with method='adjoint'"):
-        jax.grad(lambda m: pj.rollout(m, None, motion, 1.0, 1e-4, method="adjoint").wrenches.sum())(
-            pairs("distributed", "wide")[1]
-        )
+    with pytest.raises(
+        InvalidValueError, match="surface must be held fixed with method='adjoint'"
+    ):
+        jax.grad(
+            lambda m: pj.rollout(
+                m, None, motion, 1.0, 1e-4, method="adjoint"
+            ).wrenches.sum()
+        )(model)
+    with pytest.raises(
+        InvalidValueError, match="positions must be held fixed with method='adjoint'"
+    ):
+        jax.grad(
+            lambda m: pj.rollout(
+                m, None, motion, 1.0, 1e-4, method="adjoint"
+            ).wrenches.sum()
+        )(pairs("distributed", "wide")[1])
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_the_adjoint_of_cells_takes_the_steps_and_slopes_of_jax(law):
     reference, model = pairs("distributed", law)
-    motion, sides = sway(60, 1e-4), np.random.default_rng(0).normal(size=(60, 3)) * (1.0, 1.0, 100.0)
+    motion = sway(60, 1e-4)
+    sides = np.random.default_rng(0).normal(size=(60, 3)) * (1.0, 1.0, 100.0)
     loads = np.linspace(0.5, 2.0, 60)
     loads[30] = 0.0
 
@@ -342,13 +466,17 @@ def test_the_adjoint_of_cells_takes_the_steps_and_slopes_of_jax(law):
         run = pj.rollout(changed, state, motion, loads, 1e-4, method=method)
         return (run.wrenches * sides).sum() + 1e6 * run.state.sum(), run.wrenches
 
-    state, slopes = (
-        states(reference, 2)[1],
-        jax.jit(jax.grad(loss, argnums=(0, 1, 2, 3), has_aux=True), static_argnums=4),
+    state = states(reference, 2)[1]
+    slopes = jax.jit(
+        jax.grad(loss, argnums=(0, 1, 2, 3), has_aux=True), static_argnums=4
     )
-    (eager, _), (adjoint, wrenches) = (slopes(model.parameters, state, motion, loads, m) for m in ("eager", "adjoint"))
+    (eager, _), (adjoint, wrenches) = (
+        slopes(model.parameters, state, motion, loads, m) for m in ("eager", "adjoint")
+    )
     close(wrenches, pf.rollout(reference, state, motion, loads, 1e-4).wrenches, 1e-11)
-    for one, other in zip(jax.tree.leaves(eager), jax.tree.leaves(adjoint), strict=True):
+    for one, other in zip(
+        jax.tree.leaves(eager), jax.tree.leaves(adjoint), strict=True
+    ):
         close(one, other, 1e-8)
 
 
@@ -361,7 +489,9 @@ def test_the_adjoint_of_cells_takes_the_steps_and_slopes_of_jax(law):
 @settings(max_examples=50, deadline=None)
 def test_gradients_are_finite_everywhere(twist, state, load, dt):
     model = pairs("published", "elasto-plastic")[1]
-    for part in jax.tree.leaves(_slopes()(model, jnp.array(state), jnp.array(twist), load, dt)):
+    for part in jax.tree.leaves(
+        _slopes()(model, jnp.array(state), jnp.array(twist), load, dt)
+    ):
         assert np.isfinite(part).all()
 
 
@@ -374,8 +504,12 @@ def test_at_rest_friction_changes_with_the_twist_as_that_of_the_ellipsoid():
     # The kernels' convention: du/dV_S is the identity at rest, and |V| has slope 0 there.
     for kind in ("published", "ellipsoid"):
         model = pairs(kind, "elasto-plastic")[1]
-        slope = jax.jit(jax.jacobian(lambda twist, m=model: pj.rate(m, m.rest(), twist, 1.0)))(jnp.zeros(3))
-        x, y, r = model.parameters.centre_x, model.parameters.centre_y, model.parameters.contact_radius
+        slope = jax.jit(
+            jax.jacobian(lambda twist, m=model: pj.rate(m, m.rest(), twist, 1.0))
+        )(jnp.zeros(3))
+        x = model.parameters.centre_x
+        y = model.parameters.centre_y
+        r = model.parameters.contact_radius
         close(slope, [[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, r * r]])
 
 
@@ -405,7 +539,10 @@ def test_leading_axes_broadcast():
     roll_out = jax.jit(pj.rollout)
     run = roll_out(model, np.full(3, 1e-7), motion, np.array([[1.0], [2.0]]), 1e-4)
     assert run.wrenches.shape == (2, 20, 3) and run.state.shape == (2, 3)
-    close(run.wrenches[1], roll_out(model, np.full(3, 1e-7), motion[1], 2.0, 1e-4).wrenches)
+    close(
+        run.wrenches[1],
+        roll_out(model, np.full(3, 1e-7), motion[1], 2.0, 1e-4).wrenches,
+    )
 
 
 @pytest.mark.parametrize("kind", ["table", "distributed"])
@@ -414,18 +551,26 @@ def test_single_precision_stays_single(kind):
     single = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), model)
     motion = sway(50, 1e-4).astype(np.float32)
     run, slopes = jax.jit(
-        jax.value_and_grad(lambda m: pj.rollout(m, None, motion, np.float32(1.0), np.float32(1e-4)).wrenches.sum())
+        jax.value_and_grad(
+            lambda m: pj.rollout(
+                m, None, motion, np.float32(1.0), np.float32(1e-4)
+            ).wrenches.sum()
+        )
     )(single)
     assert run.dtype == jnp.float32
     for part in jax.tree.leaves(slopes):
         assert part.dtype == jnp.float32 and np.isfinite(part).all()
     expected = pj.rollout(model, None, sway(50, 1e-4), 1.0, 1e-4).wrenches.sum()
-    assert float(run) == pytest.approx(float(expected), rel=1e-3)  # 1e-7 in z is 0.1 of rounding times sigma_0
+    assert float(run) == pytest.approx(
+        float(expected), rel=1e-3
+    )  # 1e-7 in z is 0.1 of rounding times sigma_0
 
 
 def test_wrong_input_is_named():
     model = pairs("ellipsoid", "plain")[1]
-    with pytest.raises(InvalidValueError, match=r"twist must have shape \[\.\.\., T, 3\]"):
+    with pytest.raises(
+        InvalidValueError, match=r"twist must have shape \[\.\.\., T, 3\]"
+    ):
         pj.rollout(model, None, np.zeros(3), 1.0, 1e-3)
     with pytest.raises(InvalidValueError, match="broadcast"):
         pj.rollout(model, None, np.zeros((4, 3)), np.ones(3), 1e-3)
@@ -433,7 +578,10 @@ def test_wrong_input_is_named():
         pj.rollout(model, None, np.zeros((4, 3)), 1.0, 1e-3, method="adjont")
     with pytest.raises(InvalidValueError, match="patch must be a ContactPatch"):
         pj.DistributedModel("disc", PLAIN)
-    with pytest.raises(InvalidValueError, match=r"model must be one of planarfriction.jax .* got planarfriction\.mod"):
+    with pytest.raises(
+        InvalidValueError,
+        match=r"model must be one of planarfriction.jax .* got planarfriction\.mod",
+    ):
         pj.rollout(pairs("ellipsoid", "plain")[0], None, np.zeros((4, 3)), 1.0, 1e-3)
 
 
@@ -466,6 +614,10 @@ def test_the_example_with_diffrax_sticks_slips_and_turns(tmp_path):
 
 @pytest.mark.parametrize("kind", [">f8", np.longdouble])
 def test_floats_that_jax_does_not_know_are_converted(kind):
-    model, twist = pj.DistributedModel(PATCH, PLAIN), np.array([0.01, 0.0, 1.0])
-    given, wanted = (model.step(model.rest(), each, 1.0, 1e-3)[1] for each in (twist.astype(kind), twist))
+    model = pj.DistributedModel(PATCH, PLAIN)
+    twist = np.array([0.01, 0.0, 1.0])
+    given, wanted = (
+        model.step(model.rest(), each, 1.0, 1e-3)[1]
+        for each in (twist.astype(kind), twist)
+    )
     assert np.array_equal(given, wanted)

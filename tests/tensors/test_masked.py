@@ -10,12 +10,18 @@ import pytest
 import planarfriction as pf
 
 
-@pytest.mark.parametrize("front", [pytest.param(name, marks=getattr(pytest.mark, name)) for name in ("jax", "torch")])
+@pytest.mark.parametrize(
+    "front",
+    [pytest.param(name, marks=getattr(pytest.mark, name)) for name in ("jax", "torch")],
+)
 def test_a_mask_that_masks_nothing_is_left_out(front):
     pytest.importorskip(front)
     models = importlib.import_module(f"planarfriction.{front}")
-    model = models.ReducedModel(pf.ContactPatch.disc(0.02), pf.LuGre(mu_c=0.3, mu_s=0.4))
-    twist, load = np.array([0.01, 0.0, 1.0]), np.array(2.0)
+    model = models.ReducedModel(
+        pf.ContactPatch.disc(0.02), pf.LuGre(mu_c=0.3, mu_s=0.4)
+    )
+    twist = np.array([0.01, 0.0, 1.0])
+    load = np.array(2.0)
     _, plain = model.step(model.rest(), twist, load, 1e-3)
     _, masked = model.step(model.rest(), np.ma.array(twist), np.ma.array(load), 1e-3)
     assert masked.tolist() == plain.tolist()

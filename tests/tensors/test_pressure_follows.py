@@ -27,7 +27,10 @@ KINDS = {
 }
 
 QUICK = ("few cells with a metric",)
-EACH = [pytest.param(kind, marks=() if kind in QUICK else pytest.mark.slow) for kind in KINDS]
+EACH = [
+    pytest.param(kind, marks=() if kind in QUICK else pytest.mark.slow)
+    for kind in KINDS
+]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -43,20 +46,35 @@ def test_steps_and_derivatives_are_those_of_numpy(kind):
     """Derivatives by the moments are those of central differences, as far as the rule is exact: 1e-7 of the patch."""
     patch, name, options = KINDS[kind]
     model, ours = (getattr(end, name)(patch, LAW, **options) for end in (pf, front))
-    rng, load = np.random.default_rng(0), np.array([1.0, 2.0, 1.5])
-    state, twist = 1e-7 * rng.normal(size=(3, *model.state_shape)), rng.normal(size=(3, 3)) * (0.01, 0.01, 0.1)
-    moments = load[:, None] * np.array([(0.003, -0.005), (0.02, 0.03), (-0.1, 0.0)])  # kern, beyond it, beyond the edge
+    rng = np.random.default_rng(0)
+    load = np.array([1.0, 2.0, 1.5])
+    state = 1e-7 * rng.normal(size=(3, *model.state_shape))
+    twist = rng.normal(size=(3, 3)) * (0.01, 0.01, 0.1)
+    moments = load[:, None] * np.array(
+        [(0.003, -0.005), (0.02, 0.03), (-0.1, 0.0)]
+    )  # kern, beyond it, beyond the edge
     new, wrench = model.step(state, twist, load, 1e-3, moments=moments)
     found, pulled = ours.step(jnp.asarray(state), twist, load, 1e-3, moments=moments)
     np.testing.assert_allclose(found, new, rtol=1e-7, atol=1e-15)
     np.testing.assert_allclose(pulled, wrench, rtol=1e-6, atol=1e-8)
 
-    slopes = jax.jacobian(lambda m: ours.step(jnp.asarray(state[1]), twist[1], load[1], 1e-3, moments=m)[1])
-    h, held = 1e-6, (state[1], twist[1], load[1], 1e-3)
-    ends = [[model.step(*held, moments=moments[1] + s * b)[1] for s in (1.0, -1.0)] for b in h * np.eye(2)]
+    slopes = jax.jacobian(
+        lambda m: ours.step(jnp.asarray(state[1]), twist[1], load[1], 1e-3, moments=m)[
+            1
+        ]
+    )
+    h = 1e-6
+    held = (state[1], twist[1], load[1], 1e-3)
+    ends = [
+        [model.step(*held, moments=moments[1] + s * b)[1] for s in (1.0, -1.0)]
+        for b in h * np.eye(2)
+    ]
     differences = np.stack([(one - other) / (2.0 * h) for one, other in ends], -1)
     np.testing.assert_allclose(
-        slopes(jnp.asarray(moments[1])), differences, rtol=1e-3, atol=1e-3 * abs(differences).max()
+        slopes(jnp.asarray(moments[1])),
+        differences,
+        rtol=1e-3,
+        atol=1e-3 * abs(differences).max(),
     )
 
 
@@ -73,5 +91,7 @@ def test_cells_press_as_in_the_kernel_however_uneven_their_shares_and_far_the_ce
     out = np.empty_like(share)
     tilt_many(*away, share, centre, out)
     narrow = np.zeros((300, 1), bool)
-    found = pressing(*map(jnp.asarray, (*away, share, centre[:, :1], centre[:, 1:], narrow)))
+    found = pressing(
+        *map(jnp.asarray, (*away, share, centre[:, :1], centre[:, 1:], narrow))
+    )
     np.testing.assert_array_equal(found, out > 0.0)

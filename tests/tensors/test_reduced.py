@@ -8,7 +8,9 @@ import pytest
 
 import planarfriction as pf
 
-FRONTS = [pytest.param(name, marks=getattr(pytest.mark, name)) for name in ("jax", "torch")]
+FRONTS = [
+    pytest.param(name, marks=getattr(pytest.mark, name)) for name in ("jax", "torch")
+]
 LAW = pf.LuGre(mu_c=0.3, mu_s=0.4, elasto_plastic=0.9)
 
 
@@ -20,6 +22,8 @@ def front(request):
 
 @pytest.mark.parametrize("option", ["parts", "segments", "speeds", "load_error"])
 def test_an_option_that_it_had_says_what_to_write_instead(front, option):
-    with pytest.raises(pf.FrictionError, match=f"^{option} must be left out: write cells=") as caught:
+    with pytest.raises(
+        pf.FrictionError, match=f"^{option} must be left out: write cells="
+    ) as caught:
         front.ReducedModel(pf.ContactPatch.disc(0.02), LAW, **{option: 1})
     assert "\n" not in str(caught.value)

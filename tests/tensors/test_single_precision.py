@@ -12,7 +12,10 @@ from tests.support import single_precision as single
 LIMIT, BENDING = 1e-4, 1e-3
 """Largest error of wrenches in the load; of derivatives in the largest of a contact, or a tenth of that of all."""
 
-EACH = [pytest.param(name, marks=() if name == "feet on a line" else pytest.mark.slow) for name in single.PATCHES]
+EACH = [
+    pytest.param(name, marks=() if name == "feet on a line" else pytest.mark.slow)
+    for name in single.PATCHES
+]
 
 
 def in_torch(patch, precision: str):
@@ -42,7 +45,9 @@ def in_jax(patch, precision: str):
 
     def of_numbers(*inputs):
         with jax.enable_x64(precision == "float64"):
-            return jax.tree.map(np.asarray, slopes(*(each.astype(precision) for each in inputs)))
+            return jax.tree.map(
+                np.asarray, slopes(*(each.astype(precision) for each in inputs))
+            )
 
     return of_numbers
 
@@ -64,11 +69,15 @@ def compare(front, name: str, count: int, seed: int) -> tuple[float, float]:
     inputs = single.drawn(model, count, seed)
     slopes, wrenches = front(patch, "float32")(*inputs)
     assert wrenches.dtype == np.float32
-    settled, bent = single.settled(model, inputs), 0.0
+    settled = single.settled(model, inputs)
+    bent = 0.0
     assert settled.mean() > 0.3
     for got, wanted in zip(slopes, front(patch, "float64")(*inputs)[0], strict=True):
         assert got.dtype == np.float32 and np.isfinite(got).all()
-        rows = (got - wanted)[settled].reshape(settled.sum(), -1), wanted[settled].reshape(settled.sum(), -1)
+        rows = (
+            (got - wanted)[settled].reshape(settled.sum(), -1),
+            wanted[settled].reshape(settled.sum(), -1),
+        )
         off, size = (np.abs(each).max(1) for each in rows)
         bent = max(bent, (off / np.maximum(size, 0.1 * size.max())).max())
     return single.error(model, inputs, wrenches), bent
@@ -90,19 +99,39 @@ def test_rollouts_and_gradients_of_torch(name):
 
     def made(dtype):
         if name == "table":
-            return pt.ReducedPlanarLuGre(radius=0.004, surface=bridged.SURFACES["table"][2], dtype=dtype)
+            return pt.ReducedPlanarLuGre(
+                radius=0.004, surface=bridged.SURFACES["table"][2], dtype=dtype
+            )
         return pt.ReducedModel(bridged.PATCH, bridged.LAW, cells=4, dtype=dtype)
 
-    found, wanted = (bridged.of_torch(made(dtype)) for dtype in (torch.float32, torch.float64))
+    found, wanted = (
+        bridged.of_torch(made(dtype)) for dtype in (torch.float32, torch.float64)
+    )
     assert found.pop("kind") != wanted.pop("kind")
-    for part, limit in (("wrenches", LIMIT), ("state", LIMIT), ("gradient", BENDING), ("adjoint", BENDING)):
+    for part, limit in (
+        ("wrenches", LIMIT),
+        ("state", LIMIT),
+        ("gradient", BENDING),
+        ("adjoint", BENDING),
+    ):
         each = zip(leaves(found[part]), leaves(wanted[part]), strict=True)
-        assert max(np.abs(got - own).max() / np.abs(own).max() for got, own in each if own.any()) < limit
+        assert (
+            max(
+                np.abs(got - own).max() / np.abs(own).max()
+                for got, own in each
+                if own.any()
+            )
+            < limit
+        )
 
 
 def leaves(value):
     """Return the arrays in lists."""
-    return [each for part in value for each in leaves(part)] if isinstance(value, list) else [np.asarray(value, float)]
+    return (
+        [each for part in value for each in leaves(part)]
+        if isinstance(value, list)
+        else [np.asarray(value, float)]
+    )
 
 
 @pytest.mark.jax
@@ -122,16 +151,28 @@ def test_rollouts_of_jax_side_by_side():
     inputs = single.drawn(pf.DistributedModel(patch, single.LAW), 200, 3)
 
     def rollout(state, twist, load, dt, moments):
-        return jax.lax.scan(lambda z, _: model.step(z, twist, load, dt, moments=moments), state, None, length=1)[1][0]
+        return jax.lax.scan(
+            lambda z, _: model.step(z, twist, load, dt, moments=moments),
+            state,
+            None,
+            length=1,
+        )[1][0]
 
     with jax.enable_x64(False):  # other tests may have left it on
         model = DistributedModel(patch, single.LAW)
-        wrenches = np.asarray(jax.jit(jax.vmap(rollout))(*(each.astype(np.float32) for each in inputs)))
+        wrenches = np.asarray(
+            jax.jit(jax.vmap(rollout))(*(each.astype(np.float32) for each in inputs))
+        )
     assert wrenches.dtype == np.float32
-    assert single.error(pf.DistributedModel(patch, single.LAW), inputs, wrenches) < LIMIT
+    assert (
+        single.error(pf.DistributedModel(patch, single.LAW), inputs, wrenches) < LIMIT
+    )
 
 
-FRONTS = [pytest.param(in_torch, marks=pytest.mark.torch), pytest.param(in_jax, marks=pytest.mark.jax)]
+FRONTS = [
+    pytest.param(in_torch, marks=pytest.mark.torch),
+    pytest.param(in_jax, marks=pytest.mark.jax),
+]
 
 
 @pytest.mark.slow
@@ -139,5 +180,7 @@ FRONTS = [pytest.param(in_torch, marks=pytest.mark.torch), pytest.param(in_jax, 
 @pytest.mark.parametrize("front", FRONTS)
 def test_many_steps(front, name):
     worst = np.max([compare(front, name, 2000, seed) for seed in range(3, 6)], 0)
-    print(f"\n{front.__name__} {name}: wrenches {worst[0]:.1e}, derivatives {worst[1]:.1e}")
+    print(
+        f"\n{front.__name__} {name}: wrenches {worst[0]:.1e}, derivatives {worst[1]:.1e}"
+    )
     assert worst[0] < LIMIT and worst[1] < BENDING

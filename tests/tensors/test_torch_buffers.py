@@ -10,15 +10,29 @@ import pytest
 
 import planarfriction as pf
 
-torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
+torch = pytest.importorskip(
+    "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
+)
 
-from planarfriction.torch import DistributedModel, ReducedModel, ReducedModelPublished, rollout  # noqa: E402
+from planarfriction.torch import (  # noqa: E402
+    DistributedModel,
+    ReducedModel,
+    ReducedModelPublished,
+    rollout,
+)
 
 pytestmark = pytest.mark.torch
 
-PATCH = pf.ContactPatch.from_pressure(np.random.default_rng(4).uniform(0.0, 1.0, (5, 6)), 0.002, name="lopsided")
-OTHER = pf.ContactPatch.from_pressure(np.random.default_rng(4).uniform(0.0, 1.0, (5, 6)), 0.004, name="larger")
-PLAIN, ELASTIC = pf.LuGre(mu_s=1.2, gamma=1.7), pf.LuGre(mu_s=1.2, gamma=1.3, elasto_plastic=pf.ElastoPlastic(0.7))
+PATCH = pf.ContactPatch.from_pressure(
+    np.random.default_rng(4).uniform(0.0, 1.0, (5, 6)), 0.002, name="lopsided"
+)
+OTHER = pf.ContactPatch.from_pressure(
+    np.random.default_rng(4).uniform(0.0, 1.0, (5, 6)), 0.004, name="larger"
+)
+PLAIN, ELASTIC = (
+    pf.LuGre(mu_s=1.2, gamma=1.7),
+    pf.LuGre(mu_s=1.2, gamma=1.3, elasto_plastic=pf.ElastoPlastic(0.7)),
+)
 MODELS = {
     "reduced": functools.partial(ReducedModel, cells=12),
     "published": ReducedModelPublished,
@@ -27,16 +41,27 @@ MODELS = {
 T = 20
 
 every_model = pytest.mark.parametrize("kind", MODELS)
-every_way = pytest.mark.parametrize(("kind", "method"), [(kind, m) for kind in MODELS for m in ("adjoint", "eager")])
+every_way = pytest.mark.parametrize(
+    ("kind", "method"), [(kind, m) for kind in MODELS for m in ("adjoint", "eager")]
+)
 
 
-def module(kind: str, patch: pf.ContactPatch = PATCH, law: pf.LuGre = ELASTIC, **options):
+def module(
+    kind: str, patch: pf.ContactPatch = PATCH, law: pf.LuGre = ELASTIC, **options
+):
     return MODELS[kind](patch, law, **{"dtype": torch.float64, **options})
 
 
 def twists() -> torch.Tensor:
     t = 1e-4 * torch.arange(T, dtype=torch.float64)
-    return torch.stack([2e-3 * torch.sin(300 * t) + 1e-4, 1e-3 * torch.cos(200 * t), 0.3 * torch.sin(150 * t)], -1)
+    return torch.stack(
+        [
+            2e-3 * torch.sin(300 * t) + 1e-4,
+            1e-3 * torch.cos(200 * t),
+            0.3 * torch.sin(150 * t),
+        ],
+        -1,
+    )
 
 
 def wrenches(model, method: str) -> torch.Tensor:
@@ -48,8 +73,11 @@ def wrenches(model, method: str) -> torch.Tensor:
 
 @every_way
 def test_a_state_dict_carries_the_patch(kind, method):
-    model, other = module(kind), module(kind, OTHER)
-    assert not torch.allclose(wrenches(model, method), wrenches(other, method), rtol=1e-2)
+    model = module(kind)
+    other = module(kind, OTHER)
+    assert not torch.allclose(
+        wrenches(model, method), wrenches(other, method), rtol=1e-2
+    )
     model.load_state_dict(other.state_dict())
     assert torch.equal(wrenches(model, method), wrenches(other, method))
     assert model.law() == other.law() and model.lever == other.lever
@@ -57,21 +85,31 @@ def test_a_state_dict_carries_the_patch(kind, method):
 
 @every_way
 def test_models_that_are_stacked_keep_each_its_own_patch(kind, method):
-    models = [module(kind), module(kind, OTHER), module(kind, OTHER, pf.LuGre(0.5, 0.6, elasto_plastic=0.7, gamma=1.3))]
+    models = [
+        module(kind),
+        module(kind, OTHER),
+        module(kind, OTHER, pf.LuGre(0.5, 0.6, elasto_plastic=0.7, gamma=1.3)),
+    ]
     parameters, buffers = torch.func.stack_module_state(models)
 
     def loss(parameters, buffers):
         base = copy.deepcopy(models[0])
-        run = torch.func.functional_call(_Run(base, method), _inside({**parameters, **buffers}), ())
+        run = torch.func.functional_call(
+            _Run(base, method), _inside({**parameters, **buffers}), ()
+        )
         return run.square().sum(), run
 
-    slopes, together = torch.func.vmap(torch.func.grad(loss, has_aux=True))(parameters, buffers)
+    slopes, together = torch.func.vmap(torch.func.grad(loss, has_aux=True))(
+        parameters, buffers
+    )
     for i, model in enumerate(models):
         alone = wrenches(model, method)
         torch.testing.assert_close(together[i], alone, rtol=1e-12, atol=1e-14)
         alone.square().sum().backward()
         for name, parameter in model.named_parameters():
-            torch.testing.assert_close(slopes[name][i], parameter.grad, rtol=1e-9, atol=1e-12)
+            torch.testing.assert_close(
+                slopes[name][i], parameter.grad, rtol=1e-9, atol=1e-12
+            )
 
 
 class _Run(torch.nn.Module):
@@ -79,7 +117,8 @@ class _Run(torch.nn.Module):
 
     def __init__(self, model, method: str) -> None:
         super().__init__()
-        self.model, self.method = model, method
+        self.model = model
+        self.method = method
 
     def forward(self) -> torch.Tensor:
         return wrenches(self.model, self.method)
@@ -103,9 +142,13 @@ def test_the_adjoint_of_stacked_models_takes_shared_inputs():
 
     def slopes(parameters, buffers, v):
         values = _inside({**parameters, **buffers})
-        return torch.func.jacrev(lambda v: torch.func.functional_call(Run(models[0]), values, (v,))[5:8])(v)
+        return torch.func.jacrev(
+            lambda v: torch.func.functional_call(Run(models[0]), values, (v,))[5:8]
+        )(v)
 
-    together = torch.func.vmap(slopes, in_dims=(0, 0, None))(parameters, buffers, twists())
+    together = torch.func.vmap(slopes, in_dims=(0, 0, None))(
+        parameters, buffers, twists()
+    )
     for model, slope in zip(models, together, strict=True):
         alone = torch.func.jacrev(lambda v, model=model: Run(model)(v)[5:8])(twists())
         torch.testing.assert_close(slope, alone, rtol=1e-12, atol=0.0)
@@ -115,7 +158,9 @@ def test_a_single_precision_model_is_rolled_out_with_its_own_numbers():
     model = module("reduced", dtype=torch.float32)
     model.load_state_dict(module("reduced", OTHER).state_dict())
     wanted = wrenches(module("reduced", OTHER), "adjoint")
-    torch.testing.assert_close(wrenches(model, "adjoint"), wanted, rtol=1e-4, atol=1e-5)  # a law and cells of 7 digits
+    torch.testing.assert_close(
+        wrenches(model, "adjoint"), wanted, rtol=1e-4, atol=1e-5
+    )  # a law and cells of 7 digits
 
 
 @every_model
@@ -123,7 +168,8 @@ def test_buffers_share_no_memory_with_what_the_caller_gave(kind):
     surface = pf.LimitSurfaceTable(PATCH) if kind == "published" else None
     model = module(kind, surface=surface) if surface else module(kind)
     before = surface.numbers.data.copy() if surface else None
-    positions, weights = PATCH.positions.copy(), PATCH.weights().copy()
+    positions = PATCH.positions.copy()
+    weights = PATCH.weights().copy()
     reference = {
         "reduced": functools.partial(pf.ReducedModel, cells=12),
         "published": pf.ReducedModelPublished,
@@ -135,7 +181,9 @@ def test_buffers_share_no_memory_with_what_the_caller_gave(kind):
     with torch.no_grad():
         for _, buffer in model.named_buffers():
             buffer.zero_()
-    assert np.array_equal(PATCH.positions, positions) and np.array_equal(PATCH.weights(), weights)
+    assert np.array_equal(PATCH.positions, positions) and np.array_equal(
+        PATCH.weights(), weights
+    )
     assert np.array_equal(numpy_model.wrench(*inputs), wrench)
     if surface:
         assert np.array_equal(surface.numbers.data, before)
@@ -146,23 +194,38 @@ def test_a_gradient_to_the_numbers_of_the_patch_is_eager():
     model.positions.requires_grad_()
     wrenches(model, None).square().sum().backward()
     assert model.positions.grad.abs().max() > 0.0
-    with pytest.raises(pf.FrictionError, match="be 'eager' for a gradient to the numbers of the patch"):
+    with pytest.raises(
+        pf.FrictionError, match="be 'eager' for a gradient to the numbers of the patch"
+    ):
         wrenches(model, "adjoint")
 
 
 @every_model
 def test_single_precision_is_as_close_as_its_digits_however_stiff(kind):
     """Steady sliding at 1 m/s, where sigma_1 times the rounding of a rate was 3e-3 of the load."""
-    law = pf.LuGre(mu_s=1.2, gamma=1.7, sigma_0=1e7, sigma_1=8e3, elasto_plastic=pf.ElastoPlastic(0.7))
-    single, double = (module(kind, law=law, dtype=dtype) for dtype in (torch.float32, torch.float64))
+    law = pf.LuGre(
+        mu_s=1.2,
+        gamma=1.7,
+        sigma_0=1e7,
+        sigma_1=8e3,
+        elasto_plastic=pf.ElastoPlastic(0.7),
+    )
+    single, double = (
+        module(kind, law=law, dtype=dtype) for dtype in (torch.float32, torch.float64)
+    )
     fast = (500.0 * twists()).float()
     exact = rollout(double, None, fast.double(), 1.0, 1e-3, method="eager").wrenches
     found = rollout(single, None, fast, 1.0, 1e-3, method="eager").wrenches
     steps = [single.step(single.rest(), twist, 1.0, 1e-3)[1] for twist in fast]
     assert found.dtype == steps[0].dtype == torch.float32
     lever = torch.tensor([1.0, 1.0, double.lever.item()], dtype=torch.float64)
-    for each in (found, torch.stack(steps)):  # a step of a millisecond forgets where it began
-        assert ((each.double() - exact) / lever).abs().max() < 2e-6  # parameters and results have 7 digits
+    for each in (
+        found,
+        torch.stack(steps),
+    ):  # a step of a millisecond forgets where it began
+        assert (
+            (each.double() - exact) / lever
+        ).abs().max() < 2e-6  # parameters and results have 7 digits
 
 
 # ---------------------------------------------------------------------- what does not fit
@@ -173,13 +236,19 @@ def test_bristles_of_the_other_kind_are_refused(kind):
     model = module(kind, law=PLAIN)
     before = model.physical().clone()
     with pytest.raises(
-        pf.FrictionError, match="state_dict must be that of plain bristles, got elasto-plastic"
+        pf.FrictionError,
+        match="state_dict must be that of plain bristles, got elasto-plastic",
     ) as caught:
         model.load_state_dict(module(kind, law=ELASTIC).state_dict())
     assert "\n" not in str(caught.value) and torch.equal(model.physical(), before)
-    with pytest.raises(pf.FrictionError, match="state_dict must be that of elasto-plastic bristles, got plain"):
+    with pytest.raises(
+        pf.FrictionError,
+        match="state_dict must be that of elasto-plastic bristles, got plain",
+    ):
         module(kind).load_state_dict(module(kind, law=PLAIN).state_dict())
-    nothing = {name: value for name, value in model.state_dict().items() if name != "bristles"}
+    nothing = {
+        name: value for name, value in model.state_dict().items() if name != "bristles"
+    }
     with pytest.raises(RuntimeError, match=r'Missing key.*"bristles"'):
         model.load_state_dict(nothing)
 
@@ -216,7 +285,10 @@ def test_a_dynamic_friction_trained_up_to_a_fixed_static_one_is_said(kind):
         optimiser.step()
 
     pull()
-    with pytest.warns(UserWarning, match="mu_c has been trained up to mu_s, which is fixed .*: name mu_s in trainable"):
+    with pytest.warns(
+        UserWarning,
+        match="mu_c has been trained up to mu_s, which is fixed .*: name mu_s in trainable",
+    ):
         for _ in range(8):
             pull()
         assert model.law().mu_c <= model.law().mu_s == pytest.approx(1.2, rel=1e-12)

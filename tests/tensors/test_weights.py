@@ -21,7 +21,8 @@ CASES = {
 
 def motion():
     rng = np.random.default_rng(8)
-    twists, loads = rng.normal(size=(3, 12, 3)) * [1e-3, 1e-3, 0.2], rng.uniform(0.4, 3.0, (3, 12))
+    twists = rng.normal(size=(3, 12, 3)) * [1e-3, 1e-3, 0.2]
+    loads = rng.uniform(0.4, 3.0, (3, 12))
     loads[1, 4:6] = 0.0
     return twists, loads, rng.normal(size=(3, 12, 3)) * [1.0, 1.0, 300.0]
 
@@ -32,7 +33,12 @@ def power(front, model, twists, loads, bars, method):  # noqa: F811
     def of(numbers):
         if front.name == "jax":
             now = model.replace(weights=numbers)
-            return (front.models.rollout(now, None, twists, loads, DT, method=method).wrenches * bars).sum()
+            return (
+                front.models.rollout(
+                    now, None, twists, loads, DT, method=method
+                ).wrenches
+                * bars
+            ).sum()
 
         class Roll(front.library.nn.Module):
             def __init__(self):
@@ -40,26 +46,43 @@ def power(front, model, twists, loads, bars, method):  # noqa: F811
                 self.model = model
 
             def forward(self):
-                return (front.models.rollout(model, None, twists, loads, DT, method=method).wrenches * bars).sum()
+                return (
+                    front.models.rollout(
+                        model, None, twists, loads, DT, method=method
+                    ).wrenches
+                    * bars
+                ).sum()
 
-        return front.library.func.functional_call(Roll(), {"model.raw_weights": numbers}, ())
+        return front.library.func.functional_call(
+            Roll(), {"model.raw_weights": numbers}, ()
+        )
 
     return of
 
 
 def weighed(front, kind, law):  # noqa: F811
-    options = {"trainable": ("mu_c", "mu_s", "weights")} if front.name == "torch" else {}
+    options = (
+        {"trainable": ("mu_c", "mu_s", "weights")} if front.name == "torch" else {}
+    )
     model = front.model(patch(kind), law, **options)
-    return model, (model.raw_weights.detach() if front.name == "torch" else model.weights)
+    return model, (
+        model.raw_weights.detach() if front.name == "torch" else model.weights
+    )
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_gradients_to_weights_are_those_of_recorded_steps(front, case):  # noqa: F811
     model, numbers = weighed(front, *CASES[case])
-    at, grad = front.arrays(*motion()), front.library.func.grad if front.name == "torch" else front.library.grad
-    compiled, recorded = (grad(power(front, model, *at, method))(numbers) for method in ("adjoint", "eager"))
+    at = front.arrays(*motion())
+    grad = front.library.func.grad if front.name == "torch" else front.library.grad
+    compiled, recorded = (
+        grad(power(front, model, *at, method))(numbers)
+        for method in ("adjoint", "eager")
+    )
     wanted = front.plain(recorded)
-    np.testing.assert_allclose(front.plain(compiled), wanted, rtol=1e-10, atol=1e-11 * np.abs(wanted).max())
+    np.testing.assert_allclose(
+        front.plain(compiled), wanted, rtol=1e-10, atol=1e-11 * np.abs(wanted).max()
+    )
     assert np.abs(wanted).max() > 1e-3
 
 
@@ -67,17 +90,29 @@ def test_every_contact_may_have_weights_of_its_own(front):  # noqa: F811
     model, numbers = weighed(front, "points", LAW)
     func = front.library.func if front.name == "torch" else front.library
     of = power(front, model, *front.arrays(*motion()), "adjoint")
-    rows = numbers + front.arrays(0.01 * np.random.default_rng(2).normal(size=(3, *numbers.shape)))[0]
+    rows = (
+        numbers
+        + front.arrays(
+            0.01 * np.random.default_rng(2).normal(size=(3, *numbers.shape))
+        )[0]
+    )
     both = func.vmap(lambda row: (of(row), func.grad(of)(row)))(rows)
     for k, row in enumerate(rows):
         for got, want in zip(both, (of(row), func.grad(of)(row)), strict=True):
-            np.testing.assert_allclose(front.plain(got[k]), front.plain(want), rtol=1e-11, atol=1e-14)
+            np.testing.assert_allclose(
+                front.plain(got[k]), front.plain(want), rtol=1e-11, atol=1e-14
+            )
     turned = func.jvp(of, (rows[0],), (rows[1],))[1]
-    np.testing.assert_allclose(front.plain(turned), front.plain((func.grad(of)(rows[0]) * rows[1]).sum()), rtol=1e-10)
+    np.testing.assert_allclose(
+        front.plain(turned),
+        front.plain((func.grad(of)(rows[0]) * rows[1]).sum()),
+        rtol=1e-10,
+    )
 
 
 def test_trained_weights_are_a_patch_again(front):  # noqa: F811
-    whole, (twists, loads, _) = pf.ContactPatch.disc(0.01, cells=7), motion()
+    whole = pf.ContactPatch.disc(0.01, cells=7)
+    (twists, loads, _) = motion()
     for name, options in (("DistributedModel", {}), ("ReducedModel", {"cells": 9})):
         ours = front.model(whole, LAW, name, **options)
         shares = np.random.default_rng(5).uniform(0.5, 1.5, len(ours.weights))
@@ -87,9 +122,15 @@ def test_trained_weights_are_a_patch_again(front):  # noqa: F811
         else:
             ours = ours.replace(weights=front.arrays(shares / shares.sum())[0])
         model = pf.DistributedModel(ours.weighted(whole), LAW)
-        np.testing.assert_allclose(model.patch.weights(), shares / shares.sum(), rtol=1e-12)
+        np.testing.assert_allclose(
+            model.patch.weights(), shares / shares.sum(), rtol=1e-12
+        )
         run = front.models.rollout(ours, None, *front.arrays(twists, loads), DT)
         wanted = pf.rollout(model, None, twists, loads, DT).wrenches
-        np.testing.assert_allclose(front.plain(run.wrenches), wanted, rtol=1e-9, atol=1e-9)
-    with pytest.raises(InvalidValueError, match="patch must have the 9 cells of the model, got 4"):
+        np.testing.assert_allclose(
+            front.plain(run.wrenches), wanted, rtol=1e-9, atol=1e-9
+        )
+    with pytest.raises(
+        InvalidValueError, match="patch must have the 9 cells of the model, got 4"
+    ):
         ours.weighted(pf.ContactPatch.rectangle(0.01, 0.01, (2, 2)))

@@ -9,7 +9,13 @@ import numpy as np
 from planarfriction._engine.codegen.definitions import bind
 from planarfriction._engine.compiler import entry
 from planarfriction._engine.compiler.calls import address_of
-from planarfriction._engine.compiler.memory import Doubles, Layout, offsets_of, reader, row_of
+from planarfriction._engine.compiler.memory import (
+    Doubles,
+    Layout,
+    offsets_of,
+    reader,
+    row_of,
+)
 
 
 class Rows(NamedTuple):
@@ -92,13 +98,20 @@ CALLS = len(Addresses._fields)
 
 def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
     """Return the functions of a model, entry points `<name>_<template>`: templates that are bound to its argument."""
-    return ModelFunctions(*(bind(each, f"{name}_{each.__name__}", entry, **model) for each in templates))
+    return ModelFunctions(
+        *(bind(each, f"{name}_{each.__name__}", entry, **model) for each in templates)
+    )
 
 
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
     """Return the words of `Addresses` of compiled functions of a model, those from `change` on if asked for."""
     wanted = functions[: None if change else ModelFunctions._fields.index("change")]
-    return row_of(Addresses(*(address_of(each) if each else 0 for each in wanted), *[0] * (CALLS - len(wanted))))
+    return row_of(
+        Addresses(
+            *(address_of(each) if each else 0 for each in wanted),
+            *[0] * (CALLS - len(wanted)),
+        )
+    )
 
 
 SLOPES = 12

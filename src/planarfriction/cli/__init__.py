@@ -36,11 +36,17 @@ def _run(arguments: list[str]) -> int:
 
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # names of files need not be text that a terminal can show
+            stream.reconfigure(
+                errors="backslashreplace"
+            )  # names of files need not be text that a terminal can show
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _warn
-            code = app.main(arguments or ["--help"], prog_name="planarfriction", standalone_mode=False)
+            code = app.main(
+                arguments or ["--help"],
+                prog_name="planarfriction",
+                standalone_mode=False,
+            )
     except FrictionError as error:
         return _fail(str(error))
     except click.ClickException as error:

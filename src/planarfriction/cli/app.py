@@ -14,7 +14,13 @@ from planarfriction import __version__
 from planarfriction.cli.doctor import doctor
 from planarfriction.cli.export import export
 from planarfriction.cli.identify import identify
-from planarfriction.cli.options import FILE, cells_option, complete_scene, map_options, patch_option
+from planarfriction.cli.options import (
+    FILE,
+    cells_option,
+    complete_scene,
+    map_options,
+    patch_option,
+)
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SURFACES, Family
 
@@ -62,7 +68,8 @@ class MemberOf(click.Choice):
     """A choice among the members of a family, those that are registered later too, and a few words more."""
 
     def __init__(self, family: Family, *more: str):
-        self.family, self.more = family, more
+        self.family = family
+        self.more = more
         super().__init__([*family, *more])
 
     @property
@@ -74,10 +81,18 @@ class MemberOf(click.Choice):
     def choices(self, value: object) -> None:
         """Ignore the names that click sets: the family has them."""
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
         """Return the members that begin with the typed text, with their descriptions."""
-        words = {name: self.family.words(name) for name in self.family} | dict.fromkeys(self.more)
-        return [CompletionItem(name, help=help) for name, help in words.items() if name.startswith(incomplete)]
+        words = {name: self.family.words(name) for name in self.family} | dict.fromkeys(
+            self.more
+        )
+        return [
+            CompletionItem(name, help=help)
+            for name, help in words.items()
+            if name.startswith(incomplete)
+        ]
 
 
 @click.group(
@@ -103,14 +118,34 @@ def app() -> None:
 @patch_option("Default: the scene's (mostly Circle), or the file's.")
 @map_options
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
-@click.option("--rtol", type=float, help="Relative tolerance of the solver. Default: the scene's.")
-@click.option("--max-steps", type=int, help="Largest number of steps of the solver. Default: 50 million.")
 @click.option(
-    "--set", "settings", metavar="PATH=VALUE", multiple=True, help="Change a value of the scene; may be repeated."
+    "--rtol", type=float, help="Relative tolerance of the solver. Default: the scene's."
 )
-@click.option("--out", type=FILE, help="Folder for the data (NetCDF, CSV) and the pictures.")
-@click.option("--plot", is_flag=True, help="Draw histories, motion and patch as PNG (in out/ by default).")
-@click.option("--animate", is_flag=True, help="Draw motion and slip as an animated GIF (in out/ by default).")
+@click.option(
+    "--max-steps",
+    type=int,
+    help="Largest number of steps of the solver. Default: 50 million.",
+)
+@click.option(
+    "--set",
+    "settings",
+    metavar="PATH=VALUE",
+    multiple=True,
+    help="Change a value of the scene; may be repeated.",
+)
+@click.option(
+    "--out", type=FILE, help="Folder for the data (NetCDF, CSV) and the pictures."
+)
+@click.option(
+    "--plot",
+    is_flag=True,
+    help="Draw histories, motion and patch as PNG (in out/ by default).",
+)
+@click.option(
+    "--animate",
+    is_flag=True,
+    help="Draw motion and slip as an animated GIF (in out/ by default).",
+)
 def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any) -> int:
     """Simulate a ready scene or a scene file with one friction model, or with several to compare them.
 
@@ -131,21 +166,37 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
     from planarfriction.cli import run as command
     from planarfriction.solvers.structured import compiled_together
 
-    pictures = [name for name, wanted in (("plot", plot), ("animate", animate)) if wanted]
+    pictures = [
+        name for name, wanted in (("plot", plot), ("animate", animate)) if wanted
+    ]
     folder = Path("out") if out is None and pictures else out
     with compiled_together():  # the models take a second to load
         return command.run(scene, folder=folder, pictures=pictures, **options)
 
 
-@app.command(name="limit-surface", short_help="Print, draw or tabulate a limit surface.")
+@app.command(
+    name="limit-surface", short_help="Print, draw or tabulate a limit surface."
+)
 @patch_option("Default: Circle.")
 @click.option("--pressure", type=FILE, help="Pressure map, as with --patch.")
 @map_options
-@click.option("--surface", type=MemberOf(SURFACES), default="exact", show_default=True, help="Kind of limit surface.")
-@click.option("--out", type=FILE, help="Picture to write (.png, .pdf, .svg, or .html to rotate it with the mouse).")
+@click.option(
+    "--surface",
+    type=MemberOf(SURFACES),
+    default="exact",
+    show_default=True,
+    help="Kind of limit surface.",
+)
+@click.option(
+    "--out",
+    type=FILE,
+    help="Picture to write (.png, .pdf, .svg, or .html to rotate it with the mouse).",
+)
 @click.option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
 @click.option("--csv", type=FILE, help="Table of samples to write (.csv).")
-def limit_surface(patch: str | None, pressure: Path | None, size: dict[str, Any], **options: Any) -> None:
+def limit_surface(
+    patch: str | None, pressure: Path | None, size: dict[str, Any], **options: Any
+) -> None:
     """Show the limit surface of a contact patch: numbers, a picture (next to its ellipsoid), a table as CSV.
 
     The CSV has the columns vx vy omega fx fy tau: twists in all directions and their friction wrenches for mu f_N = 1,

@@ -9,7 +9,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 from rich.table import Table
 
 EVERY = 10.0
@@ -36,20 +42,31 @@ def _bar(words: str) -> Iterator[Callable[..., None]]:
 
     expect_compilation()  # the bar says it
     console = Console(stderr=True)
-    if not console.is_terminal:  # rich before 15 ends a bar that is not shown with an empty line
+    if (
+        not console.is_terminal
+    ):  # rich before 15 ends a bar that is not shown with an empty line
         with _lines(words) as update:
             yield update
         return
-    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=30)
-    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True) as bar:
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=30),
+    )
+    with Progress(
+        *columns, TimeElapsedColumn(), console=console, transient=True
+    ) as bar:
         task = bar.add_task(words, total=None)
-        yield lambda words, done, of: bar.update(task, completed=done, total=of, description=words)
+        yield lambda words, done, of: bar.update(
+            task, completed=done, total=of, description=words
+        )
 
 
 @contextmanager
 def _lines(words: str) -> Iterator[Callable[..., None]]:
     """Show progress in a file or a pipe: a line on stderr every `EVERY` seconds, written by a thread of its own."""
-    begin, ended = time.monotonic(), threading.Event()
+    begin = time.monotonic()
+    ended = threading.Event()
 
     def write() -> None:
         while not ended.wait(EVERY):
@@ -73,16 +90,33 @@ def note(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def print_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], *, width: int = 200) -> None:
+def print_table(
+    title: str,
+    headings: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    width: int = 200,
+) -> None:
     """Print a table on stdout: columns with numbers are aligned on the right, words on the left.
 
     It is as wide as the terminal; elsewhere `width` letters are enough for every table that programs may read.
     """
-    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    table = Table(
+        title=title, title_justify="left", title_style="bold", header_style="bold"
+    )
     for number, heading in enumerate(headings):
-        numbers = number > 0 and any(character.isdigit() for row in rows for character in row[number][:2])
-        name = number == 0 and not any(" " in row[0] for row in rows)  # stays in one piece
-        table.add_column(heading, justify="right" if numbers else "left", overflow="fold", no_wrap=name)
+        numbers = number > 0 and any(
+            character.isdigit() for row in rows for character in row[number][:2]
+        )
+        name = number == 0 and not any(
+            " " in row[0] for row in rows
+        )  # stays in one piece
+        table.add_column(
+            heading,
+            justify="right" if numbers else "left",
+            overflow="fold",
+            no_wrap=name,
+        )
     for row in rows:
         table.add_row(*row)
     console = Console(markup=False, highlight=False)  # units in brackets are no markup

@@ -45,7 +45,10 @@ class Check(NamedTuple):
             return one_line(f"FAILS, {type(error).__name__}: {error}"), False
         right = abs(found - self.expected) <= self.tolerance
         verdict = "holds" if right else "FAILS"
-        return f"{verdict}, {found:.9g} (expected {self.expected:.9g} to {self.tolerance:.2g})", right
+        return (
+            f"{verdict}, {found:.9g} (expected {self.expected:.9g} to {self.tolerance:.2g})",
+            right,
+        )
 
 
 def checks() -> list[Check]:
@@ -53,17 +56,34 @@ def checks() -> list[Check]:
 
     Closed forms hold to rounding; scenes end within 2 um and 2e-5 rad of converged ones at the default tolerances.
     """
-    exact, rectangle = pf.LimitSurfaceExact, pf.ContactPatch.rectangle(0.03, 0.04)
-    disc, corner = pf.ContactPatch.disc(0.01), (0.02, -0.015, 1.0)
+    exact = pf.LimitSurfaceExact
+    rectangle = pf.ContactPatch.rectangle(0.03, 0.04)
+    disc = pf.ContactPatch.disc(0.01)
+    corner = (0.02, -0.015, 1.0)
     plain = pf.ReducedModel(disc, pf.LuGre())
     slid = plain.rest(), (1e-3, 0.0, 0.0), 1.0, 1e-3
     found = [
         # 2 R/3: contact radius of an evenly pressed disc
-        Check("torque of a spinning disc [m]", lambda: -exact(disc).wrench((0.0, 0.0, 1.0))[2], 0.02 / 3.0, 1e-12),
+        Check(
+            "torque of a spinning disc [m]",
+            lambda: -exact(disc).wrench((0.0, 0.0, 1.0))[2],
+            0.02 / 3.0,
+            1e-12,
+        ),
         # [2 a b d + a^3 asinh(b/a) + b^3 asinh(a/b)]/(6 a b), d^2 = a^2 + b^2: mean distance from the corner
-        Check("rectangle turned about its corner [m]", lambda: exact(rectangle).dissipation(corner), 0.026947771, 1e-9),
+        Check(
+            "rectangle turned about its corner [m]",
+            lambda: exact(rectangle).dissipation(corner),
+            0.026947771,
+            1e-9,
+        ),
         # mu_c (1 - e) + sigma_1 v e + sigma_2 v, e = exp(-sigma_0 v dt/mu_c)
-        Check("force of plain LuGre after a step [N]", lambda: -plain.step(*slid)[1][0], 0.926624112, 1e-9),
+        Check(
+            "force of plain LuGre after a step [N]",
+            lambda: -plain.step(*slid)[1][0],
+            0.926624112,
+            1e-9,
+        ),
     ]
     # converged by fine-step Runge-Kutta
     for name, y, angle in (
@@ -71,8 +91,15 @@ def checks() -> list[Check]:
         ("reduced-published", -0.0197103377, -0.1260840893),
     ):
         found += [
-            Check(f"plate in the hand, {name}, y [m]", partial(_end, name, "y"), y, 2e-6),
-            Check(f"plate in the hand, {name}, angle [rad]", partial(_end, name, "theta"), angle, 2e-5),
+            Check(
+                f"plate in the hand, {name}, y [m]", partial(_end, name, "y"), y, 2e-6
+            ),
+            Check(
+                f"plate in the hand, {name}, angle [rad]",
+                partial(_end, name, "theta"),
+                angle,
+                2e-5,
+            ),
         ]
     return found
 
@@ -98,9 +125,15 @@ def requirements() -> Iterator[tuple[str, list[Requirement]]]:
     except metadata.PackageNotFoundError:  # sources that nobody has installed
         return
     every = [Requirement(line) for line in installed.get_all("Requires-Dist") or ()]
-    needed = lambda each, extra: each.marker is None or each.marker.evaluate({"extra": extra})  # noqa: E731
+    needed = lambda each, extra: (
+        each.marker is None or each.marker.evaluate({"extra": extra})
+    )
     for extra in ("", *(installed.get_all("Provides-Extra") or ())):
-        own = [each for each in every if needed(each, extra) and (not extra or not needed(each, ""))]
+        own = [
+            each
+            for each in every
+            if needed(each, extra) and (not extra or not needed(each, ""))
+        ]
         yield extra, [each for each in own if each.name != "planarfriction"]
 
 
@@ -111,7 +144,9 @@ def state_of(requirement: Requirement) -> tuple[str, bool]:
     except metadata.PackageNotFoundError:
         return f"{requirement.name} is missing", False
     right = requirement.specifier.contains(version, prereleases=True)
-    return f"{requirement.name} {version}" + ("" if right else f" (needs {requirement.specifier})"), right
+    return f"{requirement.name} {version}" + (
+        "" if right else f" (needs {requirement.specifier})"
+    ), right
 
 
 def processor() -> list[tuple[str, str]]:
@@ -122,7 +157,11 @@ def processor() -> list[tuple[str, str]]:
     name, have = target()
     return [
         ("processor", f"{platform.machine()}, {name}, {processors()} for this process"),
-        ("features", ", ".join(each for each in FEATURES if each in have) or "none of those that matter"),
+        (
+            "features",
+            ", ".join(each for each in FEATURES if each in have)
+            or "none of those that matter",
+        ),
     ]
 
 
@@ -134,8 +173,13 @@ def machine_code() -> list[tuple[str, str]]:
     rows = []
     for folder in folders(SOURCES):
         files = [file for file in folder.glob("*.machine") if file.is_file()]
-        size, damaged = sum(file.stat().st_size for file in files), sum(not whole(file) for file in files)
-        kept = f"{len(files)} functions, {size / 1e6:.1f} MB, {damaged} damaged" if files else "none"
+        size = sum(file.stat().st_size for file in files)
+        damaged = sum(not whole(file) for file in files)
+        kept = (
+            f"{len(files)} functions, {size / 1e6:.1f} MB, {damaged} damaged"
+            if files
+            else "none"
+        )
         rows.append((f"machine code in {folder}", kept))
     return rows
 
@@ -147,7 +191,9 @@ def step_times() -> list[tuple[str, str]]:
         model = _model(name)
         call = partial(model.step, model.rest(), (0.01, 0.0, 1.0), 1.0, 1e-4)
         times = timeit.repeat(call, number=_CALLS, repeat=_ROUNDS)
-        rows.append((f"step, {name}", f"{1e6 * statistics.median(times) / _CALLS:.2f} us"))
+        rows.append(
+            (f"step, {name}", f"{1e6 * statistics.median(times) / _CALLS:.2f} us")
+        )
     return rows
 
 
@@ -175,8 +221,15 @@ def doctor() -> int:
         ("planarfriction", f"{pf.__version__} in {pf.__path__[0]}"),
         ("Python", f"{platform.python_version()} in {sys.prefix}"),
         ("system", platform.platform()),
-        ("packages", ", ".join(words for words, _ in packages) or "unknown, planarfriction is not installed"),
-        *((f"extra {name}", ", ".join(state_of(each)[0] for each in those)) for name, those in extras.items()),
+        (
+            "packages",
+            ", ".join(words for words, _ in packages)
+            or "unknown, planarfriction is not installed",
+        ),
+        *(
+            (f"extra {name}", ", ".join(state_of(each)[0] for each in those))
+            for name, those in extras.items()
+        ),
         *processor(),
         *machine_code(),
         *times,
@@ -185,5 +238,9 @@ def doctor() -> int:
     for name, words in lines:
         print(f"{name}: {words}")
     good = all(right for _, right in packages) and all(right for *_, right in outcomes)
-    print("everything is as it should be" if good else "something is wrong: see FAILS, missing and needs above")
+    print(
+        "everything is as it should be"
+        if good
+        else "something is wrong: see FAILS, missing and needs above"
+    )
     return 0 if good else OUT_OF_TOLERANCE

@@ -27,12 +27,19 @@ def read_model(file: Path, contact: str | None) -> Any:
     if "contact" not in table:
         if contact is not None:
             raise InvalidValueError("--contact", "be given only for a scene", contact)
-        return model_from_dict(Section(table, "", str(file), file.parent).only(["model", "patch", "law"]))
-    models = {each.name: each.model for each in pf.Scene.from_dict(table, file.parent, str(file)).contacts}
+        return model_from_dict(
+            Section(table, "", str(file), file.parent).only(["model", "patch", "law"])
+        )
+    models = {
+        each.name: each.model
+        for each in pf.Scene.from_dict(table, file.parent, str(file)).contacts
+    }
     if contact is None:
         first, *others = models.values()
         if any(each != first for each in others):
-            raise InvalidValueError("--contact", f"be one of {', '.join(models)}", "none")
+            raise InvalidValueError(
+                "--contact", f"be one of {', '.join(models)}", "none"
+            )
         return first
     return models[validation.choice("--contact", contact, models)]
 
@@ -41,11 +48,25 @@ def read_model(file: Path, contact: str | None) -> Any:
 @click.argument("file", type=FILE, shell_complete=complete_scene)
 @click.option("--out", type=FILE, required=True, help="Folder for the files.")
 @click.option(
-    "--name", default="friction", show_default=True, help="Name of the files, and prefix of the names in them."
+    "--name",
+    default="friction",
+    show_default=True,
+    help="Name of the files, and prefix of the names in them.",
 )
-@click.option("--precision", default="double", show_default=True, help="double or float.")
-@click.option("--patches", default=1, show_default=True, help="Patches of this model below a body.")
-@click.option("--contact", metavar="NAME", help="Contact whose model is exported, if a scene has different ones.")
+@click.option(
+    "--precision", default="double", show_default=True, help="double or float."
+)
+@click.option(
+    "--patches",
+    default=1,
+    show_default=True,
+    help="Patches of this model below a body.",
+)
+@click.option(
+    "--contact",
+    metavar="NAME",
+    help="Contact whose model is exported, if a scene has different ones.",
+)
 def export(file: Path, out: Path, contact: str | None, **options: Any) -> None:
     """Write the friction model of a file as C source for a controller: NAME.h and NAME.c, C99 and C++17.
 

@@ -20,43 +20,122 @@ class FitOrPlan(click.Command):
     """`identify`: fits the logs that follow, unless the first word is that of a subcommand."""
 
     def make_context(
-        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
     ) -> click.Context:
         """Make the context of the fit, or of a subcommand."""
         if args and args[0] in OTHERS:
-            return OTHERS[args[0]].make_context(f"{info_name} {args[0]}", args[1:], parent, **extra)
+            return OTHERS[args[0]].make_context(
+                f"{info_name} {args[0]}", args[1:], parent, **extra
+            )
         return super().make_context(info_name, args, parent, **extra)
 
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_options(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
         """Write the options, then the other commands."""
         super().format_options(ctx, formatter)
         with formatter.section("Commands"):
-            formatter.write_dl([(each, f"{OTHERS[each].short_help} See identify {each} --help.") for each in OTHERS])
+            formatter.write_dl(
+                [
+                    (each, f"{OTHERS[each].short_help} See identify {each} --help.")
+                    for each in OTHERS
+                ]
+            )
 
 
-def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list[CompletionItem]:
+def complete_log(
+    ctx: click.Context, parameter: object, incomplete: str
+) -> list[CompletionItem]:
     """Return completions of a log: files, and the names of subcommands where they may stand."""
-    names = [] if ctx.params.get("logs") else [name for name in OTHERS if name.startswith(incomplete)]
+    names = (
+        []
+        if ctx.params.get("logs")
+        else [name for name in OTHERS if name.startswith(incomplete)]
+    )
     words = [CompletionItem(name, help=OTHERS[name].short_help) for name in names]
     return [*words, CompletionItem(incomplete, type="file")]
 
 
-@click.command(cls=FitOrPlan, short_help="Estimate friction parameters from logs; plan the next measurement.")
-@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
+@click.command(
+    cls=FitOrPlan,
+    short_help="Estimate friction parameters from logs; plan the next measurement.",
+)
+@click.argument(
+    "logs",
+    metavar="LOG...",
+    type=FILE,
+    nargs=-1,
+    required=True,
+    shell_complete=complete_log,
+)
 @patch_option("Default: Circle.")
 @map_options
-@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
-@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Initial guess, or fixed value if not estimated.")
-@click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
-@click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, if there are several.")
-@click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
-@click.option("--plain", is_flag=True, help="Use plain LuGre bristles. Default: what fits better.")
-@click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
-@click.option("--model", default="auto", show_default=True, help="reduced-published, reduced, distributed, or auto.")
-@click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
-@click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
-@click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
+@click.option(
+    "--parameters",
+    metavar="NAMES",
+    help="What to estimate, separated by commas. Default: law and radius.",
+)
+@click.option(
+    "--start",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Initial guess, or fixed value if not estimated.",
+)
+@click.option(
+    "--normal-force",
+    type=float,
+    help="Normal force in N, if the logs have no such column.",
+)
+@click.option(
+    "--contact",
+    metavar="NAME",
+    help="Contact whose columns (NAME.vx) are read, if there are several.",
+)
+@click.option(
+    "--noise",
+    metavar="FX,FY,TAU",
+    help="Noise of the measured wrench in N and N m. Default: estimated.",
+)
+@click.option(
+    "--plain", is_flag=True, help="Use plain LuGre bristles. Default: what fits better."
+)
+@click.option(
+    "--steady", is_flag=True, help="The logs begin in steady sliding, not at rest."
+)
+@click.option(
+    "--model",
+    default="auto",
+    show_default=True,
+    help="reduced-published, reduced, distributed, or auto.",
+)
+@click.option(
+    "--nuisance",
+    metavar="NAMES",
+    help="Rig disturbances: delay,bias,load,twist or none. Default: all.",
+)
+@click.option(
+    "--starts",
+    type=int,
+    default=4,
+    show_default=True,
+    help="Number of starting points of the search.",
+)
+@click.option(
+    "--seed",
+    type=int,
+    default=0,
+    show_default=True,
+    help="Random seed of the starting points.",
+)
+@click.option(
+    "--out",
+    type=FILE,
+    help="Folder for the estimates (JSON) and the residual plot (PNG).",
+)
 def identify(
     logs: tuple[Path, ...],
     patch: str | None,
@@ -95,7 +174,11 @@ def identify(
     from planarfriction.writing import make_folder, write_text
 
     given = find_patch(patch, size)
-    chosen: dict[str, Any] = {"parameters": parse_names(parameters), "start": parse_start(start), "model": model}
+    chosen: dict[str, Any] = {
+        "parameters": parse_names(parameters),
+        "start": parse_start(start),
+        "model": model,
+    }
     options = FitOptions(
         noise=parse_noise(noise),
         elasto_plastic=None if plain else "auto",
@@ -109,9 +192,13 @@ def identify(
     with work_progress("identifying") as progress:
         for path in logs:
             progress(f"reading {path.name}")
-            read.append(pf.Log.from_csv(path, normal_force=normal_force, contact=contact))
+            read.append(
+                pf.Log.from_csv(path, normal_force=normal_force, contact=contact)
+            )
         try:
-            found = identify_lugre(read, given, **chosen, options=options, progress=progress)
+            found = identify_lugre(
+                read, given, **chosen, options=options, progress=progress
+            )
         except IdentificationInterrupted as stop:
             print(stop)
             return INTERRUPTED
@@ -121,7 +208,8 @@ def identify(
     note(f"{found.starts[0]} of {found.starts[1]} starting points led to this minimum")
     if out is not None:
         stem = slug(read[0].name)
-        table, picture = out / f"{stem}-identification.json", out / f"{stem}-residuals.png"
+        table = out / f"{stem}-identification.json"
+        picture = out / f"{stem}-residuals.png"
         write_text(table, json.dumps(found.to_dict(), indent=2) + "\n")
         note(f"wrote {table}")
         note(f"wrote {write_picture(found.plot(), picture)}")
@@ -145,7 +233,11 @@ def parse_names(text: str | None) -> tuple[str, ...]:
     """Parse the names of `--parameters`, separated by commas; the usual ones without it."""
     from planarfriction.identify.parameters import USUAL, check_names
 
-    return USUAL if text is None else check_names([name.strip() for name in text.split(",") if name.strip()])
+    return (
+        USUAL
+        if text is None
+        else check_names([name.strip() for name in text.split(",") if name.strip()])
+    )
 
 
 def parse_nuisance(text: str | None) -> tuple[str, ...]:
@@ -154,30 +246,72 @@ def parse_nuisance(text: str | None) -> tuple[str, ...]:
 
     if text is None:
         return GROUPS
-    return () if text.strip() == "none" else tuple(name.strip() for name in text.split(","))
+    return (
+        ()
+        if text.strip() == "none"
+        else tuple(name.strip() for name in text.split(","))
+    )
 
 
 def parse_noise(text: str | None) -> list[float] | None:
     """Parse the three numbers of `--noise`."""
     from planarfriction import validation
 
-    return None if text is None else [validation.number_in("--noise", part) for part in text.split(",")]
+    return (
+        None
+        if text is None
+        else [validation.number_in("--noise", part) for part in text.split(",")]
+    )
 
 
 @click.command(short_help="Suggest which motion to measure next.")
 @click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
 @patch_option("Default: Circle.", "patch_name")
 @map_options
-@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
-@click.option("--wanted", metavar="NAMES", help="Parameters whose information counts. Default: all.")
-@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Guess of a parameter, or fixed value.")
-@click.option("--normal-force", type=float, multiple=True, help="Load in N; may be repeated. Default: the logs', or 1.")
-@click.option("--speed", type=float, default=0.05, show_default=True, help="Largest speed in m/s.")
-@click.option("--spin", type=float, help="Largest angular speed in rad/s. Default: the rim as fast as --speed.")
-@click.option("--duration", type=float, default=2.0, show_default=True, help="Length of a motion in s.")
-@click.option("--rate", type=float, default=1000.0, show_default=True, help="Samples per second.")
 @click.option(
-    "--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: the logs', else 1 %."
+    "--parameters",
+    metavar="NAMES",
+    help="What to estimate, separated by commas. Default: law and radius.",
+)
+@click.option(
+    "--wanted",
+    metavar="NAMES",
+    help="Parameters whose information counts. Default: all.",
+)
+@click.option(
+    "--start",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Guess of a parameter, or fixed value.",
+)
+@click.option(
+    "--normal-force",
+    type=float,
+    multiple=True,
+    help="Load in N; may be repeated. Default: the logs', or 1.",
+)
+@click.option(
+    "--speed", type=float, default=0.05, show_default=True, help="Largest speed in m/s."
+)
+@click.option(
+    "--spin",
+    type=float,
+    help="Largest angular speed in rad/s. Default: the rim as fast as --speed.",
+)
+@click.option(
+    "--duration",
+    type=float,
+    default=2.0,
+    show_default=True,
+    help="Length of a motion in s.",
+)
+@click.option(
+    "--rate", type=float, default=1000.0, show_default=True, help="Samples per second."
+)
+@click.option(
+    "--noise",
+    metavar="FX,FY,TAU",
+    help="Noise of the measured wrench in N and N m. Default: the logs', else 1 %.",
 )
 @click.option("--out", type=FILE, help="File for the best motion (.csv).")
 def plan(
@@ -209,12 +343,21 @@ def plan(
     from planarfriction.identify.logs import columns_of
 
     patch = find_patch(patch_name, size)
-    names, values, spread = parse_names(parameters), parse_start(start), parse_noise(noise)
+    names = parse_names(parameters)
+    values = parse_start(start)
+    spread = parse_noise(noise)
     if out is not None:
         output.check_kind(out)
-    measured = [pf.Log.from_csv(path, normal_force=normal_force[0] if normal_force else None) for path in logs]
+    measured = [
+        pf.Log.from_csv(path, normal_force=normal_force[0] if normal_force else None)
+        for path in logs
+    ]
     patch, law = _known(measured, patch, names, values, spread)
-    loads = list(normal_force) or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured}) or [1.0]
+    loads = (
+        list(normal_force)
+        or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured})
+        or [1.0]
+    )
     motions = candidate_motions(patch, law, normal_force=loads, **motion)
     chosen = None if wanted is None else [name.strip() for name in wanted.split(",")]
     options = {"parameters": names, "wanted": chosen, "noise": spread}
@@ -243,30 +386,65 @@ def _known(
         return patch, law
     with work_progress("identifying") as progress:
         chosen = {"parameters": names, "start": start, "model": "reduced-published"}
-        found = identify_lugre(logs, patch, **chosen, options=FitOptions(noise=noise), progress=progress)
+        found = identify_lugre(
+            logs, patch, **chosen, options=FitOptions(noise=noise), progress=progress
+        )
     note(found.summary().replace("\n", " "))
     return current_estimate(found, patch, law)
 
 
-@click.command(short_help="Estimate the friction of a joint from a torque, a voltage or the goal of a servo.")
+@click.command(
+    short_help="Estimate the friction of a joint from a torque, a voltage or the goal of a servo."
+)
 @click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True)
-@click.option("--mass", type=float, default=0.0, help="Mass at the end of a pendulum in kg.")
+@click.option(
+    "--mass", type=float, default=0.0, help="Mass at the end of a pendulum in kg."
+)
 @click.option("--length", type=float, default=0.0, help="Length of the pendulum in m.")
 @click.option("--arm-mass", type=float, help="Mass of its arm in kg.")
-@click.option("--offset", type=float, help="Angle in rad at which the pendulum hangs. Default: estimated.")
-@click.option("--inertia", type=float, help="Moment of inertia, without the pendulum, in kg m^2. Default: estimated.")
+@click.option(
+    "--offset",
+    type=float,
+    help="Angle in rad at which the pendulum hangs. Default: estimated.",
+)
+@click.option(
+    "--inertia",
+    type=float,
+    help="Moment of inertia, without the pendulum, in kg m^2. Default: estimated.",
+)
 @click.option("--torque-gain", type=float, help="kt/R in N m/V. Default: estimated.")
-@click.option("--kp", type=float, multiple=True, help="Gain of the servo; once for each log, or once for all.")
-@click.option("--gain", type=float, default=1.0, show_default=True, help="Duty per rad at a gain of 1.")
+@click.option(
+    "--kp",
+    type=float,
+    multiple=True,
+    help="Gain of the servo; once for each log, or once for all.",
+)
+@click.option(
+    "--gain",
+    type=float,
+    default=1.0,
+    show_default=True,
+    help="Duty per rad at a gain of 1.",
+)
 @click.option("--supply", type=float, help="Voltage of the servo in V.")
-@click.option("--sag", type=float, default=0.0, show_default=True, help="Voltage lost at full duty in V.")
+@click.option(
+    "--sag",
+    type=float,
+    default=0.0,
+    show_default=True,
+    help="Voltage lost at full duty in V.",
+)
 @click.option(
     "--terms",
     default="auto",
     show_default=True,
     help="gravity,stribeck,load,bristles,asymmetry for torques, load,stribeck,bristles,directional for goals; or auto.",
 )
-@click.option("--out", type=FILE, help="Folder for the estimates (JSON), the picture (PNG) and C source.")
+@click.option(
+    "--out",
+    type=FILE,
+    help="Folder for the estimates (JSON), the picture (PNG) and C source.",
+)
 def joint(
     logs: tuple[Path, ...],
     torque_gain: float | None,
@@ -296,28 +474,55 @@ def joint(
     from planarfriction.writing import make_folder, write_text
 
     if len(kp) not in (0, 1, len(logs)):
-        raise InvalidValueError("--kp", "be given once, or once for each log", f"{len(kp)} times")
+        raise InvalidValueError(
+            "--kp", "be given once, or once for each log", f"{len(kp)} times"
+        )
     if kp and supply is None:
         raise InvalidValueError("--supply", "be given with --kp", "none")
     gains = (kp * len(logs) if len(kp) == 1 else kp) or (None,) * len(logs)
-    drives = [None if each is None else Drive(each, supply or 0.0, gain, sag) for each in gains]
-    read = [JointLog.from_csv(path, drive=drive) for path, drive in zip(logs, drives, strict=True)]
-    words = terms.split(",") if terms not in ("auto", "none") else terms if terms == "auto" else ()
+    drives = [
+        None if each is None else Drive(each, supply or 0.0, gain, sag)
+        for each in gains
+    ]
+    read = [
+        JointLog.from_csv(path, drive=drive)
+        for path, drive in zip(logs, drives, strict=True)
+    ]
+    words = (
+        terms.split(",")
+        if terms not in ("auto", "none")
+        else terms
+        if terms == "auto"
+        else ()
+    )
     if out is not None:
         make_folder(out)
     with work_progress("identifying") as progress:
-        fit = identify_joint(read, Plant(**plant), torque_gain=torque_gain, terms=words, progress=progress)
+        fit = identify_joint(
+            read,
+            Plant(**plant),
+            torque_gain=torque_gain,
+            terms=words,
+            progress=progress,
+        )
     print(fit.table())
     if out is not None:
         stem = slug(read[0].name)
-        write_text(out / f"{stem}-joint.json", json.dumps(fit.to_dict(), indent=2) + "\n")
-        files = [out / f"{stem}-joint.json", write_picture(fit.plot(), out / f"{stem}-joint.png")]
+        write_text(
+            out / f"{stem}-joint.json", json.dumps(fit.to_dict(), indent=2) + "\n"
+        )
+        files = [
+            out / f"{stem}-joint.json",
+            write_picture(fit.plot(), out / f"{stem}-joint.png"),
+        ]
         if not fit.unclear:
             files += export_joint_c(fit.friction, out, name="friction")
         for file in files:
             note(f"wrote {file}")
         if fit.unclear:
-            note(f"no C source: leave out the terms that these logs do not show ({', '.join(fit.unclear)})")
+            note(
+                f"no C source: leave out the terms that these logs do not show ({', '.join(fit.unclear)})"
+            )
     return 0
 
 

@@ -26,16 +26,27 @@ POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
 """Samples of the direction sphere in the CSV: every five degrees."""
 
 
-def choose_patch(patch: str | None, pressure: Path | None, size: Mapping[str, Any]) -> pf.ContactPatch:
+def choose_patch(
+    patch: str | None, pressure: Path | None, size: Mapping[str, Any]
+) -> pf.ContactPatch:
     """Return the patch of `--patch` or of `--pressure`, of which at most one is given; Circle without either."""
     if patch is not None and pressure is not None:
-        raise InvalidValueError("--patch", "not be given together with --pressure", patch)
+        raise InvalidValueError(
+            "--patch", "not be given together with --pressure", patch
+        )
     if pressure is not None:
         return pressure_map(pressure, size)
     return find_patch(patch, size)
 
 
-def show(patch: pf.ContactPatch, *, surface: str, out: Path | None, alone: bool, csv: Path | None) -> None:
+def show(
+    patch: pf.ContactPatch,
+    *,
+    surface: str,
+    out: Path | None,
+    alone: bool,
+    csv: Path | None,
+) -> None:
     """Print the numbers of a limit surface; write its picture (alone or beside the ellipsoid) and its samples."""
     if out is not None:
         check_kind(out, (*PICTURES, HTML), "a picture")
@@ -44,28 +55,45 @@ def show(patch: pf.ContactPatch, *, surface: str, out: Path | None, alone: bool,
     if csv is not None:
         check_kind(csv)
     shown = SURFACES[surface](patch)
-    centre = np.round(1e3 * shown.centre_of_pressure, 9) + 0.0  # no -0 and no rounding errors of symmetric patches
+    centre = (
+        np.round(1e3 * shown.centre_of_pressure, 9) + 0.0
+    )  # no -0 and no rounding errors of symmetric patches
     rows = [
         ["loaded cells", f"{patch.cells}"],
         ["centre of pressure [mm]", f"{centre[0]:.4g}, {centre[1]:.4g}"],
         ["contact radius r [mm]", f"{1e3 * shown.contact_radius:.4g}"],
         ["second moment <rho^2> [mm^2]", f"{1e6 * float(patch.second_moment()):.4g}"],
-        ["largest distance from the ellipsoid [-]", f"{_distance_from_ellipsoid(shown):.3g}"],
+        [
+            "largest distance from the ellipsoid [-]",
+            f"{_distance_from_ellipsoid(shown):.3g}",
+        ],
     ]
     rows += _grid_errors(patch)
-    print_table(f"Limit surface of {patch.name} ({surface})", ["mu f_N = 1", "value"], rows)
+    print_table(
+        f"Limit surface of {patch.name} ({surface})", ["mu f_N = 1", "value"], rows
+    )
     if csv is not None:
         from planarfriction.plots.limit_surface import sample_limit_surface
 
         columns = np.hstack(sample_limit_surface(shown, *_directions())).T
-        write_csv(csv, dict(zip(("vx", "vy", "omega", "fx", "fy", "tau"), columns, strict=True)))
+        write_csv(
+            csv,
+            dict(zip(("vx", "vy", "omega", "fx", "fy", "tau"), columns, strict=True)),
+        )
         note(f"wrote {csv}")
     if out is not None:
         from planarfriction import plots
 
         beside = None if alone else "ellipsoid"
-        if out.suffix.lower() == HTML:  # with plotly's own code in it, so that it opens without a network
-            write_text(out, plots.interactive_limit_surface(shown, beside=beside).to_html(include_plotlyjs=True))
+        if (
+            out.suffix.lower() == HTML
+        ):  # with plotly's own code in it, so that it opens without a network
+            write_text(
+                out,
+                plots.interactive_limit_surface(shown, beside=beside).to_html(
+                    include_plotlyjs=True
+                ),
+            )
         else:
             write_picture(plots.plot_limit_surface(shown, beside=beside), out)
         note(f"wrote {out}")
@@ -77,7 +105,9 @@ def _grid_errors(patch: pf.ContactPatch) -> list[list[str]]:
         return []
     rows = [["errors of these cells", f"{patch.grid_error()}"]]
     if patch.cells * FINER**2 <= MOST_FINER:
-        rows.append([f"errors of refined({FINER})", f"{patch.grid_error(refined=FINER)}"])
+        rows.append(
+            [f"errors of refined({FINER})", f"{patch.grid_error(refined=FINER)}"]
+        )
     return rows
 
 
@@ -88,13 +118,19 @@ def _directions() -> tuple[np.ndarray, np.ndarray]:
         np.linspace(0.0, 2 * np.pi, AZIMUTH_SAMPLES, endpoint=False),
         indexing="ij",
     )
-    return np.concatenate([[0.0], polar.ravel(), [np.pi]]), np.concatenate([[0.0], azimuth.ravel(), [0.0]])
+    return np.concatenate([[0.0], polar.ravel(), [np.pi]]), np.concatenate(
+        [[0.0], azimuth.ravel(), [0.0]]
+    )
 
 
 def _distance_from_ellipsoid(surface: Any) -> float:
     """Return the largest distance of (fx, fy, tau/r) from those of the ellipsoid at the same directions of sliding."""
     from planarfriction.plots.limit_surface import scaled_samples
 
-    ellipsoid = pf.LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
-    points, others = (scaled_samples(each, *_directions())[1] for each in (surface, ellipsoid))
+    ellipsoid = pf.LimitSurfaceEllipsoid(
+        surface.patch, normal_force=surface.normal_force
+    )
+    points, others = (
+        scaled_samples(each, *_directions())[1] for each in (surface, ellipsoid)
+    )
     return float(np.linalg.norm(points - others, axis=1).max())

@@ -27,7 +27,9 @@ _PER_WIDTH = {"width": 1.0, "length": 1.0, "radius": 0.5}
 """First parameters of shapes that a width decides, and how large they are for a width of 1."""
 
 
-def find_patch(text: str | None, size: Mapping[str, Any], width: float = WIDTH) -> pf.ContactPatch:
+def find_patch(
+    text: str | None, size: Mapping[str, Any], width: float = WIDTH
+) -> pf.ContactPatch:
     """Return the patch called `text` (case does not matter), `width` [m] wide, or the pressure map in the file `text`.
 
     Circle for None, not for an empty text. `size` holds the options of `map_options` that were given.
@@ -38,12 +40,19 @@ def find_patch(text: str | None, size: Mapping[str, Any], width: float = WIDTH) 
     text = USUAL if text is None else text
     width = size.get("width", width)
     makers = _shapes(width)
-    makers |= {name.lower(): functools.partial(make, width=width) for name, make in PUBLISHED_PATCHES.items()}
+    makers |= {
+        name.lower(): functools.partial(make, width=width)
+        for name, make in PUBLISHED_PATCHES.items()
+    }
     if make := makers.get(text.lower()):
         for name in size:
             if name != "width":
                 given = f"{size[name]} for the patch {text}"
-                raise InvalidValueError(f"--{name.replace('_', '-')}", "be given only for a pressure map", given)
+                raise InvalidValueError(
+                    f"--{name.replace('_', '-')}",
+                    "be given only for a pressure map",
+                    given,
+                )
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
         from planarfriction import validation  # loads NumPy
@@ -54,25 +63,34 @@ def find_patch(text: str | None, size: Mapping[str, Any], width: float = WIDTH) 
 
 def patch_names() -> list[str]:
     """Return names that `find_patch` knows."""
-    return [*PUBLISHED_PATCHES, *(name for name in _shapes(WIDTH) if name.title() not in PUBLISHED_PATCHES)]
+    return [
+        *PUBLISHED_PATCHES,
+        *(name for name in _shapes(WIDTH) if name.title() not in PUBLISHED_PATCHES),
+    ]
 
 
 def _shapes(width: float) -> dict[str, Callable[[], pf.ContactPatch]]:
     """Return the shapes that their width alone describes, by name."""
     makers = {}
     for name, make in SHAPES.items():
-        parameters = list(inspect.signature(make).parameters.values())  # none, in a shape of one's own
+        parameters = list(
+            inspect.signature(make).parameters.values()
+        )  # none, in a shape of one's own
         if any(each.default is each.empty for each in parameters[1:]):
             continue
         if parameters and parameters[0].name in _PER_WIDTH:
-            makers[name] = functools.partial(make, _PER_WIDTH[parameters[0].name] * width)
+            makers[name] = functools.partial(
+                make, _PER_WIDTH[parameters[0].name] * width
+            )
     return makers
 
 
 def pressure_map(path: str | Path, size: Mapping[str, Any]) -> pf.ContactPatch:
     """Return the patch of a pressure map file, with the options of `map_options` that were given."""
     if not {"cell_size", "width"} & set(size):
-        raise InvalidValueError("--cell-size", f"be given (or --width) for the pressure map {path}", "none")
+        raise InvalidValueError(
+            "--cell-size", f"be given (or --width) for the pressure map {path}", "none"
+        )
     return pf.ContactPatch.from_pressure(path, **size)
 
 
@@ -85,25 +103,41 @@ PATCH_HELP = (
 class FilePath(click.Path):
     """A path that the commands check themselves, and that is one."""
 
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Path:
         """Return the path; refuse an empty text, as of a variable that a script has not set."""
         if not str(value) or "\0" in str(value):
-            self.fail("the name of a file or a folder is needed, got an empty one", param, ctx)
+            self.fail(
+                "the name of a file or a folder is needed, got an empty one", param, ctx
+            )
         return Path(str(value))
 
 
 FILE = FilePath()
 
 
-def complete_scene(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
+def complete_scene(
+    context: object, parameter: object, incomplete: str
+) -> list[CompletionItem]:
     """Return completions of a scene: ready scenes that begin with the typed text, and files."""
-    names = [CompletionItem(name, help=SCENES.words(name)) for name in SCENES if name.startswith(incomplete)]
+    names = [
+        CompletionItem(name, help=SCENES.words(name))
+        for name in SCENES
+        if name.startswith(incomplete)
+    ]
     return [*names, CompletionItem(incomplete, type="file")]
 
 
-def complete_patch(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
+def complete_patch(
+    context: object, parameter: object, incomplete: str
+) -> list[CompletionItem]:
     """Return completions of a patch: names that begin with the typed text in any case, and files."""
-    names = [CompletionItem(name) for name in patch_names() if name.lower().startswith(incomplete.lower())]
+    names = [
+        CompletionItem(name)
+        for name in patch_names()
+        if name.lower().startswith(incomplete.lower())
+    ]
     return [*names, CompletionItem(incomplete, type="file")]
 
 
@@ -111,7 +145,9 @@ def _replaced(context: object, parameter: click.Parameter, value: Any) -> None:
     """Refuse an option that another one has replaced."""
     if value is not None:
         raise InvalidValueError(
-            "--parts", "be left out: write --cells, the number of discs of the reduced model", value
+            "--parts",
+            "be left out: write --cells, the number of discs of the reduced model",
+            value,
         )
 
 
@@ -125,29 +161,71 @@ def cells_option(function: Any) -> Any:
 def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
     """Make the option `--patch`, given to a command as `name`; `default` says what is taken without it."""
     words = f"Contact patch: {PATCH_HELP} {default}"
-    return click.option("--patch", name, metavar="PATCH", shell_complete=complete_patch, help=words)
+    return click.option(
+        "--patch", name, metavar="PATCH", shell_complete=complete_patch, help=words
+    )
 
 
 _MAP_OPTIONS = (
-    click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m."),
-    click.option("--width", type=float, help=f"Width in m of a patch. Default: {WIDTH}, or the scene's or map's."),
-    click.option("--header/--no-header", default=None, help="First row of a CSV map: names, or pressures."),
-    click.option("--index/--no-index", default=None, help="First column of a CSV map: labels, or pressures."),
-    click.option("--frame", type=int, help="Frame or page of a map that has several, from 0."),
-    click.option("--frame-shape", type=(int, int), metavar="ROWS COLUMNS", help="Shape of frames that are rows."),
-    click.option("--threshold", type=float, help="Share of the peak up to which cells of a map count as empty."),
-    click.option("--invert/--no-invert", default=None, help="In an image, dark means pressure, or bright does."),
+    click.option(
+        "--cell-size", type=float, help="Side of a cell of a pressure map in m."
+    ),
+    click.option(
+        "--width",
+        type=float,
+        help=f"Width in m of a patch. Default: {WIDTH}, or the scene's or map's.",
+    ),
+    click.option(
+        "--header/--no-header",
+        default=None,
+        help="First row of a CSV map: names, or pressures.",
+    ),
+    click.option(
+        "--index/--no-index",
+        default=None,
+        help="First column of a CSV map: labels, or pressures.",
+    ),
+    click.option(
+        "--frame", type=int, help="Frame or page of a map that has several, from 0."
+    ),
+    click.option(
+        "--frame-shape",
+        type=(int, int),
+        metavar="ROWS COLUMNS",
+        help="Shape of frames that are rows.",
+    ),
+    click.option(
+        "--threshold",
+        type=float,
+        help="Share of the peak up to which cells of a map count as empty.",
+    ),
+    click.option(
+        "--invert/--no-invert",
+        default=None,
+        help="In an image, dark means pressure, or bright does.",
+    ),
 )
 """Options that say how large a patch is and how a pressure map is read."""
 
 
 def map_options(function: Any) -> Any:
     """Add the options of pressure maps; the command gets those that were given, by name, as `size`."""
-    names = ("cell_size", "width", "header", "index", "frame", "frame_shape", "threshold", "invert")
+    names = (
+        "cell_size",
+        "width",
+        "header",
+        "index",
+        "frame",
+        "frame_shape",
+        "threshold",
+        "invert",
+    )
 
     @functools.wraps(function)
     def command(*arguments: Any, **options: Any) -> Any:
-        size = {name: value for name in names if (value := options.pop(name)) is not None}
+        size = {
+            name: value for name in names if (value := options.pop(name)) is not None
+        }
         return function(*arguments, size=size, **options)
 
     for option in reversed(_MAP_OPTIONS):
@@ -172,7 +250,9 @@ def load_function(option: str, entry: str) -> tuple[str, Callable[[Any], Any]]:
     try:
         spec.loader.exec_module(module)
     except Exception as error:  # whatever a file of the user raises
-        raise FileError(one_line(f"{path}: {type(error).__name__}: {' '.join(str(error).split())}")) from None
+        raise FileError(
+            one_line(f"{path}: {type(error).__name__}: {' '.join(str(error).split())}")
+        ) from None
     if not callable(getattr(module, name, None)):
         raise FileError(f"{path}: has no function called {name}")
     return name, getattr(module, name)

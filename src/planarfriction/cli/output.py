@@ -17,7 +17,9 @@ PICTURES = (".png", ".pdf", ".svg")
 """Kinds of pictures."""
 
 
-def check_kind(path: Path, kinds: tuple[str, ...] = (".csv",), what: str = "a table") -> Path:
+def check_kind(
+    path: Path, kinds: tuple[str, ...] = (".csv",), what: str = "a table"
+) -> Path:
     """Return `path` if a file of one of the `kinds` can be written there, or raise FileError."""
     if path.suffix.lower() not in kinds:
         raise FileError(f"{path}: {what} ends in {' or '.join(kinds)}")
@@ -42,7 +44,8 @@ def write_picture(figure: Any, path: Path) -> Path:
 def write_solution(solution: pf.Solution, folder: Path, label: str) -> list[Path]:
     """Write a solution as NetCDF, which `planarfriction.Solution.load` reads, and as CSV; return both paths."""
     stem = f"{slug(solution.scene.name)}-{slug(label)}"
-    stored, table = folder / f"{stem}.nc", folder / f"{stem}.csv"
+    stored = folder / f"{stem}.nc"
+    table = folder / f"{stem}.csv"
     solution.save(stored)
     write_csv(table, history_columns(solution))
     return [stored, table]
@@ -54,11 +57,20 @@ def history_columns(solution: pf.Solution) -> dict[str, np.ndarray]:
     def values(name: str) -> np.ndarray:
         return solution.histories[name].values
 
-    columns = {name: values(name) for name in ("time", "x", "y", "theta", "vx", "vy", "omega")}
+    columns = {
+        name: values(name) for name in ("time", "x", "y", "theta", "vx", "vy", "omega")
+    }
     for index, contact in enumerate(map(str, values("contact"))):
-        wrench = {name: values(name)[:, index] for name in ("fx", "fy", "tau", "normal_force")}
-        twist = dict(zip(("vx", "vy", "omega"), solution.contact_twist(contact).T, strict=True))
-        columns |= {f"{slug(contact)}.{name}": column for name, column in (twist | wrench).items()}
+        wrench = {
+            name: values(name)[:, index] for name in ("fx", "fy", "tau", "normal_force")
+        }
+        twist = dict(
+            zip(("vx", "vy", "omega"), solution.contact_twist(contact).T, strict=True)
+        )
+        columns |= {
+            f"{slug(contact)}.{name}": column
+            for name, column in (twist | wrench).items()
+        }
     return columns
 
 

@@ -30,15 +30,35 @@ def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
 
     every = list(solutions.values())
     ends = {name: [_last(each, name) for each in every] for name in ("x", "y", "theta")}
-    length, angle = unit_for("length", ends["x"], ends["y"]), unit_for("angle", ends["theta"])
+    length = unit_for("length", ends["x"], ends["y"])
+    angle = unit_for("angle", ends["theta"])
     rows = [
-        [f"final {called} [{unit.label}]", *(f"{unit.factor * end:.5g}" for end in ends[name])]
-        for name, called, unit in (("x", "x", length), ("y", "y", length), ("theta", "angle", angle))
+        [
+            f"final {called} [{unit.label}]",
+            *(f"{unit.factor * end:.5g}" for end in ends[name]),
+        ]
+        for name, called, unit in (
+            ("x", "x", length),
+            ("y", "y", length),
+            ("theta", "angle", angle),
+        )
     ]
     if len(every) > 1:
         differences = [largest_differences(each, every[0]) for each in every[1:]]
-        rows.append(["largest difference, position [mm]", "", *(f"{1e3 * each[0]:.4g}" for each in differences)])
-        rows.append(["largest difference, angle [deg]", "", *(f"{np.degrees(each[1]):.4g}" for each in differences)])
+        rows.append(
+            [
+                "largest difference, position [mm]",
+                "",
+                *(f"{1e3 * each[0]:.4g}" for each in differences),
+            ]
+        )
+        rows.append(
+            [
+                "largest difference, angle [deg]",
+                "",
+                *(f"{np.degrees(each[1]):.4g}" for each in differences),
+            ]
+        )
     statistics = [each.statistics for each in every]
     rows += [
         ["simulated time [s]", *(f"{_last(each, 'time'):g}" for each in every)],
@@ -48,18 +68,27 @@ def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
         ["times faster than real time", *(_speed(each) for each in every)],
     ]
     if any(each.compile_time > 0.1 for each in statistics):
-        rows.append(["loading or compiling the solver [s]", *(f"{each.compile_time:.3g}" for each in statistics)])
+        rows.append(
+            [
+                "loading or compiling the solver [s]",
+                *(f"{each.compile_time:.3g}" for each in statistics),
+            ]
+        )
     if any(each.status != FINISHED for each in every):
         rows.append(["ended", *(each.status for each in every)])
     return rows
 
 
-def largest_differences(solution: pf.Solution, reference: pf.Solution) -> tuple[float, float]:
+def largest_differences(
+    solution: pf.Solution, reference: pf.Solution
+) -> tuple[float, float]:
     """Return the largest differences of position [m] and angle [rad] over the time that both solutions cover."""
-    time, own = reference.histories["time"].values, solution.histories["time"].values
+    time = reference.histories["time"].values
+    own = solution.histories["time"].values
     time = time[time <= own[-1]]
     dx, dy, dtheta = (
-        np.interp(time, own, solution.histories[name].values) - reference.histories[name].values[: len(time)]
+        np.interp(time, own, solution.histories[name].values)
+        - reference.histories[name].values[: len(time)]
         for name in ("x", "y", "theta")
     )
     return float(np.hypot(dx, dy).max()), float(np.abs(dtheta).max())
@@ -88,7 +117,9 @@ class Usual(NamedTuple):
     """Width of a patch given by its name [m]."""
     patch: Callable[[], pf.ContactPatch] | None = None
     """Makes the patch; None for a disc."""
-    law: Callable[[], pf.LuGre] = lambda: pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+    law: Callable[[], pf.LuGre] = lambda: pf.LuGre(
+        mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)
+    )
     """Makes the law; that of the published experiments."""
 
 
@@ -97,7 +128,9 @@ _USUAL = {
     # a soft finger on a disc that it fills at 8 N: Hertz contact, of radius 6 mm at 1 N
     "pivot": Usual(
         width=0.024,
-        patch=lambda: pf.ContactPatch.disc(0.012, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012)),
+        patch=lambda: pf.ContactPatch.disc(
+            0.012, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012)
+        ),
     ),
     "foot": Usual(width=0.06),
     # the ring that a curling stone stands on; granite on pebbled ice: bristles of 0.1 um, no viscous friction at cm/s
@@ -111,7 +144,11 @@ _USUAL = {
 
 
 def build_scenes(
-    name: str, models: Sequence[str], *, settings: Mapping[str, Any] | None = None, **options: Any
+    name: str,
+    models: Sequence[str],
+    *,
+    settings: Mapping[str, Any] | None = None,
+    **options: Any,
 ) -> dict[str, pf.Scene]:
     """Return the scenes to simulate, by the label of their model, with the values of `settings` by their paths."""
     makers = scene_makers(name, models, **options)
@@ -131,7 +168,11 @@ def scene_makers(
     """Return functions that make the scenes of some values, by the kind of their model; "" for the file's own."""
     if t_end is not None:
         validation.positive("--t-end", t_end)
-    kinds = list(dict.fromkeys(kind for each in models for kind in (BOTH if each == "both" else [each])))
+    kinds = list(
+        dict.fromkeys(
+            kind for each in models for kind in (BOTH if each == "both" else [each])
+        )
+    )
     if Path(name).suffix.lower() in (".toml", ".json"):
         return _makers_from_file(name, kinds, cells, patch, size or {})
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
@@ -147,15 +188,23 @@ def scene_makers(
     if name == "free-slide":
         options["save_every"] = SLIDE_SAMPLING
     made = {kind: _make(MODELS[kind], contact_patch, law, cells) for kind in kinds}
-    return {kind: functools.partial(_ready, SCENES[name], model, options) for kind, model in made.items()}
+    return {
+        kind: functools.partial(_ready, SCENES[name], model, options)
+        for kind, model in made.items()
+    }
 
 
-def _ready(make: Callable[..., pf.Scene], model: Any, options: dict[str, Any], /, **values: Any) -> pf.Scene:
+def _ready(
+    make: Callable[..., pf.Scene], model: Any, options: dict[str, Any], /, **values: Any
+) -> pf.Scene:
     """Make a ready scene: values that its function takes, such as `mass`, go there, the others to what it returns."""
     from planarfriction.sweeps.settings import Settable
 
     own = [name for name in inspect.signature(make).parameters if name != "model"]
-    scene = make(model, **options | {name: value for name, value in values.items() if name in own})
+    scene = make(
+        model,
+        **options | {name: value for name, value in values.items() if name in own},
+    )
     rest = {path: value for path, value in values.items() if path not in own}
     return Settable(scene, own)(**rest) if rest else scene
 
@@ -185,23 +234,37 @@ def _check_cells(cells: int | None, makes: Iterable[Any]) -> None:
     validation.count("--cells", cells)
     if not any(map(_has_cells, makes)):
         kinds = ", ".join(kind for kind, make in MODELS.items() if _has_cells(make))
-        raise InvalidValueError("--cells", f"be given only for a model that has a number of cells ({kinds})", cells)
+        raise InvalidValueError(
+            "--cells",
+            f"be given only for a model that has a number of cells ({kinds})",
+            cells,
+        )
 
 
 def _make(make: Any, patch: pf.ContactPatch, law: Any, cells: int | None) -> Any:
     """Make a model of a class, of so many `cells` if it has a number of them."""
-    return make(patch, law, **({"cells": cells} if cells is not None and _has_cells(make) else {}))
+    return make(
+        patch,
+        law,
+        **({"cells": cells} if cells is not None and _has_cells(make) else {}),
+    )
 
 
 def _makers_from_file(
-    path: str, kinds: Sequence[str], cells: int | None, patch: str | None, size: Mapping[str, Any]
+    path: str,
+    kinds: Sequence[str],
+    cells: int | None,
+    patch: str | None,
+    size: Mapping[str, Any],
 ) -> dict[str, Callable[..., pf.Scene]]:
     from planarfriction.sweeps.settings import Settable
 
     make = Settable(path)
     if patch is None and size:
         name, value = next(iter(size.items()))
-        raise InvalidValueError(f"--{name.replace('_', '-')}", "be given only with --patch", value)
+        raise InvalidValueError(
+            f"--{name.replace('_', '-')}", "be given only with --patch", value
+        )
     contact_patch = None if patch is None else find_patch(patch, size)
     if not kinds and contact_patch is None and cells is None:
         return {"": make}
@@ -220,7 +283,9 @@ def _label(scene: pf.Scene) -> str:
     return (kinds.pop() if len(kinds) == 1 else None) or "mixed"
 
 
-def _with_models(scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, cells: int | None) -> pf.Scene:
+def _with_models(
+    scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, cells: int | None
+) -> pf.Scene:
     """Return the scene with models of one kind on its own patches or on `patch`, laws as they are.
 
     The kind is "" for that of the scene, "mixed" for each as it is; `cells` goes to models that have a number of them.
@@ -234,7 +299,9 @@ def _with_models(scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, cell
         if patch is not None or kind not in ("mixed", MODELS.name_of(model)):
             make = type(model) if kind == "mixed" else MODELS[kind]
             wanted = getattr(model, "cells", None) if cells is None else cells
-            model = _make(make, model.patch if patch is None else patch, model.law, wanted)
+            model = _make(
+                make, model.patch if patch is None else patch, model.law, wanted
+            )
         elif cells is not None and _has_cells(type(model)):
             model = dataclasses.replace(model, cells=cells)
         contacts.append(dataclasses.replace(contact, model=model))
@@ -256,7 +323,9 @@ def run(
     """Simulate each scene, save as soon as it is done, print the comparison, draw; returns the exit code."""
     from planarfriction.scenes import simulate
 
-    scenes = build_scenes(name, model, settings=one_each(settings), t_end=t_end, **options)
+    scenes = build_scenes(
+        name, model, settings=one_each(settings), t_end=t_end, **options
+    )
     limits: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if rtol is not None:
         limits["rtol"] = validation.positive("--rtol", rtol)
@@ -267,7 +336,9 @@ def run(
     solutions: dict[str, pf.Solution] = {}
     try:
         for label, scene in scenes.items():
-            with simulation_progress(label, limits.get("t_end", scene.t_end)) as progress:
+            with simulation_progress(
+                label, limits.get("t_end", scene.t_end)
+            ) as progress:
                 solutions[label] = simulate(scene, progress=progress, **limits)
             _save(solutions[label], folder, label)
     except SimulationInterrupted as stop:
@@ -282,7 +353,12 @@ def run(
     return 0
 
 
-def _keep_part(part: pf.Solution, solutions: dict[str, pf.Solution], label: str, folder: Path | None) -> int:
+def _keep_part(
+    part: pf.Solution,
+    solutions: dict[str, pf.Solution],
+    label: str,
+    folder: Path | None,
+) -> int:
     note(f"stopped at t = {part.histories['time'].values[-1]:g} s of the {label} run")
     solutions[label] = part
     _save(part, folder, label)
@@ -301,7 +377,9 @@ def _print(solutions: dict[str, pf.Solution]) -> None:
     print_table(name, ["", *solutions], comparison(solutions))
 
 
-def _draw(solutions: dict[str, pf.Solution], folder: Path, pictures: Sequence[str]) -> None:
+def _draw(
+    solutions: dict[str, pf.Solution], folder: Path, pictures: Sequence[str]
+) -> None:
     """Draw the histories of all runs, the motion of each, and the patch; animate each."""
     from planarfriction import plots
 
@@ -310,10 +388,15 @@ def _draw(solutions: dict[str, pf.Solution], folder: Path, pictures: Sequence[st
     if "plot" in pictures:
         with simulation_progress("drawing", 1.0):
             figures = {f"{name}-histories": plots.plot_histories(solutions)}
-            figures |= {f"{name}-motion-{output.slug(each)}": plots.plot_motion(solutions[each]) for each in solutions}
+            figures |= {
+                f"{name}-motion-{output.slug(each)}": plots.plot_motion(solutions[each])
+                for each in solutions
+            }
             contact = first.scene.contacts[0]
             load = float(contact.normal_force(0.0))
-            figures[f"{name}-patch"] = plots.plot_patch(contact.model.patch, normal_force=load)
+            figures[f"{name}-patch"] = plots.plot_patch(
+                contact.model.patch, normal_force=load
+            )
             for stem, figure in figures.items():
                 note(f"wrote {output.write_picture(figure, folder / f'{stem}.png')}")
     if "animate" in pictures:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from planarfriction.cli.options import FILE, cells_option, complete_scene, load_function, map_options, patch_option
+from planarfriction.cli.options import (
+    FILE,
+    cells_option,
+    complete_scene,
+    load_function,
+    map_options,
+    patch_option,
+)
 from planarfriction.families import SCENES
 
 if TYPE_CHECKING:
@@ -32,17 +39,32 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
     required=True,
     help="START:STOP:COUNT, both ends included, or VALUE,VALUE,...; may be repeated.",
 )
-@click.option("--model", metavar="NAME", help="Friction model. Default: the file's, or reduced.")
+@click.option(
+    "--model", metavar="NAME", help="Friction model. Default: the file's, or reduced."
+)
 @cells_option
 @patch_option("Default: Circle, or the file's.")
 @map_options
 @click.option("--t-end", type=float, help="Duration of a ready scene in s.")
 @click.option(
-    "--measure", metavar="FILE.py:NAME", help="Function of a solution that returns what to keep. Default: all."
+    "--measure",
+    metavar="FILE.py:NAME",
+    help="Function of a solution that returns what to keep. Default: all.",
 )
-@click.option("--out", type=FILE, default=Path("sweep"), show_default=True, help="Folder for the runs.")
+@click.option(
+    "--out",
+    type=FILE,
+    default=Path("sweep"),
+    show_default=True,
+    help="Folder for the runs.",
+)
 def sweep(
-    scene: str, settings: tuple[str, ...], model: str | None, measure: str | None, out: Path, **options: Any
+    scene: str,
+    settings: tuple[str, ...],
+    model: str | None,
+    measure: str | None,
+    out: Path,
+    **options: Any,
 ) -> int:
     """Simulate a scene for every combination of some of its values; an interrupted sweep can be continued.
 
@@ -87,7 +109,11 @@ def sweep(
 
             data = sweeps.sweep(make, values, out=out, measure=function, progress=tell)
     except SweepInterrupted:
-        note(f"interrupted: {last[0]}; the same command continues" if last else "interrupted")
+        note(
+            f"interrupted: {last[0]}; the same command continues"
+            if last
+            else "interrupted"
+        )
         return INTERRUPTED
     note(str(last[0]))
     _show(data, out)
@@ -101,12 +127,16 @@ def _show(data: xr.Dataset, out: Path) -> None:
 
     failed = [str(each) for each in data.failure.values.ravel().tolist() if each]
     if failed:
-        note(f"{len(failed)} failed; the first: {failed[0]} (for all reasons see the variable failure)")
+        note(
+            f"{len(failed)} failed; the first: {failed[0]} (for all reasons see the variable failure)"
+        )
     swept = data.status.dims
     note(f"wrote {write_dataset(data, out / 'sweep.nc')}")
     ends = data.isel(time=-1) if "time" in data.dims else data
     columns = dict(
-        _in_units(each) for each in ends.data_vars.values() if each.dims == swept and each.dtype.kind in "fiu"
+        _in_units(each)
+        for each in ends.data_vars.values()
+        if each.dims == swept and each.dtype.kind in "fiu"
     )
     title = f"{data.status.size} runs over {', '.join(map(str, swept))}"
     if "time" in data.dims:
@@ -115,12 +145,21 @@ def _show(data: xr.Dataset, out: Path) -> None:
         import numpy as np
 
         known = {name: each[np.isfinite(each)] for name, each in columns.items()}
-        ranges = {name: np.quantile(each, [0.0, 0.5, 1.0]) for name, each in known.items() if each.size}
-        rows = [[name, *(f"{value:.3g}" for value in each)] for name, each in ranges.items()]
+        ranges = {
+            name: np.quantile(each, [0.0, 0.5, 1.0])
+            for name, each in known.items()
+            if each.size
+        }
+        rows = [
+            [name, *(f"{value:.3g}" for value in each)] for name, each in ranges.items()
+        ]
         print_table(title, ["", "smallest", "median", "largest"], rows)
         return
     labels = itertools.product(*(data[name].values.tolist() for name in swept))
-    values = zip(*([f"{value:.3g}" for value in each.tolist()] for each in columns.values()), strict=True)
+    values = zip(
+        *([f"{value:.3g}" for value in each.tolist()] for each in columns.values()),
+        strict=True,
+    )
     rows = [[*(f"{each:.4g}" if isinstance(each, float) else str(each) for each in label), *row]
             for label, row in zip(labels, values, strict=True)]  # fmt: skip
     print_table(title, [*map(str, swept), *columns], rows)
@@ -132,8 +171,10 @@ def _in_units(each: xr.DataArray) -> tuple[str, np.ndarray]:
 
     from planarfriction.shown import unit_for
 
-    values, unit = each.values.ravel(), each.attrs.get("units")
+    values = each.values.ravel()
+    unit = each.attrs.get("units")
     if unit in KINDS:
         suited = unit_for(KINDS[unit], values[np.isfinite(values)])
-        values, unit = suited.factor * values, suited.label
+        values = suited.factor * values
+        unit = suited.label
     return (f"{each.name} [{unit}]" if unit else str(each.name)), values

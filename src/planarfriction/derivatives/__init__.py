@@ -6,7 +6,11 @@ are derivatives of the steps themselves, not of the continuous model, so they ag
 to rounding. Kinks are described in `planarfriction._engine.bristles.bristle_step`.
 """
 
-from planarfriction.derivatives.parameters import PARAMETERS, parameter_names, parameters_of
+from planarfriction.derivatives.parameters import (
+    PARAMETERS,
+    parameter_names,
+    parameters_of,
+)
 from planarfriction.derivatives.rollouts import (
     Rollout,
     RolloutJacobian,
@@ -21,7 +25,12 @@ from planarfriction.derivatives.rollouts import (
     rollout_vjp,
 )
 from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS
-from planarfriction.derivatives.scenes import SceneGradient, SceneSensitivities, scene_gradient, scene_sensitivities
+from planarfriction.derivatives.scenes import (
+    SceneGradient,
+    SceneSensitivities,
+    scene_gradient,
+    scene_sensitivities,
+)
 
 __all__ = [
     "PARAMETERS",

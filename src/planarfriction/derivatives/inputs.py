@@ -47,36 +47,70 @@ class RolloutInputs(NamedTuple):
 
     def compiled(self, slopes: bool = False) -> Inputs:
         """Return the inputs as compiled loops take them, with the `slopes` of the weights of cells by the load."""
-        shape, which = self.model.shapes, np.zeros((1, len(self.dt)), dtype=int)
+        shape = self.model.shapes
+        which = np.zeros((1, len(self.dt)), dtype=int)
         if own := self.model.batch:
-            each = np.broadcast_to(np.arange(math.prod(own)).reshape(own), self.batch).reshape(-1, 1)
+            each = np.broadcast_to(
+                np.arange(math.prod(own)).reshape(own), self.batch
+            ).reshape(-1, 1)
             which = np.repeat(each, len(self.dt), axis=1)
         if not isinstance(shape, ShapesByLoad):
             loads, which = np.unique(self.normal_force, return_inverse=True)
             which = which.reshape(self.normal_force.shape)
-            if (loads[:1] == 0.0).any():  # any shape does for a step without load, but for its slope
+            if (
+                loads[:1] == 0.0
+            ).any():  # any shape does for a step without load, but for its slope
                 loads[0] = loads[1] if len(loads) > 1 and not slopes else LIGHTEST
             shape = shape(loads if len(loads) else np.array([LIGHTEST]), slopes)
-        return Inputs(self.rows, shape, self.twist, self.normal_force, self.dt, which, self.model.reference)
+        return Inputs(
+            self.rows,
+            shape,
+            self.twist,
+            self.normal_force,
+            self.dt,
+            which,
+            self.model.reference,
+        )
 
 
-def sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def sequences(
+    twist: Any, normal_force: Any, dt: Any
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return twists `[..., T, 3]`, loads `[..., T]` and steps `[T]`."""
     twist, load, dt = (
-        validation.numbers(n, v) for n, v in (("twist", twist), ("normal_force", normal_force), ("dt", dt))
+        validation.numbers(n, v)
+        for n, v in (("twist", twist), ("normal_force", normal_force), ("dt", dt))
     )
     if twist.ndim < 2 or twist.shape[-1] != 3:
-        raise InvalidValueError("twist", "have shape [..., T, 3]", f"shape {list(twist.shape)}")
+        raise InvalidValueError(
+            "twist", "have shape [..., T, 3]", f"shape {list(twist.shape)}"
+        )
     steps = twist.shape[-2]
     if load.ndim and load.shape[-1] not in (1, steps):
-        raise InvalidValueError("normal_force", f"broadcast with [..., {steps}]", f"shape {list(load.shape)}")
+        raise InvalidValueError(
+            "normal_force",
+            f"broadcast with [..., {steps}]",
+            f"shape {list(load.shape)}",
+        )
     if dt.ndim and dt.shape != (steps,):
-        raise InvalidValueError("dt", f"be one number or have shape [{steps}]", f"shape {list(dt.shape)}")
-    return twist, np.broadcast_to(load, (*load.shape[:-1], steps)), np.broadcast_to(dt, steps)
+        raise InvalidValueError(
+            "dt", f"be one number or have shape [{steps}]", f"shape {list(dt.shape)}"
+        )
+    return (
+        twist,
+        np.broadcast_to(load, (*load.shape[:-1], steps)),
+        np.broadcast_to(dt, steps),
+    )
 
 
 def checked(
-    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, parameters: Any, more: Sequence[tuple] = ()
+    model: Any,
+    state: Any,
+    twist: Any,
+    normal_force: Any,
+    dt: Any,
+    parameters: Any,
+    more: Sequence[tuple] = (),
 ) -> RolloutInputs:
     """Check the inputs of a rollout; `more` are batch axes of other arrays that belong to it."""
     packed = pack(model, parameters)
@@ -84,24 +118,42 @@ def checked(
     state = np.zeros(inner) if state is None else validation.numbers("state", state)
     if state.shape[-len(inner) :] != inner:
         wanted = ", ".join(map(str, inner))
-        raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(state.shape)}")
+        raise InvalidValueError(
+            "state", f"have shape [..., {wanted}]", f"shape {list(state.shape)}"
+        )
     twist, load, dt = sequences(twist, normal_force, dt)
     steps = len(dt)
-    for name, value in {"state": state, "twist": twist, "normal_force": load, "dt": dt}.items():
+    for name, value in {
+        "state": state,
+        "twist": twist,
+        "normal_force": load,
+        "dt": dt,
+    }.items():
         validation.within_range(name, value.min(initial=0.0), value.max(initial=0.0))
     for name, value in {"normal_force": load, "dt": dt}.items():
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))
-    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], packed.rows.shape[:-1], packed.batch, *more
+    axes = (
+        state.shape[: -len(inner)],
+        twist.shape[:-2],
+        load.shape[:-1],
+        packed.rows.shape[:-1],
+        packed.batch,
+        *more,
+    )
     try:
         batch = np.broadcast_shapes(*axes)
     except ValueError:
-        raise InvalidValueError("batch axes", "broadcast", f"shapes {', '.join(str(list(a)) for a in axes)}") from None
+        raise InvalidValueError(
+            "batch axes", "broadcast", f"shapes {', '.join(str(list(a)) for a in axes)}"
+        ) from None
     count = int(np.prod(batch))
     return RolloutInputs(
         packed,
         rows_of("parameters", packed.rows, packed.rows.shape[-1:], batch),
-        np.ascontiguousarray(np.broadcast_to(state, (*batch, *inner)).reshape(count, math.prod(inner))),
+        np.ascontiguousarray(
+            np.broadcast_to(state, (*batch, *inner)).reshape(count, math.prod(inner))
+        ),
         packed.turned(rows_of("twist", twist, (steps, 3), batch)),
         rows_of("normal_force", load, (steps,), batch),
         np.require(dt, float, ["C", "W", "A"]),
@@ -109,7 +161,9 @@ def checked(
     )
 
 
-def rows_of(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
+def rows_of(
+    name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]
+) -> np.ndarray:
     """Return `value` `[..., *inner]` as `[B, *inner]`, or as one row where the contacts share it."""
     value = validation.finite_numbers(name, value)
     if value.size != np.prod(inner) or value.shape[value.ndim - len(inner) :] != inner:
@@ -117,7 +171,9 @@ def rows_of(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...
             value = np.broadcast_to(value, (*batch, *inner))
         except ValueError:
             wanted = ", ".join(str(n) for n in inner)
-            raise InvalidValueError(name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}") from None
+            raise InvalidValueError(
+                name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}"
+            ) from None
     outer = value.shape[: value.ndim - len(inner)]
     return np.require(value.reshape(math.prod(outer), *inner), float, ["C", "W", "A"])
 

@@ -14,7 +14,12 @@ from planarfriction._engine.cells import cells_rollout
 from planarfriction._engine.cells.cell_kinds import rollouts_of_cells
 from planarfriction._engine.cells.rollouts import ShapesByLoad
 from planarfriction._engine.published import published_step
-from planarfriction._engine.published.published_rollouts import gradient, rollout, sensitivities, tangent
+from planarfriction._engine.published.published_rollouts import (
+    gradient,
+    rollout,
+    sensitivities,
+    tangent,
+)
 from planarfriction._engine.records.packed import cells_by_load
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
@@ -23,7 +28,13 @@ from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.models.reduced_published import axes_of
 
-PARAMETERS = *cells_rollout.PARAMETERS, "contact_radius", "second_moment", "centre_x", "centre_y"
+PARAMETERS = (
+    *cells_rollout.PARAMETERS,
+    "contact_radius",
+    "second_moment",
+    "centre_x",
+    "centre_y",
+)
 """Parameters of `ReducedModelPublished`, in the order of their vector; units as in `LuGre`, [m], [m^2], [m], [m]."""
 
 POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
@@ -55,7 +66,11 @@ PUBLISHED = Family(PARAMETERS, _COLUMNS, rollout, gradient, sensitivities, tange
 @functools.cache
 def _cells(size: int, turned: bool, leans: bool) -> Family:
     """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3 (see `cell_passes.KINDS`)."""
-    return Family(cells_rollout.PARAMETERS, np.array(cells_rollout.COLUMNS), *rollouts_of_cells(size, turned, leans))
+    return Family(
+        cells_rollout.PARAMETERS,
+        np.array(cells_rollout.COLUMNS),
+        *rollouts_of_cells(size, turned, leans),
+    )
 
 
 class Packed(NamedTuple):
@@ -109,7 +124,9 @@ def pack(model: Any, parameters: Any = None) -> Packed:
     if parameters is None:
         return packed
     values = _checked(parameters, packed.family.names)
-    rows = np.broadcast_to(packed.rows, (*values.shape[:-1], packed.rows.shape[-1])).copy()
+    rows = np.broadcast_to(
+        packed.rows, (*values.shape[:-1], packed.rows.shape[-1])
+    ).copy()
     rows[..., packed.family.columns] = values
     return packed._replace(rows=rows)
 
@@ -119,8 +136,14 @@ def _family(model: Any) -> Family:
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
     if isinstance(model, DistributedModel) and not is_rate_law(model.law):
-        return _cells(model.patch.bristles, model.patch.anisotropic, model.patch.asymmetric)
-    kind = "cells with a RateLaw" if isinstance(model, DistributedModel) else type(model).__name__
+        return _cells(
+            model.patch.bristles, model.patch.anisotropic, model.patch.asymmetric
+        )
+    kind = (
+        "cells with a RateLaw"
+        if isinstance(model, DistributedModel)
+        else type(model).__name__
+    )
     raise InvalidValueError("model", "be one that has compiled rollouts", kind)
 
 
@@ -154,40 +177,71 @@ def _packed(model: Any) -> Packed:
     if isinstance(model, DistributedModel):
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
-        return Packed(family, np.array(law), shapes, inner=model.state_shape, reference=model.compiled.reference)
+        return Packed(
+            family,
+            np.array(law),
+            shapes,
+            inner=model.state_shape,
+            reference=model.compiled.reference,
+        )
     shape = model.shape_at(1.0)
-    surface, axes = shape.surface.numbers, None if (shape.root == np.eye(2)).all() else shape.axes
-    return _on_surface(np.array([*law, *shape.numbers]), surface.kind, surface.size, surface.data, axes)
+    surface = shape.surface.numbers
+    axes = None if (shape.root == np.eye(2)).all() else shape.axes
+    return _on_surface(
+        np.array([*law, *shape.numbers]), surface.kind, surface.size, surface.data, axes
+    )
 
 
-def _on_surface(row: np.ndarray, kind: int, size: int, data: np.ndarray, axes: np.ndarray | None) -> Packed:
+def _on_surface(
+    row: np.ndarray, kind: int, size: int, data: np.ndarray, axes: np.ndarray | None
+) -> Packed:
     none = np.zeros((1, 0))
-    return Packed(PUBLISHED, row, ShapesByLoad(np.array([kind, 0, size]), none, none, data), axes)
+    return Packed(
+        PUBLISHED, row, ShapesByLoad(np.array([kind, 0, size]), none, none, data), axes
+    )
 
 
 def pack_surface(
-    elasto_plastic: bool, kind: int, size: int, data: np.ndarray, root: np.ndarray | None = None
+    elasto_plastic: bool,
+    kind: int,
+    size: int,
+    data: np.ndarray,
+    root: np.ndarray | None = None,
 ) -> Packed:
     """Return a `ReducedModelPublished` by its limit surface, for rollouts at given parameters of law and shape."""
-    row = np.array([*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)])
+    row = np.array(
+        [*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)]
+    )
     axes = None if root is None else axes_of(root)
     return _on_surface(row, kind, size, np.ascontiguousarray(data, dtype=float), axes)
 
 
-def pack_cells(elasto_plastic: bool, weights: np.ndarray, positions: np.ndarray, reference: Any = 0.0) -> Packed:
+def pack_cells(
+    elasto_plastic: bool,
+    weights: np.ndarray,
+    positions: np.ndarray,
+    reference: Any = 0.0,
+) -> Packed:
     """Return a `DistributedModel` by its cells and their weights `[..., N]`, for rollouts at given parameters.
 
     `positions` are `[2, N]`, levers `[5, N]`, or these with an asymmetry behind them `[7, N]`; of discs `[3, N]`,
     `[6, N]` or `[8, N]`, with `kappa a` before the asymmetry. `reference` is a `LuGre.reference_load` [N], or 0.
     """
-    levers, weights, count = np.asarray(positions, dtype=float), np.asarray(weights, dtype=float), len(positions)
-    rows, inner = weights.reshape(-1, weights.shape[-1]), (3 if count in (3, 6, 8) else 2, weights.shape[-1])
+    levers = np.asarray(positions, dtype=float)
+    weights = np.asarray(weights, dtype=float)
+    count = len(positions)
+    rows = weights.reshape(-1, weights.shape[-1])
+    inner = (3 if count in (3, 6, 8) else 2, weights.shape[-1])
     same = len(rows) > 0 and (rows == rows[0]).all()
     if 3 < count < 7:
         levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
-    family, shapes = _cells(inner[0], count > 3, count > 6), cells_by_load(levers, rows[:1] if same else rows, None)
-    law, batch = np.array(_any_law(elasto_plastic)), () if same else weights.shape[:-1]
-    return Packed(family, law, shapes, inner=inner, reference=float(reference), batch=batch)
+    family = _cells(inner[0], count > 3, count > 6)
+    shapes = cells_by_load(levers, rows[:1] if same else rows, None)
+    law = np.array(_any_law(elasto_plastic))
+    batch = () if same else weights.shape[:-1]
+    return Packed(
+        family, law, shapes, inner=inner, reference=float(reference), batch=batch
+    )
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:
@@ -197,9 +251,14 @@ def _any_law(elasto_plastic: bool) -> LawNumbers:
 def _checked(parameters: Any, names: tuple[str, ...]) -> np.ndarray:
     values = validation.numbers("parameters", parameters)
     if values.shape[-1:] != (len(names),):
-        raise InvalidValueError("parameters", f"have shape [..., {len(names)}]", f"shape {list(values.shape)}")
+        raise InvalidValueError(
+            "parameters",
+            f"have shape [..., {len(names)}]",
+            f"shape {list(values.shape)}",
+        )
     for name, column in zip(names, np.moveaxis(values, -1, 0), strict=True):
-        low, high = float(column.min(initial=np.inf)), float(column.max(initial=-np.inf))
+        low = float(column.min(initial=np.inf))
+        high = float(column.max(initial=-np.inf))
         if not np.isfinite(column).all():
             raise InvalidValueError(name, "be finite", "NaN or infinity")
         check_range(name, low, high)

@@ -72,25 +72,49 @@ class SceneDerivatives(ByValue):
 class MotionPath:
     """A motion of a scene on its way, with its recorded samples."""
 
-    def __init__(self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None) -> None:
+    def __init__(
+        self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None
+    ) -> None:
         options = SolverOptions() if options is None else options
-        plan = validation.instance("options", options, SolverOptions, "SolverOptions").plan(scene, RTOL)
-        self.scene, self.inputs = scene, inputs
+        plan = validation.instance(
+            "options", options, SolverOptions, "SolverOptions"
+        ).plan(scene, RTOL)
+        self.scene = scene
+        self.inputs = inputs
         for contact in scene.contacts:
             if contact.edge:
-                raise InvalidValueError(f"edge of contact {contact.name!r}", "be False for derivatives of scenes", True)
-        self.batches = SegmentBatches(scene, plan.end, times=plan.times, sensitivities=True, marks=inputs.marks)
+                raise InvalidValueError(
+                    f"edge of contact {contact.name!r}",
+                    "be False for derivatives of scenes",
+                    True,
+                )
+        self.batches = SegmentBatches(
+            scene, plan.end, times=plan.times, sensitivities=True, marks=inputs.marks
+        )
         for contact, model in zip(scene.contacts, self.batches.models, strict=True):
             if None in model.functions:
                 rule = "have all functions of protocol.ModelFunctions for derivatives of scenes"
-                raise InvalidValueError(f"model of contact {contact.name!r}", rule, type(contact.model).__name__)
-        self.instants, contacts = len(plan.times), len(scene.contacts)
-        self._rtol, self._atol, self.scale = plan.rtol, plan.atol * self.batches.state_scale, self.batches.state_scale
+                raise InvalidValueError(
+                    f"model of contact {contact.name!r}",
+                    rule,
+                    type(contact.model).__name__,
+                )
+        self.instants = len(plan.times)
+        contacts = len(scene.contacts)
+        self._rtol = plan.rtol
+        self._atol = plan.atol * self.batches.state_scale
+        self.scale = self.batches.state_scale
         self.accuracy = SHARE * plan.rtol**POWER
         """Relative accuracy of each step of the derivatives."""
-        wrenches, loads = np.empty((self.instants, contacts, 3)), np.empty((self.instants, contacts))
-        self._output = Output(plan.times, np.empty((self.instants, 6)), wrenches, loads, np.empty((0, 0)))
-        self._limit = plan.max_steps, "max_steps steps were taken before the end: raise it, or check the scene"
+        wrenches = np.empty((self.instants, contacts, 3))
+        loads = np.empty((self.instants, contacts))
+        self._output = Output(
+            plan.times, np.empty((self.instants, 6)), wrenches, loads, np.empty((0, 0))
+        )
+        self._limit = (
+            plan.max_steps,
+            "max_steps steps were taken before the end: raise it, or check the scene",
+        )
         self.reached = 0
         """Number of instants that have been recorded."""
 
@@ -99,12 +123,23 @@ class MotionPath:
 
         Raises SolverError if the solver fails, or takes too many steps.
         """
-        now, outcome, n, (left, too_many) = start_of(self.batches.state), rosenbrock.DONE, len(self.scale), self._limit
+        now = start_of(self.batches.state)
+        outcome = rosenbrock.DONE
+        n = len(self.scale)
+        (left, too_many) = self._limit
         nodes = max(int(min(NUMBERS / n, most)), LEAST_NODES)
-        path = Path(np.zeros(nodes, np.int64), np.zeros(nodes), np.zeros((nodes, n)), np.zeros((nodes, n)))
+        path = Path(
+            np.zeros(nodes, np.int64),
+            np.zeros(nodes),
+            np.zeros((nodes, n)),
+            np.zeros((nodes, n)),
+        )
         for system in self.batches:
-            run = rosenbrock.Run(system, RODAS4, self._output, now, rtol=self._rtol, atol=self._atol)
-            now.cursor[0], outcome = 0, rosenbrock.PAUSED
+            run = rosenbrock.Run(
+                system, RODAS4, self._output, now, rtol=self._rtol, atol=self._atol
+            )
+            now.cursor[0] = 0
+            outcome = rosenbrock.PAUSED
             while outcome == rosenbrock.PAUSED:
                 nodes, outcome = paths.follow(run.address, path)
                 self.reached = int(now.cursor[1])
@@ -116,7 +151,9 @@ class MotionPath:
             if outcome != rosenbrock.DONE:
                 break
         if outcome == rosenbrock.STEP_TOO_SMALL:
-            raise SolverError("the step size fell below the resolution of time: loosen rtol, or check the scene")
+            raise SolverError(
+                "the step size fell below the resolution of time: loosen rtol, or check the scene"
+            )
 
     @property
     def time(self) -> np.ndarray:
@@ -136,7 +173,9 @@ class MotionPath:
 
 def pieces_of(path: Path) -> list[tuple[int, int]]:
     """Return the first and the last node on each piece between two breaks that a part of a path crosses."""
-    nodes = np.split(np.arange(len(path.piece)), np.flatnonzero(np.diff(path.piece)) + 1)
+    nodes = np.split(
+        np.arange(len(path.piece)), np.flatnonzero(np.diff(path.piece)) + 1
+    )
     return [(int(each[0]), int(each[-1])) for each in nodes if len(each)]
 
 
@@ -146,12 +185,19 @@ def pieces_of(path: Path) -> list[tuple[int, int]]:
 class KeptMotion(MotionPath):
     """A simulated motion with its whole path, along which gradients of costs go back; not for several threads."""
 
-    def __init__(self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None) -> None:
+    def __init__(
+        self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None
+    ) -> None:
         super().__init__(scene, inputs, options)
         if (most := MOST_KEPT // len(self.scale)) < self._limit[0]:
-            self._limit = most, f"the path has more than {most} steps, too many to keep: lower t_end, or raise rtol"
+            self._limit = (
+                most,
+                f"the path has more than {most} steps, too many to keep: lower t_end, or raise rtol",
+            )
         steps = self.steps(MOST_NODES)
-        self._parts = [(system, Path(*(each.copy() for each in path))) for system, path in steps]
+        self._parts = [
+            (system, Path(*(each.copy() for each in path))) for system, path in steps
+        ]
 
     def gradient(self, of_motion: np.ndarray, of_wrenches: np.ndarray) -> np.ndarray:
         """Return the gradient `[P]` of a cost from its derivatives by motion `[M, 6]` and wrenches `[M, C, 3]`."""
@@ -161,17 +207,31 @@ class KeptMotion(MotionPath):
 class _Adjoint:
     """The adjoint of a motion on its way back, and the gain of the cost by then."""
 
-    def __init__(self, motion: KeptMotion, of_motion: np.ndarray, of_wrenches: np.ndarray) -> None:
-        self._bars, self._wrench_bars, self._time = of_motion, of_wrenches, motion.time
-        self._inputs, self._accuracy = motion.inputs, motion.accuracy
-        self._initial, scale = motion.inputs.start(motion.batches), motion.scale
+    def __init__(
+        self, motion: KeptMotion, of_motion: np.ndarray, of_wrenches: np.ndarray
+    ) -> None:
+        self._bars = of_motion
+        self._wrench_bars = of_wrenches
+        self._time = motion.time
+        self._inputs = motion.inputs
+        self._accuracy = motion.accuracy
+        self._initial = motion.inputs.start(motion.batches)
+        scale = motion.scale
         count, n = self._initial.shape
-        self._state, self._gain, self._moments = np.zeros(n), np.zeros(count), np.zeros((self._inputs.inputs, 2))
-        grip = max(np.abs(contact.normal_force.values).max() for contact in motion.scene.contacts)
+        self._state = np.zeros(n)
+        self._gain = np.zeros(count)
+        self._moments = np.zeros((self._inputs.inputs, 2))
+        grip = max(
+            np.abs(contact.normal_force.values).max()
+            for contact in motion.scene.contacts
+        )
         of_forces = of_wrenches * grip * np.array([1.0, 1.0, scale[-3] / scale[-1]])
-        level = np.abs(np.append(of_motion * scale[-6:], of_forces)).max(initial=0.0) or 1.0
+        level = (
+            np.abs(np.append(of_motion * scale[-6:], of_forces)).max(initial=0.0) or 1.0
+        )
         self._atol = self._accuracy * level / scale
-        self._space, self._known = workspace_for(1, self._inputs.inputs, n), 0.0
+        self._space = workspace_for(1, self._inputs.inputs, n)
+        self._known = 0.0
         self._space.record.most[:] = level / self._inputs.input_scale
         self._space.record.left[:] = ALLOWANCE
         self._next = len(self._time) - 1
@@ -183,23 +243,32 @@ class _Adjoint:
             for first, last in reversed(pieces_of(path)):
                 if last > first:
                     self._piece(system, path, first, last)
-        return self._inputs.in_order(self._gain + (self._initial * self._state).sum(axis=1))
+        return self._inputs.in_order(
+            self._gain + (self._initial * self._state).sum(axis=1)
+        )
 
     def _piece(self, system: System, path: Path, first: int, last: int) -> None:
-        piece, breaks = int(path.piece[first]), system.motion.breaks
-        begin, end = float(breaks[piece]), float(breaks[piece + 1])
-        since, reach = float(path.since[last]), float(path.since[first])
+        piece = int(path.piece[first])
+        breaks = system.motion.breaks
+        begin = float(breaks[piece])
+        end = float(breaks[piece + 1])
+        since = float(path.since[last])
+        reach = float(path.since[first])
         if since == end - begin:
             tangent.forget(system.address, piece, self._state[None, :])
             self._known = 0.0
-        drives, place = self._inputs.at(system, piece), (system, path, first, last)
+        drives = self._inputs.at(system, piece)
+        place = (system, path, first, last)
         self._moments[:] = 0.0
-        while (m := self._next) >= 0 and (self._time[m] > begin + reach or self._time[m] == begin == 0.0 == reach):
+        while (m := self._next) >= 0 and (
+            self._time[m] > begin + reach or self._time[m] == begin == 0.0 == reach
+        ):
             instant = min(float(self._time[m]) - begin, since)
             if self._bars[m].any() or self._wrench_bars[m].any():
                 self._propagate(*place, drives, since, instant)
                 self._jump(*place, drives, instant)
-                since, self._known = instant, 0.0
+                since = instant
+                self._known = 0.0
             self._next -= 1
         self._propagate(*place, drives, since, reach)
         self._gain[: len(drives.kind)] += self._inputs.gained(drives, self._moments)
@@ -207,10 +276,21 @@ class _Adjoint:
             tangent.settle(system.address, piece, self._state[None, :])
         if reach == 0.0 and system.motion.body_axes:
             columns = np.flatnonzero(drives.kind == tangent.VELOCITY)
-            self._gain[columns] += drives.weight[columns, 0] * self._state[drives.place[columns] - 6]
-            self._state[-6:-3], self._known = 0.0, 0.0
+            self._gain[columns] += (
+                drives.weight[columns, 0] * self._state[drives.place[columns] - 6]
+            )
+            self._state[-6:-3] = 0.0
+            self._known = 0.0
 
-    def _jump(self, system: System, path: Path, first: int, last: int, drives: Drives, instant: float) -> None:
+    def _jump(
+        self,
+        system: System,
+        path: Path,
+        first: int,
+        last: int,
+        drives: Drives,
+        instant: float,
+    ) -> None:
         """Add the cotangents at the next instant, `instant` seconds into the piece."""
         wrenches = self._wrench_bars[self._next]
         if wrenches.any():
@@ -220,11 +300,27 @@ class _Adjoint:
         self._state[-6:] += self._bars[self._next]
         self._space.record.left[:] += PER_JUMP
 
-    def _propagate(self, system: System, path: Path, first: int, last: int, drives: Drives, *span: float) -> None:
+    def _propagate(
+        self,
+        system: System,
+        path: Path,
+        first: int,
+        last: int,
+        drives: Drives,
+        *span: float,
+    ) -> None:
         since, until = span
         if until < since:
-            stretch, tolerances = Stretch(first, last, since, until), Tolerances(self._accuracy, self._atol)
-            numbers = self._state, drives, self._moments, self._known, tolerances, self._space.address
+            stretch = Stretch(first, last, since, until)
+            tolerances = Tolerances(self._accuracy, self._atol)
+            numbers = (
+                self._state,
+                drives,
+                self._moments,
+                self._known,
+                tolerances,
+                self._space.address,
+            )
             adjoint.propagate_back(system.address, path, stretch, *numbers)
             self._known = 1.0
             if self._space.record.left[0] <= 0.0:

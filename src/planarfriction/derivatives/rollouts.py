@@ -9,9 +9,21 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction._engine.cells.cell_blocks import divided
-from planarfriction._engine.cells.rollouts import Bars, Derivatives, Inputs, ShapesByLoad
+from planarfriction._engine.cells.rollouts import (
+    Bars,
+    Derivatives,
+    Inputs,
+    ShapesByLoad,
+)
 from planarfriction._engine.compiler import threads
-from planarfriction.derivatives.inputs import RolloutInputs, checked, rows_of, sequences, share, sum_to
+from planarfriction.derivatives.inputs import (
+    RolloutInputs,
+    checked,
+    rows_of,
+    sequences,
+    share,
+    sum_to,
+)
 from planarfriction.derivatives.parameters import Packed, is_compiled, pack
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
@@ -98,7 +110,13 @@ class RolloutVJP(NamedTuple):
 
 
 def rollout(
-    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
+    model: Any,
+    state: Any,
+    twist: Any,
+    normal_force: Any,
+    dt: Any,
+    *,
+    parameters: Any = None,
 ) -> Rollout[np.ndarray]:
     """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
@@ -112,8 +130,14 @@ def rollout(
     them.
     """
     if not isinstance(model, FrictionModel | Packed):
-        raise InvalidValueError("model", f"be a friction model ({MODELS.classes()})", type(model).__name__)
-    if parameters is None and isinstance(model, FrictionModel) and not is_compiled(model):
+        raise InvalidValueError(
+            "model", f"be a friction model ({MODELS.classes()})", type(model).__name__
+        )
+    if (
+        parameters is None
+        and isinstance(model, FrictionModel)
+        and not is_compiled(model)
+    ):
         return _stepped(model, state, twist, normal_force, dt)
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, _ = _roll(inputs, 0)
@@ -121,7 +145,13 @@ def rollout(
 
 
 def rollout_states(
-    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
+    model: Any,
+    state: Any,
+    twist: Any,
+    normal_force: Any,
+    dt: Any,
+    *,
+    parameters: Any = None,
 ) -> RolloutStates:
     """Step a model as `rollout` does and keep the state before each step, which saves `rollout_vjp` half of its work.
 
@@ -129,7 +159,9 @@ def rollout_states(
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, states = _roll(inputs, len(inputs.dt))
-    return RolloutStates(inputs.shaped(end), wrenches, inputs.shaped(states, len(inputs.dt)))
+    return RolloutStates(
+        inputs.shaped(end), wrenches, inputs.shaped(states, len(inputs.dt))
+    )
 
 
 def rollout_vjp(
@@ -157,16 +189,27 @@ def rollout_vjp(
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled rollout.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
-    (count, size), steps, packed = inputs.state.shape, len(inputs.dt), inputs.model
-    inner, family, turned = packed.inner, packed.family, packed.turned
+    (count, size) = inputs.state.shape
+    steps = len(inputs.dt)
+    packed = inputs.model
+    inner = packed.inner
+    family = packed.family
+    turned = packed.turned
     cotangents = turned(rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch))
     on_the_way = _on_the_way(inputs, states)
     z_bar = np.zeros_like(inputs.state)
     if state_bar is not None:
-        z_bar[:] = rows_of("state_bar", state_bar, inner, inputs.batch).reshape(-1, size)
+        z_bar[:] = rows_of("state_bar", state_bar, inner, inputs.batch).reshape(
+            -1, size
+        )
     rows_bar = np.zeros((count, inputs.rows.shape[-1]))
-    bars, compiled = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar), inputs.compiled(True)
-    share(compiled, count, lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars))
+    bars = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar)
+    compiled = inputs.compiled(True)
+    share(
+        compiled,
+        count,
+        lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars),
+    )
     vector = parameters if parameters is not None else packed.rows[..., family.columns]
     start = np.empty(inner) if state is None else state
     return RolloutVJP(
@@ -185,11 +228,22 @@ def weights_vjp(
 
     Other arguments are as in `rollout_vjp`. Raises InvalidValueError as `rollout_vjp` does.
     """
-    inputs = checked(model, state, twist, normal_force, dt, parameters, [weights.shape[:-1]])
-    count, shares, on_the_way = len(inputs.state), inputs.model.family.shares, _on_the_way(inputs, states)
-    cotangents = rows_of("wrenches_bar", wrenches_bar, (len(inputs.dt), 3), inputs.batch)
-    found, compiled = np.zeros((count, weights.shape[-1])), inputs.compiled()
-    share(compiled, count, lambda *span: shares(compiled, on_the_way, cotangents, span, found))  # pyright: ignore
+    inputs = checked(
+        model, state, twist, normal_force, dt, parameters, [weights.shape[:-1]]
+    )
+    count = len(inputs.state)
+    shares = inputs.model.family.shares
+    on_the_way = _on_the_way(inputs, states)
+    cotangents = rows_of(
+        "wrenches_bar", wrenches_bar, (len(inputs.dt), 3), inputs.batch
+    )
+    found = np.zeros((count, weights.shape[-1]))
+    compiled = inputs.compiled()
+    share(
+        compiled,
+        count,
+        lambda *span: shares(compiled, on_the_way, cotangents, span, found),
+    )  # pyright: ignore
     return sum_to(weights.shape, inputs.of_all(found))
 
 
@@ -212,12 +266,22 @@ def rollout_jacobian(
     that are not parameters of the law.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
-    family, turned, count, steps = inputs.model.family, inputs.model.turned, len(inputs.state), len(inputs.dt)
+    family = inputs.model.family
+    turned = inputs.model.turned
+    count = len(inputs.state)
+    steps = len(inputs.dt)
     known = family.names
-    chosen = [known.index(name) for name in (known if names is None else validation.choices("names", names, known))]
+    chosen = [
+        known.index(name)
+        for name in (
+            known if names is None else validation.choices("names", names, known)
+        )
+    ]
     columns = family.columns[np.array(chosen, dtype=int)]
-    end, compiled = inputs.state.copy(), inputs.compiled()
-    wrenches, slopes = np.zeros((count, steps, 3)), np.zeros((count, steps, 3, len(columns)))
+    end = inputs.state.copy()
+    compiled = inputs.compiled()
+    wrenches = np.zeros((count, steps, 3))
+    slopes = np.zeros((count, steps, 3, len(columns)))
     _differentiate(inputs.model, compiled, end, Derivatives(columns, wrenches, slopes))
     slopes = np.swapaxes(turned(np.swapaxes(inputs.of_all(slopes), -1, -2)), -1, -2)
     return RolloutJacobian(inputs.shaped(end), turned(inputs.of_all(wrenches)), slopes)
@@ -240,38 +304,60 @@ def rollout_jvp(
     Raises `InvalidValueError` as `rollout_vjp` does.
     """
     packed = pack(model, parameters)
-    family, turned = packed.family, packed.turned
+    family = packed.family
+    turned = packed.turned
     steps = validation.numbers("twist", twist).shape[-2:-1]
     tangent = RolloutTangent() if tangent is None else tangent
     validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
     names = [f"tangent.{name}" for name in tangent._fields]
     inner = packed.inner, (*steps, 3), steps, (len(family.names),)
-    changes = [validation.finite_numbers(name, value) for name, value in zip(names, tangent, strict=True)]
-    more = [value.shape[: max(value.ndim - len(shape), 0)] for value, shape in zip(changes, inner, strict=True)]
+    changes = [
+        validation.finite_numbers(name, value)
+        for name, value in zip(names, tangent, strict=True)
+    ]
+    more = [
+        value.shape[: max(value.ndim - len(shape), 0)]
+        for value, shape in zip(changes, inner, strict=True)
+    ]
     inputs = checked(packed, state, twist, normal_force, dt, None, more)
     rows = zip(names, changes, inner, strict=True)
     z, twists, loads, values = (rows_of(*each, inputs.batch) for each in rows)
     numbers = np.zeros((len(values), inputs.rows.shape[-1]))
     numbers[:, family.columns] = values
-    end, count = inputs.state.copy(), len(inputs.state)
+    end = inputs.state.copy()
+    count = len(inputs.state)
     d_state = np.zeros_like(end)
     d_state[:] = z.reshape(len(z), -1)
-    changed, compiled = Bars(d_state, turned(twists), loads, numbers), inputs.compiled(slopes=bool(loads.any()))
+    changed = Bars(d_state, turned(twists), loads, numbers)
+    compiled = inputs.compiled(slopes=bool(loads.any()))
     both = [np.zeros((count, *steps, 3)) for _ in range(2)]
-    share(compiled, count, lambda *span: family.tangent(compiled, span, end, changed, *both))
+    share(
+        compiled,
+        count,
+        lambda *span: family.tangent(compiled, span, end, changed, *both),
+    )
     wrenches, slopes = (turned(inputs.of_all(values)) for values in both)
     return RolloutJVP(inputs.shaped(end), wrenches, inputs.shaped(d_state), slopes)
 
 
-def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _roll(
+    inputs: RolloutInputs, kept: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return states at the end `[B, S]`, wrenches `[..., T, 3]`, and with `kept = T` the states before each step.
 
     These are `[B, T, S]`; `kept = 0` for none.
     """
-    end, count = inputs.state.copy(), len(inputs.state)
-    states, wrenches = np.empty((count, kept, end.shape[-1])), np.zeros((count, len(inputs.dt), 3))
-    compiled, family = inputs.compiled(), inputs.model.family
-    share(compiled, count, lambda *span: family.rollout(compiled, span, end, wrenches, states))
+    end = inputs.state.copy()
+    count = len(inputs.state)
+    states = np.empty((count, kept, end.shape[-1]))
+    wrenches = np.zeros((count, len(inputs.dt), 3))
+    compiled = inputs.compiled()
+    family = inputs.model.family
+    share(
+        compiled,
+        count,
+        lambda *span: family.rollout(compiled, span, end, wrenches, states),
+    )
     return end, inputs.of_all(inputs.model.turned(wrenches)), states
 
 
@@ -284,20 +370,35 @@ def _on_the_way(inputs: RolloutInputs, states: Any) -> np.ndarray:
     return rows.reshape(-1, steps, inputs.state.shape[1])
 
 
-def _differentiate(model: Packed, inputs: Inputs, z: np.ndarray, out: Derivatives) -> None:
+def _differentiate(
+    model: Packed, inputs: Inputs, z: np.ndarray, out: Derivatives
+) -> None:
     """Run rollouts with their derivatives by numbers of the model: contacts, or the blocks of one, on threads."""
-    run, whole = model.family.sensitivities, inputs.shape
+    run = model.family.sensitivities
+    whole = inputs.shape
     blocks, lanes = divided.py_func(max(whole.weights.shape[1], 1))
     if blocks == 1 or len(z) > 1:
         share(inputs, len(z), lambda *span: run(inputs, span, z, out))
         return
-    state, data = z.reshape(1, model.inner[0], -1), whole.data.reshape(blocks, -1)
+    state = z.reshape(1, model.inner[0], -1)
+    data = whole.data.reshape(blocks, -1)
 
     def one(k: int) -> Derivatives:
         cells = slice(k * lanes, (k + 1) * lanes)
-        part, sums = state[..., cells].reshape(1, -1), Derivatives(out.columns, *map(np.zeros_like, out[1:]))
-        weights, by_load = (np.ascontiguousarray(each[..., cells]) for each in (whole.weights, whole.by_load))
-        run(inputs._replace(shape=ShapesByLoad(whole.surface, weights, by_load, data[k])), (0, 1), part, sums)
+        part = state[..., cells].reshape(1, -1)
+        sums = Derivatives(out.columns, *map(np.zeros_like, out[1:]))
+        weights, by_load = (
+            np.ascontiguousarray(each[..., cells])
+            for each in (whole.weights, whole.by_load)
+        )
+        run(
+            inputs._replace(
+                shape=ShapesByLoad(whole.surface, weights, by_load, data[k])
+            ),
+            (0, 1),
+            part,
+            sums,
+        )
         state[..., cells] = part.reshape(1, model.inner[0], -1)
         return sums
 
@@ -306,14 +407,20 @@ def _differentiate(model: Packed, inputs: Inputs, z: np.ndarray, out: Derivative
         out.slopes[:] += sums.slopes
 
 
-def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout[np.ndarray]:
+def _stepped(
+    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any
+) -> Rollout[np.ndarray]:
     """Step any model, which checks the numbers itself."""
     state = model.rest() if state is None else validation.numbers("state", state)
     twist, load, dt = sequences(twist, normal_force, dt)
     inner = model.state_shape
     axes = state.shape, (*twist.shape[:-2], *inner), (*load.shape[:-1], *inner)
-    state = np.broadcast_to(state, validation.common_shape("state, twist and normal_force", axes))
+    state = np.broadcast_to(
+        state, validation.common_shape("state, twist and normal_force", axes)
+    )
     wrenches = np.empty((*state.shape[: -len(inner)], len(dt), 3))
     for t, step in enumerate(dt):
-        state, wrenches[..., t, :] = model.step(state, twist[..., t, :], load[..., t], step)
+        state, wrenches[..., t, :] = model.step(
+            state, twist[..., t, :], load[..., t], step
+        )
     return Rollout(np.array(state), wrenches)

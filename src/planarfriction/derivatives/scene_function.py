@@ -11,7 +11,11 @@ import numpy as np
 from planarfriction import validation
 from planarfriction._engine.compiler import threads
 from planarfriction.derivatives.path import RTOL, KeptMotion
-from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS, STATES, SceneInputs
+from planarfriction.derivatives.scene_inputs import (
+    SCENE_PARAMETERS,
+    STATES,
+    SceneInputs,
+)
 from planarfriction.derivatives.scenes import scene_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.contact import Contact, with_friction
@@ -43,18 +47,28 @@ class SceneFunction:
         **options: Any,
     ) -> None:
         self._parameters = validation.choices("parameters", parameters, FACTORS)
-        self._knots = {name: validation.array(f"knots of {name}", t, (None,)) for name, t in (signals or {}).items()}
-        self._scene, self._initial, self._options = scene, tuple(initial), SolverOptions(**options)
+        self._knots = {
+            name: validation.array(f"knots of {name}", t, (None,))
+            for name, t in (signals or {}).items()
+        }
+        self._scene = scene
+        self._initial = tuple(initial)
+        self._options = SolverOptions(**options)
         self.count = len(self._inputs(scene).names)
         """Number P of numbers."""
-        self.shapes = {name: (len(times), *(3,) * (name in _OF_BODY)) for name, times in self._knots.items()}
+        self.shapes = {
+            name: (len(times), *(3,) * (name in _OF_BODY))
+            for name, times in self._knots.items()
+        }
         """Shape of the values of each signal: `[K]`, of force and velocity `[K, 3]`."""
         self.time = self._options.plan(scene, RTOL).times
         """Instants that are recorded `[M]` [s]."""
         self.results = (len(self.time), 6), (len(self.time), len(scene.contacts), 3)
         """Shapes of motion and wrenches."""
 
-    def run(self, values: np.ndarray, kept: dict[bytes, KeptMotion] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def run(
+        self, values: np.ndarray, kept: dict[bytes, KeptMotion] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return motion `[B, M, 6]` and wrenches `[B, M, C, 3]` at `values` `[B, P]`; keep the motions in `kept`."""
 
         def one(row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,21 +95,34 @@ class SceneFunction:
             row = different[i]
             done = (kept or {}).get(row.tobytes()) or self._motion_at(row)
             for b in np.flatnonzero(which.reshape(-1) == i):
-                bars = (self._folded(bar[b], len(done.time)) for bar in (of_motion, of_wrenches))
+                bars = (
+                    self._folded(bar[b], len(done.time))
+                    for bar in (of_motion, of_wrenches)
+                )
                 gradient[b] = done.gradient(*bars) * self._per_factor(row)
 
         threads.each(some, range(len(different)))
         return gradient
 
-    def push(self, values: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def push(
+        self, values: np.ndarray, changes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return changes of motion and wrenches for changes of the values `[B, P]`."""
 
         def one(pair: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
             row, change = pair
-            options: dict[str, Any] = {"signals": self._knots, "initial": self._initial, "options": self._options}
-            result = scene_sensitivities(self._scene_at(row), self._parameters, **options)
+            options: dict[str, Any] = {
+                "signals": self._knots,
+                "initial": self._initial,
+                "options": self._options,
+            }
+            result = scene_sensitivities(
+                self._scene_at(row), self._parameters, **options
+            )
             change = change * self._per_factor(row)
-            return self._filled(result.d_motion @ change), self._filled(result.d_wrenches @ change)
+            return self._filled(result.d_motion @ change), self._filled(
+                result.d_wrenches @ change
+            )
 
         return self._stacked(threads.each(one, list(zip(values, changes, strict=True))))
 
@@ -106,8 +133,13 @@ class SceneFunction:
         scene = self._scene_at(row)
         return KeptMotion(scene, self._inputs(scene), self._options)
 
-    def _stacked(self, results: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-        motion, wrenches = (np.array([result[i] for result in results]).reshape(-1, *self.results[i]) for i in (0, 1))
+    def _stacked(
+        self, results: list[tuple[np.ndarray, np.ndarray]]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        motion, wrenches = (
+            np.array([result[i] for result in results]).reshape(-1, *self.results[i])
+            for i in (0, 1)
+        )
         return motion, wrenches
 
     def _filled(self, values: np.ndarray) -> np.ndarray:
@@ -122,7 +154,8 @@ class SceneFunction:
 
     def _per_factor(self, row: np.ndarray) -> np.ndarray:
         """Return the derivative by each number per derivative by a factor that is 1, as derivatives of scenes are."""
-        slopes, factors = np.ones(self.count), dict(zip(self._parameters, row, strict=False))
+        slopes = np.ones(self.count)
+        factors = dict(zip(self._parameters, row, strict=False))
         slopes[: len(factors)] = 1.0 / row[: len(factors)]
         first = len(factors) + len(self._initial)
         for name, shape in self.shapes.items():
@@ -137,32 +170,50 @@ class SceneFunction:
     def _scene_at(self, row: np.ndarray) -> Scene:
         """Return the scene with these numbers in it."""
         values = iter(np.asarray(row, float).tolist())
-        factors = {name: validation.positive(name, next(values)) for name in self._parameters}
+        factors = {
+            name: validation.positive(name, next(values)) for name in self._parameters
+        }
         start = {name: next(values) for name in self._initial}
         signals = {
             name: np.reshape([next(values) for _ in range(int(np.prod(shape)))], shape)
             for name, shape in self.shapes.items()
         }
-        scene, body = self._scene, self._scene.body
+        scene = self._scene
+        body = self._scene.body
         now = zip(STATES, (*body.velocity, *body.position, body.angle), strict=True)
         state = [start.get(name, value) for name, value in now]
-        scaled = {name: getattr(body, name) * factors.get(name, 1.0) for name in ("mass", "inertia")}
-        body = dataclasses.replace(body, velocity=state[:3], position=state[3:5], angle=state[5], **scaled)
+        scaled = {
+            name: getattr(body, name) * factors.get(name, 1.0)
+            for name in ("mass", "inertia")
+        }
+        body = dataclasses.replace(
+            body, velocity=state[:3], position=state[3:5], angle=state[5], **scaled
+        )
         changed: dict[str, Any] = {
             name: self._signal(name, getattr(scene, name), values)
             for name, values in signals.items()
             if name in _OF_BODY
         }
-        contacts = [self._contact(contact, signals, factors) for contact in scene.contacts]
+        contacts = [
+            self._contact(contact, signals, factors) for contact in scene.contacts
+        ]
         return dataclasses.replace(scene, body=body, contacts=contacts, **changed)
 
-    def _contact(self, contact: Contact, signals: dict[str, np.ndarray], factors: dict[str, float]) -> Contact:
-        name, load, mu = f"{contact.name}.normal_force", contact.normal_force, factors.get("mu", 1.0)
+    def _contact(
+        self,
+        contact: Contact,
+        signals: dict[str, np.ndarray],
+        factors: dict[str, float],
+    ) -> Contact:
+        name = f"{contact.name}.normal_force"
+        load = contact.normal_force
+        mu = factors.get("mu", 1.0)
         if name in signals:
             load = self._signal(name, load, signals[name])
         if "load" in factors:
             load = dataclasses.replace(load, values=factors["load"] * load.values)
-        changed, numbers = with_friction(contact, mu), contact.model.law.numbers
+        changed = with_friction(contact, mu)
+        numbers = contact.model.law.numbers
         wanted = numbers._replace(mu_c=mu * numbers.mu_c, mu_s=mu * numbers.mu_s)
         if not np.allclose(changed.model.law.numbers, wanted, rtol=1e-12, atol=0.0):
             rule = f"not contain mu: {type(contact.model.law).__name__} has other friction coefficients too"

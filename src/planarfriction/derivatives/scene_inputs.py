@@ -52,15 +52,26 @@ class Knots:
         times = validation.array(at, times, (None,))
         if not 1 <= len(times) <= MOST_KNOTS:
             raise InvalidValueError(at, f"be 1 to {MOST_KNOTS} times", len(times))
-        if times[0] < 0.0 or times[-1] > scene.t_end or (np.diff(times) <= SAME_TIME).any():
-            raise InvalidValueError(at, f"increase, between 0 and {scene.t_end:g} s", times.tolist())
-        self.name, self.times = name, times
+        if (
+            times[0] < 0.0
+            or times[-1] > scene.t_end
+            or (np.diff(times) <= SAME_TIME).any()
+        ):
+            raise InvalidValueError(
+                at, f"increase, between 0 and {scene.t_end:g} s", times.tolist()
+            )
+        self.name = name
+        self.times = times
         if name in _COMPONENTS:
             self.kind = tangent.FORCE if name == "force" else tangent.VELOCITY
-            signal, self.components = getattr(scene, name), tuple(enumerate(_COMPONENTS[name]))
+            signal = getattr(scene, name)
+            self.components = tuple(enumerate(_COMPONENTS[name]))
         else:
-            place = [f"{contact.name}.normal_force" for contact in scene.contacts].index(name)
-            self.kind, self.components = tangent.NORMAL_FORCE, ((place, ""),)
+            place = [
+                f"{contact.name}.normal_force" for contact in scene.contacts
+            ].index(name)
+            self.kind = tangent.NORMAL_FORCE
+            self.components = ((place, ""),)
             signal = scene.contacts[place].normal_force
         hold = "previous" if signal is None else signal.hold
         self.hats = Signal(times, np.eye(len(times)), hold)
@@ -85,23 +96,30 @@ class SceneInputs:
     unit and in the order of `names`.
     """
 
-    def __init__(self, scene: Scene, parameters: Any, signals: Any, initial: Any) -> None:
+    def __init__(
+        self, scene: Scene, parameters: Any, signals: Any, initial: Any
+    ) -> None:
         if not isinstance(scene, Scene):
             raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
-        self._scene, driven = scene, scene.velocity is not None
+        self._scene = scene
+        driven = scene.velocity is not None
         parameters = validation.choices("parameters", parameters, SCENE_PARAMETERS)
         if "mu" in parameters:
             for contact in scene.contacts:
                 refuse_rate_law(contact.model.law, "derivatives by mu")
-        initial = validation.choices("initial", initial, STATES[3:] if driven else STATES)
+        initial = validation.choices(
+            "initial", initial, STATES[3:] if driven else STATES
+        )
         self._knots = _knots_of(scene, parameters, signals)
         numbers = [(name, SCENE_PARAMETERS[name], 0) for name in parameters]
         numbers += [(name, tangent.INITIAL, STATES.index(name)) for name in initial]
-        begins, sources = [np.zeros(len(numbers))], [np.full((len(numbers), 2), -1)]
+        begins = [np.zeros(len(numbers))]
+        sources = [np.full((len(numbers), 2), -1)]
         self.columns = {name: slice(i, i + 1) for i, (name, _, _) in enumerate(numbers)}
         """Derivatives with respect to each name, in the order of `names`; of a signal knot by knot."""
         for s, knots in enumerate(self._knots):
-            values, each = knots.numbers(), np.repeat(np.arange(len(knots.times)), len(knots.components))
+            values = knots.numbers()
+            each = np.repeat(np.arange(len(knots.times)), len(knots.components))
             self.columns[knots.name] = slice(len(numbers), len(numbers) + len(values))
             numbers += values
             begins.append(knots.begins[each])
@@ -109,13 +127,25 @@ class SceneInputs:
         self.names = tuple(name for name, _, _ in numbers)
         begin = np.concatenate(begins)
         self._order = np.argsort(begin, kind="stable")
-        self._begin, source = begin[self._order], np.concatenate(sources)[self._order].astype(int)
+        self._begin = begin[self._order]
+        source = np.concatenate(sources)[self._order].astype(int)
         mine = [np.flatnonzero(source[:, 0] == s) for s in range(len(self._knots))]
         self._sources = [(columns, source[columns, 1]) for columns in mine]
-        pairs = np.array([[kind, place] for _, kind, place in numbers], int).reshape(-1, 2)[self._order]
+        pairs = np.array([[kind, place] for _, kind, place in numbers], int).reshape(
+            -1, 2
+        )[self._order]
         inputs, which = np.unique(pairs, axis=0, return_inverse=True)
-        kind, place, input_kind, input_place = (np.ascontiguousarray(column) for column in (*pairs.T, *inputs.T))
-        self._drives = Drives(kind, place, np.zeros((len(numbers), 2)), which.reshape(-1), input_kind, input_place)
+        kind, place, input_kind, input_place = (
+            np.ascontiguousarray(column) for column in (*pairs.T, *inputs.T)
+        )
+        self._drives = Drives(
+            kind,
+            place,
+            np.zeros((len(numbers), 2)),
+            which.reshape(-1),
+            input_kind,
+            input_place,
+        )
         self.inputs = len(inputs)
         """Number of different inputs behind the numbers."""
         self._scale = np.ones(len(numbers))
@@ -134,17 +164,31 @@ class SceneInputs:
 
     def start(self, batches: SegmentBatches) -> np.ndarray:
         """Choose the scales of the numbers, and return the derivatives at the start `[P, n]`."""
-        scene, slopes = self._scene, np.zeros((len(self.names), len(batches.state)))
-        smallest, start = batches.state_scale[-6:], np.abs(batches.state[-6:])
-        grip = sum(contact.count * np.abs(contact.normal_force.values).max() for contact in scene.contacts) or 1.0
+        scene = self._scene
+        slopes = np.zeros((len(self.names), len(batches.state)))
+        smallest = batches.state_scale[-6:]
+        start = np.abs(batches.state[-6:])
+        grip = (
+            sum(
+                contact.count * np.abs(contact.normal_force.values).max()
+                for contact in scene.contacts
+            )
+            or 1.0
+        )
         arm = smallest[3] / smallest[5]
-        for p, (kind, place) in enumerate(zip(self._drives.kind, self._drives.place, strict=True)):
+        for p, (kind, place) in enumerate(
+            zip(self._drives.kind, self._drives.place, strict=True)
+        ):
             if kind == tangent.NORMAL_FORCE:
-                self._scale[p] = np.abs(scene.contacts[place].normal_force.values).max() or 1.0
+                self._scale[p] = (
+                    np.abs(scene.contacts[place].normal_force.values).max() or 1.0
+                )
             elif kind == tangent.FORCE:
                 self._scale[p] = grip * (arm if place == 2 else 1.0)
             elif kind == tangent.VELOCITY and scene.velocity is not None:
-                self._scale[p] = max(np.abs(scene.velocity.values[:, place]).max(), smallest[place])
+                self._scale[p] = max(
+                    np.abs(scene.velocity.values[:, place]).max(), smallest[place]
+                )
             elif kind == tangent.INITIAL:
                 self._scale[p] = max(start[place], smallest[place])
                 slopes[p, place - 6] = self._scale[p]
@@ -155,7 +199,9 @@ class SceneInputs:
 
     def _bristles_at_start(self, batches: SegmentBatches) -> np.ndarray:
         """Return the derivatives of bristles that carry the load at the start; refuse other bristles."""
-        scene, drives, count = self._scene, self._drives, len(self.names)
+        scene = self._scene
+        drives = self._drives
+        count = len(self.names)
         moves = drives.kind != tangent.INERTIA
         for (columns, knot), knots in zip(self._sources, self._knots, strict=True):
             moves[columns] = knots.hats(0.0)[knot] != 0.0
@@ -165,26 +211,42 @@ class SceneInputs:
             name = self.names[self._order[refused[0]]]
             rule = f"be 'rest' for the derivative with respect to {name}, on which the initial bristles depend"
             raise InvalidValueError("start", rule, scene.start)
-        d_loads, d_pull = np.zeros((count, len(scene.contacts))), np.zeros((count, 3))
-        d_loads[moves & (drives.kind == tangent.LOAD)] = [float(each.normal_force(0.0)) for each in scene.contacts]
-        d_pull[moves & (drives.kind == tangent.MASS), :2] = scene.body.mass * np.array(scene.body.gravity)
+        d_loads = np.zeros((count, len(scene.contacts)))
+        d_pull = np.zeros((count, 3))
+        d_loads[moves & (drives.kind == tangent.LOAD)] = [
+            float(each.normal_force(0.0)) for each in scene.contacts
+        ]
+        d_pull[moves & (drives.kind == tangent.MASS), :2] = scene.body.mass * np.array(
+            scene.body.gravity
+        )
         for (columns, knot), knots in zip(self._sources, self._knots, strict=True):
             changes = d_loads if knots.kind == tangent.NORMAL_FORCE else d_pull
-            changes[columns, drives.place[columns]] = self._scale[columns] * knots.hats(0.0)[knot]
+            changes[columns, drives.place[columns]] = (
+                self._scale[columns] * knots.hats(0.0)[knot]
+            )
         return batches.first_slopes(d_loads, d_pull)
 
     # ------------------------------------------------------------------ along the motion
 
     def at(self, system: System, piece: int) -> Drives:
         """Return the numbers that affect a piece of the system."""
-        breaks, drives = system.motion.breaks, self._drives
+        breaks = system.motion.breaks
+        drives = self._drives
         if system is not self._system:
-            self._system, self._hats = system, [knots.hats.pieces(breaks) for knots in self._knots]
+            self._system = system
+            self._hats = [knots.hats.pieces(breaks) for knots in self._knots]
         count = int(np.searchsorted(self._begin, breaks[piece + 1] - SAME_TIME))
-        for (start, slope), (column, knot) in zip(self._hats, self._sources, strict=True):
+        for (start, slope), (column, knot) in zip(
+            self._hats, self._sources, strict=True
+        ):
             drives.weight[column, 0] = self._scale[column] * start[piece, knot]
             drives.weight[column, 1] = self._scale[column] * slope[piece, knot]
-        return drives._replace(**{name: getattr(drives, name)[:count] for name in ("kind", "place", "weight", "input")})
+        return drives._replace(
+            **{
+                name: getattr(drives, name)[:count]
+                for name in ("kind", "place", "weight", "input")
+            }
+        )
 
     def begin(self, drives: Drives, slopes: np.ndarray) -> None:
         """Write the derivatives of a prescribed velocity into the derivatives `[P, n]` at the start of a piece."""
@@ -212,10 +274,20 @@ def _knots_of(scene: Scene, parameters: Any, signals: Any) -> list[Knots]:
     valid += ["force" if scene.velocity is None else "velocity"]
     signals = {} if signals is None else signals
     if not isinstance(signals, Mapping):
-        raise InvalidValueError("signals", "be a table of knots [s] by the name of a signal", signals)
+        raise InvalidValueError(
+            "signals", "be a table of knots [s] by the name of a signal", signals
+        )
     for contact in scene.contacts:
         for name in (*parameters, *signals):
-            if contact.model.patch.depends_on_load and name in ("load", f"{contact.name}.normal_force"):
+            if contact.model.patch.depends_on_load and name in (
+                "load",
+                f"{contact.name}.normal_force",
+            ):
                 rule = f"not contain {name}: the shape of the patch of contact {contact.name!r} changes with the load"
-                raise InvalidValueError("parameters" if name == "load" else "signals", rule, name)
-    return [Knots(scene, validation.choice("signals", name, valid), times) for name, times in signals.items()]
+                raise InvalidValueError(
+                    "parameters" if name == "load" else "signals", rule, name
+                )
+    return [
+        Knots(scene, validation.choice("signals", name, valid), times)
+        for name, times in signals.items()
+    ]

@@ -16,7 +16,12 @@ from planarfriction._engine.body.body import System
 from planarfriction._engine.body.path import Path, Stretch, Tolerances
 from planarfriction._engine.body.sdirk import workspace_for
 from planarfriction._engine.body.tangent import Drives
-from planarfriction.derivatives.path import KeptMotion, MotionPath, SceneDerivatives, pieces_of
+from planarfriction.derivatives.path import (
+    KeptMotion,
+    MotionPath,
+    SceneDerivatives,
+    pieces_of,
+)
 from planarfriction.derivatives.scene_inputs import SceneInputs
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.scene import Scene, SolverOptions
@@ -62,12 +67,16 @@ def scene_sensitivities(
 
     Raises `InvalidValueError` for unknown names or numbers out of range, and `SolverError` if the solver fails.
     """
-    motion = MotionPath(scene, SceneInputs(scene, parameters, signals, initial), options)
+    motion = MotionPath(
+        scene, SceneInputs(scene, parameters, signals, initial), options
+    )
     tangents = _Tangents(motion)
     for system, path in motion.steps():
         tangents.carry(system, path)
         del system, path  # the next batch of segments is packed when this one is gone
-    slopes = (motion.inputs.in_order(values[: motion.reached]) for values in tangents.recorded)
+    slopes = (
+        motion.inputs.in_order(values[: motion.reached]) for values in tangents.recorded
+    )
     return SceneSensitivities(*motion.head, *slopes)
 
 
@@ -75,22 +84,36 @@ class _Tangents:
     """Derivatives of a motion `[P, n]`, carried along its steps and recorded at instants."""
 
     def __init__(self, motion: MotionPath) -> None:
-        self._motion, self._inputs = motion, motion.inputs
-        self._slopes, inputs = motion.inputs.start(motion.batches), motion.inputs.inputs
-        (count, n), instants, contacts = self._slopes.shape, motion.instants, len(motion.batches.models)
-        self._space, self._atol = workspace_for(count, inputs, n), motion.accuracy * motion.scale
-        self._state, self._scratch, self._wrench = np.empty(n), np.empty((3, n)), np.empty((contacts, 3))
-        self.recorded = np.zeros((instants, 6, count)), np.zeros((instants, contacts, 3, count))
+        self._motion = motion
+        self._inputs = motion.inputs
+        self._slopes = motion.inputs.start(motion.batches)
+        inputs = motion.inputs.inputs
+        (count, n) = self._slopes.shape
+        instants = motion.instants
+        contacts = len(motion.batches.models)
+        self._space = workspace_for(count, inputs, n)
+        self._atol = motion.accuracy * motion.scale
+        self._state = np.empty(n)
+        self._scratch = np.empty((3, n))
+        self._wrench = np.empty((contacts, 3))
+        self.recorded = (
+            np.zeros((instants, 6, count)),
+            np.zeros((instants, contacts, 3, count)),
+        )
         """Derivatives of motion and wrenches at the instants."""
         self._next = 0
         """Number of the instant to be recorded next."""
 
     def carry(self, system: System, path: Path) -> None:
         """Go along a part of the path, and record the instants that the motion has recorded on it."""
-        breaks, instants = system.motion.breaks, self._motion.time
+        breaks = system.motion.breaks
+        instants = self._motion.time
         for first, last in pieces_of(path):
-            piece, since, reach = int(path.piece[first]), float(path.since[first]), float(path.since[last])
-            begin, length = breaks[piece], breaks[piece + 1] - breaks[piece]
+            piece = int(path.piece[first])
+            since = float(path.since[first])
+            reach = float(path.since[last])
+            begin = breaks[piece]
+            length = breaks[piece + 1] - breaks[piece]
             time = breaks[piece + 1] if reach == length else begin + reach
             drives = self._inputs.at(system, piece)
             if since == 0.0:
@@ -99,21 +122,48 @@ class _Tangents:
             while self._next < len(instants) and instants[self._next] <= time:
                 goal = instants[self._next]
                 instant = reach if goal == time else float(goal - begin)
-                self._propagate(system, path, drives, Stretch(first, last, since, instant))
+                self._propagate(
+                    system, path, drives, Stretch(first, last, since, instant)
+                )
                 self._record(system, path, drives, first, last, instant)
                 since = instant
             self._propagate(system, path, drives, Stretch(first, last, since, reach))
             if reach == length:
                 tangent.forget(system.address, piece, self._slopes)
 
-    def _propagate(self, system: System, path: Path, drives: Drives, stretch: Stretch) -> None:
+    def _propagate(
+        self, system: System, path: Path, drives: Drives, stretch: Stretch
+    ) -> None:
         tolerances = Tolerances(self._motion.accuracy, self._atol)
-        tangent.propagate(system.address, path, stretch, self._slopes, drives, tolerances, self._space.address)
+        tangent.propagate(
+            system.address,
+            path,
+            stretch,
+            self._slopes,
+            drives,
+            tolerances,
+            self._space.address,
+        )
 
-    def _record(self, system: System, path: Path, drives: Drives, first: int, last: int, since: float) -> None:
+    def _record(
+        self,
+        system: System,
+        path: Path,
+        drives: Drives,
+        first: int,
+        last: int,
+        since: float,
+    ) -> None:
         d_motion, d_wrenches = (values[self._next] for values in self.recorded)
         paths.state_at(path, first, last, since, self._state)
-        at = system.address, int(path.piece[first]), since, self._state, drives, self._slopes
+        at = (
+            system.address,
+            int(path.piece[first]),
+            since,
+            self._state,
+            drives,
+            self._slopes,
+        )
         tangent.wrench_slopes(*at, self._wrench, d_wrenches, self._scratch)
         d_motion[:] = self._slopes[:, -6:].T
         self._next += 1
@@ -158,12 +208,20 @@ def scene_gradient(
     for name, function in functions.items():
         wrong = isinstance(function, type) or not callable(function)
         if wrong and (function is not None or cotangent is wrench_cotangent):
-            raise InvalidValueError(name, "be a function of time and motion, or wrenches", function)
-    motion = KeptMotion(scene, SceneInputs(scene, parameters, signals, initial), options)
+            raise InvalidValueError(
+                name, "be a function of time and motion, or wrenches", function
+            )
+    motion = KeptMotion(
+        scene, SceneInputs(scene, parameters, signals, initial), options
+    )
     bars = [
         np.zeros_like(values)
         if function is None
-        else validation.array(f"{name} of the cost", function(motion.time, values), values.shape)
-        for (name, function), values in zip(functions.items(), motion.recorded, strict=True)
+        else validation.array(
+            f"{name} of the cost", function(motion.time, values), values.shape
+        )
+        for (name, function), values in zip(
+            functions.items(), motion.recorded, strict=True
+        )
     ]
     return SceneGradient(*motion.head, gradient=motion.gradient(*bars))

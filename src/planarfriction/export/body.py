@@ -28,19 +28,42 @@ def body_of(model: Any, precision: str, patches: int) -> dict[str, Any]:
     """Return fields and functions of the search, always in double precision, and its constants."""
     row = layout(patches, 0, 0, 0)
     counts = {name: part.stop - part.start for name, part in row.slices.items()}
-    record = np.dtype([(name, "f8", (count,)) for name, count in counts.items() if count])
-    own = Patches(**dict.fromkeys(Patches._fields, Fixed(0)))._replace(  # pyright: ignore
-        count=Fixed(patches), steps=_STEP, slopes=_SLOPES, radius=Array("lever_arm", (patches,), fixed=True)
+    record = np.dtype(
+        [(name, "f8", (count,)) for name, count in counts.items() if count]
     )
-    writer, p = Writer(), Record("p", record)
+    own = Patches(**dict.fromkeys(Patches._fields, Fixed(0)))._replace(  # pyright: ignore
+        count=Fixed(patches),
+        steps=_STEP,
+        slopes=_SLOPES,
+        radius=Array("lever_arm", (patches,), fixed=True),
+    )
+    writer = Writer()
+    p = Record("p", record)
     loops = Loops(writer, {record: "search_t"})
     loops.replaced[coupling_steps.step_patch] = lambda given: _FUNCTIONS[given[2]]
-    loops.replaced[coupling_steps.write_load_slopes] = lambda _: "(void)"  # the load is given
-    loops.add(coupling.find, (own, p, Fixed(ROUNDING[precision]), Scalar("most", "int"), Scalar("again", "int")))
+    loops.replaced[coupling_steps.write_load_slopes] = lambda _: (
+        "(void)"
+    )  # the load is given
+    loops.add(
+        coupling.find,
+        (
+            own,
+            p,
+            Fixed(ROUNDING[precision]),
+            Scalar("most", "int"),
+            Scalar("again", "int"),
+        ),
+    )
     functions = re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
-    functions = re.sub(r"\b(\w+_of_vectors)\b", r"\1_in_double", functions)  # others are in the other precision
+    functions = re.sub(
+        r"\b(\w+_of_vectors)\b", r"\1_in_double", functions
+    )  # others are in the other precision
     return {
-        "fields": [f"{name}[{count}]" for name, count in counts.items() if f"p->{name}" in functions],
+        "fields": [
+            f"{name}[{count}]"
+            for name, count in counts.items()
+            if f"p->{name}" in functions
+        ],
         "functions": functions,
         "levers": ", ".join([writer.constant(lever_of(model) or 1.0)] * patches),
         "iterations": ITERATIONS,

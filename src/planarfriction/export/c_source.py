@@ -12,7 +12,13 @@ from collections.abc import Iterator, Sequence
 from itertools import compress
 from typing import Any, NamedTuple
 
-from planarfriction._engine.codegen.trace import Block, Branch, Number, Operation, traced
+from planarfriction._engine.codegen.trace import (
+    Block,
+    Branch,
+    Number,
+    Operation,
+    traced,
+)
 from planarfriction._engine.codegen.twins import twin
 
 TYPES = {"real": "real", "index": "int", "wide": "long long", "bool": "int"}
@@ -32,7 +38,10 @@ def rendered(package: str, template: str, /, **values: Any) -> str:
     """Return the text of a template of a package."""
     import jinja2
 
-    rules: dict[str, Any] = {"undefined": jinja2.StrictUndefined, "keep_trailing_newline": True}
+    rules: dict[str, Any] = {
+        "undefined": jinja2.StrictUndefined,
+        "keep_trailing_newline": True,
+    }
     environment = jinja2.Environment(loader=jinja2.PackageLoader(package, "."), **rules)
     return environment.get_template(f"{template}.j2").render(values)
 
@@ -65,14 +74,18 @@ class Writer:
         arguments = [self.atom(each) for each in operation.arguments]
         if operation.kind == "real":  # constants of index arithmetic stay integers
             arguments = [
-                self.constant(float(each)) if isinstance(each, int) and "[" not in operation.text else text
+                self.constant(float(each))
+                if isinstance(each, int) and "[" not in operation.text
+                else text
                 for each, text in zip(operation.arguments, arguments, strict=True)
             ]
         text = operation.text.format(*arguments)
         if self.own:
             text = text.replace("$sqrt", "sqrt_of")
         if "@" in text:
-            text = text.replace("@", "" if self.own else "$").replace("(", "_of(" if self.own else "(", 1)
+            text = text.replace("@", "" if self.own else "$").replace(
+                "(", "_of(" if self.own else "(", 1
+            )
         head, sign, rest = text.partition("$")
         if not sign:
             return text
@@ -81,7 +94,9 @@ class Writer:
 
     # ------------------------------------------------------------------ functions
 
-    def lines(self, block: Block, outputs: Sequence[str], indent: str = "    ") -> Iterator[str]:
+    def lines(
+        self, block: Block, outputs: Sequence[str], indent: str = "    "
+    ) -> Iterator[str]:
         """Yield the lines that compute a block and assign its results to `outputs`."""
         used = used_by(block)
         for each in block.operations:
@@ -130,7 +145,9 @@ def of_compiled(function: Any) -> list[str]:
     """Return the lines of the body of a function of `compiled_math`, in double precision."""
     block = traced(lambda trace: twin(function)(Number(trace, "x")))
     *lines, last = Writer().lines(block, ["return"])
-    return [each.replace(" floor(", " floor_of(") for each in lines] + [last.replace("return =", "return")]
+    return [each.replace(" floor(", " floor_of(") for each in lines] + [
+        last.replace("return =", "return")
+    ]
 
 
 def _of(block: Block, wanted: list[bool]) -> Block:
@@ -145,7 +162,11 @@ def used_by(block: Block) -> set[str]:
         if isinstance(each, Branch):
             wanted = [name in used for name, _ in each.outcomes]
             if any(wanted):
-                used |= {each.condition} | used_by(_of(each.yes, wanted)) | used_by(_of(each.no, wanted))
+                used |= (
+                    {each.condition}
+                    | used_by(_of(each.yes, wanted))
+                    | used_by(_of(each.no, wanted))
+                )
         elif each.name in used:
             used.update(name for name in each.arguments if isinstance(name, str))
     return used
@@ -177,7 +198,9 @@ class Passes(NamedTuple):
     """
 
 
-def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], share: str) -> Passes | None:
+def passes_of(
+    writer: Writer, block: Block, count: int, places: Sequence[str], share: str
+) -> Passes | None:
     """Split the step of a cell, whose new state goes to `places`; None for one that has branches.
 
     `share` is its share of the load.
@@ -188,7 +211,10 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
     operations = [each for each in block.operations if each.name in used]
     common: set[str] = set()
     for each in operations:
-        if all(name in common or not re.search(r"^t\d|\bk\b", name) for name in _names(each)):
+        if all(
+            name in common or not re.search(r"^t\d|\bk\b", name)
+            for name in _names(each)
+        ):
             common.add(each.name)
     own = [each for each in operations if each.name not in common]
     again = _again(own)
@@ -197,23 +223,42 @@ def passes_of(writer: Writer, block: Block, count: int, places: Sequence[str], s
     kept = [_handed(own, block, end) for end in ends]
     shared = [writer.line(each) for each in operations if each.name in common]
     room = [f"row[{row}][i]" for row in range(len(own))]
-    room, texts, places_of = [*room[:3], *places, *room[3:]], [], {}
+    room = [*room[:3], *places, *room[3:]]
+    texts = []
+    places_of = {}
     for first, last, after in zip(ends, ends[1:], kept[1:], strict=False):
-        before, places_of = places_of, {name: each for name, each in places_of.items() if name in after}
+        before = places_of
+        places_of = {name: each for name, each in places_of.items() if name in after}
         for name in after:
-            places_of.setdefault(name, next(each for each in room if each not in places_of.values()))
+            places_of.setdefault(
+                name, next(each for each in room if each not in places_of.values())
+            )
         read = {name for each in own[first:last] for name in _names(each)}
         read |= set(block.results) if last == len(own) else set()
         for each in reversed(again):
             read |= set(_names(each)) if each.name in read else set()
-        lines = [f"    const real {name} = {place};" for name, place in before.items() if name in read]
+        lines = [
+            f"    const real {name} = {place};"
+            for name, place in before.items()
+            if name in read
+        ]
         lines += [writer.line(each) for each in again if each.name in read]
         lines += [writer.line(each) for each in own[first:last]]
-        lines += [f"    {place} = {name};" for name, place in places_of.items() if name not in before]
+        lines += [
+            f"    {place} = {name};"
+            for name, place in places_of.items()
+            if name not in before
+        ]
         if last == len(own):
             results = [writer.atom(each) for each in block.results]
-            lines += [f"    {place} = {result};" for place, result in zip(places, results, strict=False)]
-            lines += [f"    row[{j}][i] = {share} * {result};" for j, result in enumerate(results[len(places) :])]
+            lines += [
+                f"    {place} = {result};"
+                for place, result in zip(places, results, strict=False)
+            ]
+            lines += [
+                f"    row[{j}][i] = {share} * {result};"
+                for j, result in enumerate(results[len(places) :])
+            ]
         texts.append("\n".join(f"        {line}" for line in lines))
     rows = 1 + max(int(row) for row in re.findall(r"row\[(\d+)\]", "".join(texts)))
     blocks = -(-count // CELLS)
@@ -228,18 +273,28 @@ def _again(own: list[Operation]) -> list[Operation]:
     """Return operations of so few steps that each pass does them itself."""
     steps: dict[str, int] = {}
     for each in own:
-        steps[each.name] = 1 + sum(steps.get(name, 0) for name in _names(each)) if _is_short(each) else SHORT + 1
+        steps[each.name] = (
+            1 + sum(steps.get(name, 0) for name in _names(each))
+            if _is_short(each)
+            else SHORT + 1
+        )
     return [each for each in own if steps[each.name] <= SHORT]
 
 
 def _is_short(operation: Operation) -> bool:
-    return operation.kind == "real" and bool(re.fullmatch(r"\{0\} [-+*] \{1\}", operation.text))
+    return operation.kind == "real" and bool(
+        re.fullmatch(r"\{0\} [-+*] \{1\}", operation.text)
+    )
 
 
 def _handed(own: list[Operation], block: Block, end: int) -> list[str]:
     """Return the names that operations before a place leave to those after it, in order; none behind the last."""
     later = {name for each in own[end:] for name in _names(each)} | set(block.results)
-    return [each.name for each in own[:end] if each.name in later] if end < len(own) else []
+    return (
+        [each.name for each in own[:end] if each.name in later]
+        if end < len(own)
+        else []
+    )
 
 
 def _cuts(own: list[Operation], block: Block) -> list[int]:
@@ -249,7 +304,13 @@ def _cuts(own: list[Operation], block: Block) -> list[int]:
 
     def cost(end: int) -> float:
         names = _handed(own, block, end)
-        return len(names) if all(TYPES[kinds[name]] == "real" for name in names) else float("inf")
+        return (
+            len(names)
+            if all(TYPES[kinds[name]] == "real" for name in names)
+            else float("inf")
+        )
 
     middles = (share * len(own) // PASSES for share in range(1, PASSES))
-    return [min(range(middle - spread, middle + spread + 1), key=cost) for middle in middles]
+    return [
+        min(range(middle - spread, middle + spread + 1), key=cost) for middle in middles
+    ]

@@ -64,7 +64,10 @@ def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
 def kinds_of(value: Any) -> Any:
     """Return what tells functions of such arguments apart."""
     return tuple(
-        each if isinstance(each, Fixed) or getattr(each, "fixed", False) else kind_of(each) for each in leaves(value)
+        each
+        if isinstance(each, Fixed) or getattr(each, "fixed", False)
+        else kind_of(each)
+        for each in leaves(value)
     )
 
 

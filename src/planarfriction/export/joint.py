@@ -14,7 +14,9 @@ from planarfriction.joints import JointFriction
 from planarfriction.joints.loops.runs import joint_step
 
 
-def export_joint_c(friction: JointFriction, folder: Any, *, name: str = "friction") -> tuple[Path, ...]:
+def export_joint_c(
+    friction: JointFriction, folder: Any, *, name: str = "friction"
+) -> tuple[Path, ...]:
     """Write `<name>.h` and `<name>.c` with the function `<name>_joint_torque`; return the files.
 
     The source is C99 and C++17 and calls nothing but `math.h`; it is traced from the step that fits use. A rigid joint
@@ -24,11 +26,16 @@ def export_joint_c(friction: JointFriction, folder: Any, *, name: str = "frictio
     """
     import planarfriction
 
-    friction = validation.instance("friction", friction, JointFriction, "a JointFriction")
+    friction = validation.instance(
+        "friction", friction, JointFriction, "a JointFriction"
+    )
     checked_name(name)
 
     def step(trace: Trace) -> Any:
-        numbers = (Number(trace, each) for each in ("(*state)", "speed", "tau_motor", "tau_external", "dt"))
+        numbers = (
+            Number(trace, each)
+            for each in ("(*state)", "speed", "tau_motor", "tau_external", "dt")
+        )
         return twin(joint_step)(friction.numbers, *numbers)
 
     body = "\n".join(Writer().lines(traced(step), ["*state", "torque"]))

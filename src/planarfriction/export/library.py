@@ -16,7 +16,14 @@ from planarfriction._engine.compiler import compiled_math
 from planarfriction._engine.published.surfaces import CELLS
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.body import body_of
-from planarfriction.export.c_source import SQRT, Writer, comment, of_compiled, passes_of, rendered
+from planarfriction.export.c_source import (
+    SQRT,
+    Writer,
+    comment,
+    of_compiled,
+    passes_of,
+    rendered,
+)
 from planarfriction.export.c_values import Array, Fixed, Scalar
 from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces, pieces_of
@@ -31,21 +38,44 @@ def grip_of(controller: Any, name: str) -> dict[str, Any]:
     Raises InvalidValueError for anything else, and for an observer of many parts or with a sum of cells as its surface.
     """
     if getattr(controller, "_grip", None) is not grips.hold or controller.state.shape:
-        raise InvalidValueError("controller", "be a Hold of one part (without batch)", type(controller).__name__)
-    observer, writer = controller.observer, Writer()
-    own, state = observer._filter, observer.state
+        raise InvalidValueError(
+            "controller",
+            "be a Hold of one part (without batch)",
+            type(controller).__name__,
+        )
+    observer = controller.observer
+    writer = Writer()
+    own = observer._filter
+    state = observer.state
     if own.kind == CELLS:
         rule = "know an ellipsoid or a table as its surface"
         raise InvalidValueError("controller", rule, type(observer.surface).__name__)
-    arrays = {each: value for each, value in own._asdict().items() if isinstance(value, np.ndarray)}
-    known = [Array(f"own_{n}", v.shape, fixed=True) if n in arrays else Fixed(v) for n, v in own._asdict().items()]
-    estimate, control = friction_filter.ESTIMATE, grips.STATE
+    arrays = {
+        each: value
+        for each, value in own._asdict().items()
+        if isinstance(value, np.ndarray)
+    }
+    known = [
+        Array(f"own_{n}", v.shape, fixed=True) if n in arrays else Fixed(v)
+        for n, v in own._asdict().items()
+    ]
+    estimate = friction_filter.ESTIMATE
+    control = grips.STATE
     loops = Loops(writer, {estimate: f"{name}_estimate", control: f"{name}_control"})
     found = Array("found", (1,), estimate)
     loops.add(
-        friction_filter.update, (own._make(known), Array("states", (1, len(state))), Array("samples", (1, 8)), found)
+        friction_filter.update,
+        (
+            own._make(known),
+            Array("states", (1, len(state))),
+            Array("samples", (1, 8)),
+            found,
+        ),
     )
-    loops.add(controller._grip, (Array("states", (1,), control), found, *map(Fixed, controller._settings)))
+    loops.add(
+        controller._grip,
+        (Array("states", (1,), control), found, *map(Fixed, controller._settings)),
+    )
     functions = "\n\n".join(loops.functions)
     return {
         "tables": {
@@ -62,13 +92,22 @@ def grip_of(controller: Any, name: str) -> dict[str, Any]:
 
 def _fields(record: np.dtype) -> list[str]:
     """Return the fields of a struct."""
-    kinds = {field: ("double" if kind.base.kind == "f" else "int", kind) for field, (kind, *_) in record.fields.items()}  # pyright: ignore
-    return [f"{own} {field}{f'[{np.prod(kind.shape)}]' if kind.shape else ''};" for field, (own, kind) in kinds.items()]
+    kinds = {
+        field: ("double" if kind.base.kind == "f" else "int", kind)
+        for field, (kind, *_) in record.fields.items()
+    }  # pyright: ignore
+    return [
+        f"{own} {field}{f'[{np.prod(kind.shape)}]' if kind.shape else ''};"
+        for field, (own, kind) in kinds.items()
+    ]
 
 
 def _fresh(state: Any, writer: Writer) -> list[str]:
     """Return the constants of a struct."""
-    rows = ([writer.constant(float(x)) for x in np.ravel(state[field])] for field in state.dtype.names)
+    rows = (
+        [writer.constant(float(x)) for x in np.ravel(state[field])]
+        for field in state.dtype.names
+    )
     return [row[0] if len(row) == 1 else f"{{ {', '.join(row)} }}" for row in rows]
 
 
@@ -108,8 +147,16 @@ FILES = {
 
 def checked_name(name: Any) -> None:
     """Check the name of a library; raises InvalidValueError for one that is no name of C, or that of a header."""
-    if not (isinstance(name, str) and re.fullmatch(r"[a-zA-Z]\w*", name, re.ASCII) and len(name) <= LONGEST_NAME):
-        raise InvalidValueError("name", f"be a letter, then letters, digits and _, {LONGEST_NAME} in all", name)
+    if not (
+        isinstance(name, str)
+        and re.fullmatch(r"[a-zA-Z]\w*", name, re.ASCII)
+        and len(name) <= LONGEST_NAME
+    ):
+        raise InvalidValueError(
+            "name",
+            f"be a letter, then letters, digits and _, {LONGEST_NAME} in all",
+            name,
+        )
     if name.lower() in HEADERS.split():
         raise InvalidValueError("name", "not be that of a header of C", name)
 
@@ -142,11 +189,21 @@ def export_c(
     validation.count("patches", patches, 1, MOST_PATCHES)
     validation.instance("casadi", casadi, bool, "True or False")
     if (casadi or controller is not None) and precision != "double":
-        raise InvalidValueError("precision", "be double for CasADi and controllers", precision)
-    given = {"patches": patches} | ({} if controller is None else {"grip": grip_of(controller, name)})
+        raise InvalidValueError(
+            "precision", "be double for CasADi and controllers", precision
+        )
+    given = {"patches": patches} | (
+        {} if controller is None else {"grip": grip_of(controller, name)}
+    )
     folder = validation.path("folder", folder)
-    kinds = [kind for kind in FILES if (casadi or "casadi" not in kind) and ("grip" in given or "grip" not in kind)]
-    texts = _texts(model, pieces_of(model, precision, fixed=False), name, precision, given, kinds)
+    kinds = [
+        kind
+        for kind in FILES
+        if (casadi or "casadi" not in kind) and ("grip" in given or "grip" not in kind)
+    ]
+    texts = _texts(
+        model, pieces_of(model, precision, fixed=False), name, precision, given, kinds
+    )
     writing.make_folder(folder)
     files = tuple(folder / f"{name}{FILES[kind]}" for kind in kinds)
     with contextlib.ExitStack() as stack:  # all can be written, or none is
@@ -155,7 +212,9 @@ def export_c(
     return files
 
 
-def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, kinds: list[str]) -> list[str]:
+def _texts(
+    model: Any, pieces: Pieces, name: str, precision: str, given: dict, kinds: list[str]
+) -> list[str]:
     """Return the text of each kind of file."""
     import planarfriction
 
@@ -163,30 +222,54 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
     slip = slip_of(model.patch, writer)
     functions = _functions(writer, pieces)
     functions |= {} if pieces.fixed else {"tilt": tilt_of(pieces.count)}
-    read, always = "\n".join(functions.values()), ("share", "rungs", *(() if pieces.fixed else ("place_x", "place_y")))
-    tables = {table: each for table, each in pieces.tables.items() if table in always or f"{table}[" in read}
+    read = "\n".join(functions.values())
+    always = ("share", "rungs", *(() if pieces.fixed else ("place_x", "place_y")))
+    tables = {
+        table: each
+        for table, each in pieces.tables.items()
+        if table in always or f"{table}[" in read
+    }
     tables |= {} if slip is None else slip.tables
-    tables = {table: _table(writer, table, numbers) for table, numbers in tables.items()}
+    tables = {
+        table: _table(writer, table, numbers) for table, numbers in tables.items()
+    }
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
-    share = "(at->low[k] + at->part * (at->high[k] - at->low[k]))" if pieces.rungs else "share[k]"
+    share = (
+        "(at->low[k] + at->part * (at->high[k] - at->low[k]))"
+        if pieces.rungs
+        else "share[k]"
+    )
     passes = passes_of(vector, pieces.step, pieces.count, _places(pieces), "shares[k]")
-    bodies = {"exp": of_compiled(compiled_math.exp), "sin": of_compiled(compiled_math.sin), "sqrt": SQRT}
+    bodies = {
+        "exp": of_compiled(compiled_math.exp),
+        "sin": of_compiled(compiled_math.sin),
+        "sqrt": SQRT,
+    }
     stepping = "".join([passes.shared, *passes.each]) if passes else ""
-    own = {each: "\n".join(lines) for each, lines in bodies.items() if f"{each}_of(" in stepping}
+    own = {
+        each: "\n".join(lines)
+        for each, lines in bodies.items()
+        if f"{each}_of(" in stepping
+    }
     values = (
         functions
         | given
         | {
             "name": name,
             "version": planarfriction.__version__,
-            "model": comment(f"{type(model).__name__} of {model.patch.name or 'a patch'}, {type(model.law).__name__}"),
-            "digest": hashlib.sha256("\n".join([functions["step"], repr(tables)]).encode()).hexdigest()[:16],
+            "model": comment(
+                f"{type(model).__name__} of {model.patch.name or 'a patch'}, {type(model.law).__name__}"
+            ),
+            "digest": hashlib.sha256(
+                "\n".join([functions["step"], repr(tables)]).encode()
+            ).hexdigest()[:16],
             "pieces": pieces,
             "states": pieces.count * pieces.states,
             "precision": precision,
             "parameters": {
-                each: (writer.constant(value), PARAMETERS[each][0]) for each, value in pieces.parameters.items()
+                each: (writer.constant(value), PARAMETERS[each][0])
+                for each, value in pieces.parameters.items()
             },
             "ranges": " && ".join(PARAMETERS[each][1] for each in pieces.parameters),
             "tables": tables,
@@ -202,7 +285,11 @@ def _texts(model: Any, pieces: Pieces, name: str, precision: str, given: dict, k
             "own": own,
             "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),
             "operations": pieces.count * sum("=" in line for line in step),
-            "functions": pieces.count * sum(any(f"{each}{writer.suffix}(" in line for each in _SLOW) for line in step),
+            "functions": pieces.count
+            * sum(
+                any(f"{each}{writer.suffix}(" in line for each in _SLOW)
+                for line in step
+            ),
         }
     )
     return [rendered("planarfriction.export", kind, **values) for kind in kinds]
@@ -216,7 +303,11 @@ def _places(pieces: Pieces) -> list[str]:
 def _pattern(pieces: Pieces) -> list[int]:
     """Return rows, columns, starts of columns and rows of entries of the derivative of new states by states."""
     states = pieces.count * pieces.states
-    rows = [c % pieces.count + pieces.count * i for c in range(states) for i in range(pieces.states)]
+    rows = [
+        c % pieces.count + pieces.count * i
+        for c in range(states)
+        for i in range(pieces.states)
+    ]
     return [states, states, *range(0, len(rows) + 1, pieces.states), *rows]
 
 
@@ -224,24 +315,33 @@ def _functions(writer: Writer, pieces: Pieces) -> dict[str, str]:
     """Return the lines of the functions of cell k."""
     wrench = ["w[0]", "w[1]", "w[2]"]
     results = [*_places(pieces), *wrench]
-    rows = [f"rows[{row}][{column}]" for row in range(3 + pieces.states) for column in range(pieces.columns)]
+    rows = [
+        f"rows[{row}][{column}]"
+        for row in range(3 + pieces.states)
+        for column in range(pieces.columns)
+    ]
     traces = {
         "step": (pieces.step, results),
         "steady": (pieces.steady, wrench),
         "slopes": (pieces.slopes(), [*results, *rows]),
     }
     texts = {name: "\n".join(writer.lines(*each)) for name, each in traces.items()}
-    unused = {name: "" if "[k" in text else "    (void)k;\n" for name, text in texts.items()}
+    unused = {
+        name: "" if "[k" in text else "    (void)k;\n" for name, text in texts.items()
+    }
     return {name: unused[name] + text for name, text in texts.items()}
 
 
 def tilt_of(count: int) -> str:
     """Return the functions that shift shares of the load to a centre of pressure, always in double precision."""
-    loops, shares = Loops(Writer()), Array("shares", (count,))
+    loops = Loops(Writer())
+    shares = Array("shares", (count,))
     x, y = (Array(name, (count,), fixed=True) for name in ("place_x", "place_y"))
     loops.add(tilt.centre, (Scalar("mx"), Scalar("my"), Scalar("load")))
     if count > 1:
-        loops.add(tilt.tilt, (x, y, shares, Fixed(count), Scalar("cx"), Scalar("cy"), shares))
+        loops.add(
+            tilt.tilt, (x, y, shares, Fixed(count), Scalar("cx"), Scalar("cy"), shares)
+        )
     return re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
 
 
@@ -255,7 +355,10 @@ def _table(writer: Writer, name: str, numbers: np.ndarray) -> tuple[str, list[st
     """
     single = numbers.dtype == np.float32
     if name.startswith("place_"):
-        return "double", [Writer().constant(float(each)).strip("()") for each in numbers]
+        return "double", [
+            Writer().constant(float(each)).strip("()") for each in numbers
+        ]
     return ("float" if single else "real"), [
-        f"{np.float32(each)!s}f" if single else writer.constant(float(each)).strip("()") for each in numbers.ravel()
+        f"{np.float32(each)!s}f" if single else writer.constant(float(each)).strip("()")
+        for each in numbers.ravel()
     ]

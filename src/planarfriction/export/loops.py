@@ -46,30 +46,49 @@ _OPERATORS: dict[type, tuple[str, Callable[..., Any]]] = {
     ast.GtE: (">=", operator.ge), ast.Eq: ("==", operator.eq), ast.NotEq: ("!=", operator.ne),
 }  # fmt: skip
 
-_LARGER = {min: "<", builtins.max: ">", compiled_math.minimum: "<", compiled_math.maximum: ">"}
+_LARGER = {
+    min: "<",
+    builtins.max: ">",
+    compiled_math.minimum: "<",
+    compiled_math.maximum: ">",
+}
 
 
 class Loops:
     """Source of C functions, each in front of those that call it."""
 
-    def __init__(self, writer: Writer, structs: dict[np.dtype, str] | None = None) -> None:
-        self.writer, self.structs = writer, structs or {}
+    def __init__(
+        self, writer: Writer, structs: dict[np.dtype, str] | None = None
+    ) -> None:
+        self.writer = writer
+        self.structs = structs or {}
         self.replaced: dict[Any, Callable[[Any], str]] = {}
         """Names of C functions, from their arguments, in place of a kernel: they take records and numbers of these."""
         self.functions: list[str] = []
         self._made: dict[Any, tuple[str, list[bool], Any]] = {}
 
-    def add(self, kernel: Any, arguments: tuple[Any, ...]) -> tuple[str, list[bool], Any]:
+    def add(
+        self, kernel: Any, arguments: tuple[Any, ...]
+    ) -> tuple[str, list[bool], Any]:
         """Write a kernel for arguments like these; return its name, which of their numbers it takes, and its result."""
         if kernel in self.replaced:
-            return self.replaced[kernel](arguments), [isinstance(x, (Record, Scalar)) for x in leaves(arguments)], None
+            return (
+                self.replaced[kernel](arguments),
+                [isinstance(x, (Record, Scalar)) for x in leaves(arguments)],
+                None,
+            )
         straight = kernel.py_func.__module__ == surfaces.__name__
         if straight:
-            arguments = tuple(Fixed(each) if isinstance(each, (int, float)) else each for each in arguments)
+            arguments = tuple(
+                Fixed(each) if isinstance(each, (int, float)) else each
+                for each in arguments
+            )
         key = kernel, kinds_of(arguments)
         if key not in self._made:
             own = (_Traced if straight else _Translated)(self, kernel, arguments)
-            own.name += "_again" * sum(own.name == name for name, _, _ in self._made.values())
+            own.name += "_again" * sum(
+                own.name == name for name, _, _ in self._made.values()
+            )
             self.functions.append(own.source())
             self._made[key] = own.name, own.taken, own.result
         return self._made[key]
@@ -80,33 +99,61 @@ class _Function:
 
     def __init__(self, loops: Loops, kernel: Any, arguments: tuple[Any, ...]) -> None:
         own = kernel.py_func
-        self.loops, self.kernel, self.space, self.result = loops, kernel, own.__globals__, None
+        self.loops = loops
+        self.kernel = kernel
+        self.space = own.__globals__
+        self.result = None
         self.name = f"{own.__name__.strip('_')}_of_{own.__module__.rpartition('.')[2]}"
         self.lines: list[str] = []
         self.locals: dict[str, str] = {}
-        self.indent, self._parameters = "    ", []
+        self.indent = "    "
+        self._parameters = []
         given = zip(inspect.signature(own).parameters, arguments, strict=True)
-        self.names: dict[str, Any] = {name: self._parameter(name, value, self._parameters) for name, value in given}
+        self.names: dict[str, Any] = {
+            name: self._parameter(name, value, self._parameters)
+            for name, value in given
+        }
         self._write()
         body = "\n".join(self.lines)
-        self.taken = [text is not None and bool(re.search(rf"\b{name}\b", body)) for name, text in self._parameters]
+        self.taken = [
+            text is not None and bool(re.search(rf"\b{name}\b", body))
+            for name, text in self._parameters
+        ]
 
     def _write(self) -> None:
         raise NotImplementedError
 
     def source(self) -> str:
         """Return the source of the function."""
-        head = [text for (_, text), taken in zip(self._parameters, self.taken, strict=True) if text and taken]
-        head += ["real *result"] if not isinstance(self.result, (Scalar, type(None))) else []
+        head = [
+            text
+            for (_, text), taken in zip(self._parameters, self.taken, strict=True)
+            if text and taken
+        ]
+        head += (
+            ["real *result"]
+            if not isinstance(self.result, (Scalar, type(None)))
+            else []
+        )
         declared = []
         for each in ("real", "int"):
             names = [name for name, own in self.locals.items() if own == each]
             declared += [f"    {each} {', '.join(names)};"] if names else []
         lines = self.lines[: -1 if self.lines[-1] == "    return;" else None]
         kind = self.result.kind if isinstance(self.result, Scalar) else "void"
-        return "\n".join([f"static {kind} {self.name}({', '.join(head)})", "{", *declared, *lines, "}"])
+        return "\n".join(
+            [
+                f"static {kind} {self.name}({', '.join(head)})",
+                "{",
+                *declared,
+                *lines,
+                "}",
+            ]
+        )
 
-    def _parameter(self, name: str, value: Any, parameters: list[tuple[str, str | None]]) -> Any:
+    def _parameter(
+        self, name: str, value: Any, parameters: list[tuple[str, str | None]]
+    ) -> Any:
         count = len(list(leaves(value)))
 
         def named(each: Any) -> Any:
@@ -117,7 +164,12 @@ class _Function:
                 return each
             kind, _ = kind_of(each)
             points = isinstance(each, (Array, Record))
-            parameters.append((own, f"{self.loops.structs.get(kind, kind)} {'*' if points else ''}{own}"))
+            parameters.append(
+                (
+                    own,
+                    f"{self.loops.structs.get(kind, kind)} {'*' if points else ''}{own}",
+                )
+            )
             return each._replace(text=own) if points else Scalar(own, kind)
 
         first = len(parameters)
@@ -134,7 +186,11 @@ class _Function:
         self.lines.append(self.indent + text)
 
     def _of(self, value: Any) -> str:
-        return value.text if isinstance(value, (Scalar, Array, Record)) else self.loops.writer.constant(plain(value))
+        return (
+            value.text
+            if isinstance(value, (Scalar, Array, Record))
+            else self.loops.writer.constant(plain(value))
+        )
 
 
 class _Traced(_Function):
@@ -148,18 +204,28 @@ class _Traced(_Function):
                 return rows.setdefault(value.text, [0.0] * math.prod(value.shape))
             if isinstance(value, Array):
                 return Table(trace, value.text)
-            return Number(trace, value.text, value.kind) if isinstance(value, Scalar) else plain(value)
+            return (
+                Number(trace, value.text, value.kind)
+                if isinstance(value, Scalar)
+                else plain(value)
+            )
 
         def call(trace: Trace) -> Any:
             nonlocal result
-            result = twin(self.kernel)(*(seen(trace, each) for each in self.names.values()))
+            result = twin(self.kernel)(
+                *(seen(trace, each) for each in self.names.values())
+            )
             return (() if result is None else result, *map(tuple, rows.values()))
 
         result: Any = None
         block = traced(call)
-        count = 0 if result is None else len(block.results) - sum(map(len, rows.values()))
+        count = (
+            0 if result is None else len(block.results) - sum(map(len, rows.values()))
+        )
         outputs = [f"result[{i}]" for i in range(count)]
-        outputs += [f"{name}[{i}]" for name, row in rows.items() for i in range(len(row))]
+        outputs += [
+            f"{name}[{i}]" for name, row in rows.items() for i in range(len(row))
+        ]
         self.lines += self.loops.writer.lines(block, outputs)
         self.result = tuple(map(Scalar, outputs[:count])) or None
 
@@ -183,7 +249,9 @@ class _Translated(_Function):
         getattr(self, f"_{type(node).__name__.lower()}")(node)
 
     def _expr(self, node: ast.Expr) -> None:
-        if isinstance(node.value, ast.Call) and isinstance(value := self._value(node.value), Scalar):
+        if isinstance(node.value, ast.Call) and isinstance(
+            value := self._value(node.value), Scalar
+        ):
             self._line(f"{value.text};")
 
     def _break(self, node: ast.Break) -> None:
@@ -233,7 +301,11 @@ class _Translated(_Function):
 
     def _put(self, target: Any, value: Any) -> None:
         """Assign a value to names and places, all at once."""
-        pairs = [(target, value)] if not isinstance(target, ast.Tuple) else list(zip(target.elts, value, strict=True))
+        pairs = (
+            [(target, value)]
+            if not isinstance(target, ast.Tuple)
+            else list(zip(target.elts, value, strict=True))
+        )
         if len(pairs) > 1 and self._depend(pairs):
             pairs = [(each, mapped(part, self._kept)) for each, part in pairs]
         for each, part in pairs:
@@ -251,7 +323,11 @@ class _Translated(_Function):
             texts = " ".join(self._of(each) for each in leaves(value))
             if any(re.search(rf"\b{re.escape(each)}", texts) for each in done):
                 return True
-            done.append(target.id if isinstance(target, ast.Name) else self._of(self._value(target.value)))
+            done.append(
+                target.id
+                if isinstance(target, ast.Name)
+                else self._of(self._value(target.value))
+            )
         return False
 
     def _assigned(self, name: str, value: Any) -> None:
@@ -259,7 +335,13 @@ class _Translated(_Function):
         count = iter(range(len(parts)))
         self._declare(
             name,
-            mapped(value, lambda each: Scalar(name if len(parts) == 1 else f"{name}_{next(count)}", kind_of(each)[0])),
+            mapped(
+                value,
+                lambda each: Scalar(
+                    name if len(parts) == 1 else f"{name}_{next(count)}",
+                    kind_of(each)[0],
+                ),
+            ),
         )
         for own, each in zip(leaves(self.names[name]), parts, strict=True):
             self._line(f"{own.text} = {self._of(each)};")
@@ -289,14 +371,17 @@ class _Translated(_Function):
         return node.value
 
     def _value_of_name(self, node: ast.Name) -> Any:
-        return self.names.get(node.id, self.space.get(node.id, getattr(builtins, node.id, None)))
+        return self.names.get(
+            node.id, self.space.get(node.id, getattr(builtins, node.id, None))
+        )
 
     def _value_of_attribute(self, node: ast.Attribute) -> Any:
         own = self._value(node.value)
         if not isinstance(own, Record):
             return getattr(own, node.attr)
         kind = own.kind[node.attr]
-        name, number = f"{own.text}->{node.attr}", "real" if kind.base.kind == "f" else "int"
+        name = f"{own.text}->{node.attr}"
+        number = "real" if kind.base.kind == "f" else "int"
         return Array(name, kind.shape, number) if kind.shape else Scalar(name, number)
 
     def _value_of_tuple(self, node: ast.Tuple) -> Any:
@@ -305,7 +390,10 @@ class _Translated(_Function):
     def _value_of_subscript(self, node: ast.Subscript) -> Any:
         own = self._value(node.value)
         last = getattr(node.slice, "elts", [node.slice])[-1]
-        parts = [*getattr(node.slice, "elts", [node.slice])[:-1], last.lower if isinstance(last, ast.Slice) else last]
+        parts = [
+            *getattr(node.slice, "elts", [node.slice])[:-1],
+            last.lower if isinstance(last, ast.Slice) else last,
+        ]
         places = [self._value(each) for each in parts]
         if not isinstance(own, Array):
             return own[places[0]]
@@ -317,10 +405,15 @@ class _Translated(_Function):
             rest = (end - places[-1],)
         lengths = (math.prod(own.shape[i + 1 :]) for i in range(len(places)))
         terms = [
-            self._of(each) if n == 1 else f"{n} * {self._of(each)}" for each, n in zip(places, lengths, strict=True)
+            self._of(each) if n == 1 else f"{n} * {self._of(each)}"
+            for each, n in zip(places, lengths, strict=True)
         ]
         at = " + ".join(terms)
-        return own._replace(text=f"({own.text} + {at})", shape=rest) if rest else Scalar(f"{own.text}[{at}]", own.kind)
+        return (
+            own._replace(text=f"({own.text} + {at})", shape=rest)
+            if rest
+            else Scalar(f"{own.text}[{at}]", own.kind)
+        )
 
     def _value_of_unaryop(self, node: ast.UnaryOp) -> Any:
         value = self._value(node.operand)
@@ -330,31 +423,47 @@ class _Translated(_Function):
         return Scalar(f"({text}{value.text})", value.kind)
 
     def _value_of_binop(self, node: ast.BinOp) -> Any:
-        a, b = self._value(node.left), self._value(node.right)
+        a = self._value(node.left)
+        b = self._value(node.right)
         if isinstance(node.op, ast.Pow):
             if plain(b) != 2:
-                raise NotImplementedError(f"power {b} in {self.name}: squares alone are translated")
+                raise NotImplementedError(
+                    f"power {b} in {self.name}: squares alone are translated"
+                )
             a = self._kept(a)
             return Scalar(f"({a.text} * {a.text})")
         return self._joined(type(node.op), a, b)
 
     def _joined(self, operation: type, a: Any, b: Any) -> Any:
-        kinds, (text, function) = {kind_of(a)[0], kind_of(b)[0]}, _OPERATORS[operation]
+        kinds = {kind_of(a)[0], kind_of(b)[0]}
+        (text, function) = _OPERATORS[operation]
         if not isinstance(a, Scalar) and not isinstance(b, Scalar):
             return function(plain(a), plain(b))
         if "real" in kinds:
-            a, b = (each if isinstance(each, Scalar) else float(plain(each)) for each in (a, b))
+            a, b = (
+                each if isinstance(each, Scalar) else float(plain(each))
+                for each in (a, b)
+            )
         compares = issubclass(operation, ast.cmpop) or "real" not in kinds
-        return Scalar(f"({self._of(a)} {text} {self._of(b)})", "int" if compares else "real")
+        return Scalar(
+            f"({self._of(a)} {text} {self._of(b)})", "int" if compares else "real"
+        )
 
     def _value_of_compare(self, node: ast.Compare) -> Any:
         if isinstance(node.ops[0], ast.In):
-            left, own = self._text(node.left), self._value(node.comparators[0])
-            return Scalar(f"({' || '.join(f'{left} == {self._of(each)}' for each in own)})", "int")
+            left = self._text(node.left)
+            own = self._value(node.comparators[0])
+            return Scalar(
+                f"({' || '.join(f'{left} == {self._of(each)}' for each in own)})", "int"
+            )
         parts = [self._value(each) for each in (node.left, *node.comparators)]
         pairs = zip(parts, node.ops, parts[1:], strict=False)
         found = [self._joined(type(operation), a, b) for a, operation, b in pairs]
-        return found[0] if len(found) == 1 else Scalar(f"({' && '.join(map(self._of, found))})", "int")
+        return (
+            found[0]
+            if len(found) == 1
+            else Scalar(f"({' && '.join(map(self._of, found))})", "int")
+        )
 
     def _value_of_boolop(self, node: ast.BoolOp) -> Any:
         text = " && " if isinstance(node.op, ast.And) else " || "
@@ -364,21 +473,32 @@ class _Translated(_Function):
         asked = self._kept(self._value(node.test))
         if not isinstance(asked, Scalar):
             return self._value(node.body if asked else node.orelse)
-        yes, no = self._value(node.body), self._value(node.orelse)
+        yes = self._value(node.body)
+        no = self._value(node.orelse)
         others = iter(list(leaves(no)))
-        return mapped(yes, lambda each: self._chosen(self._of(asked), each, next(others)))
+        return mapped(
+            yes, lambda each: self._chosen(self._of(asked), each, next(others))
+        )
 
     def _chosen(self, asked: str, a: Any, b: Any) -> Scalar:
         return Scalar(f"({asked} ? {self._of(a)} : {self._of(b)})", kind_of(a)[0])
 
     def _value_of_call(self, node: ast.Call) -> Any:
-        function, given = self._value(node.func), tuple(map(self._value, node.args))
+        function = self._value(node.func)
+        given = tuple(map(self._value, node.args))
         if function in _LARGER:
             a, b = (self._kept(each) for each in given)
-            return self._chosen(f"{self._of(a)} {_LARGER[function]} {self._of(b)}", a, b)
-        if function is abs or getattr(math, getattr(function, "__name__", ""), None) is function:
+            return self._chosen(
+                f"{self._of(a)} {_LARGER[function]} {self._of(b)}", a, b
+            )
+        if (
+            function is abs
+            or getattr(math, getattr(function, "__name__", ""), None) is function
+        ):
             name = "fabs" if function is abs else function.__name__
-            return Scalar(f"{name}{self.loops.writer.suffix}({', '.join(map(self._of, given))})")
+            return Scalar(
+                f"{name}{self.loops.writer.suffix}({', '.join(map(self._of, given))})"
+            )
         if isinstance(function, type):
             return function(*given)
         if function is at:
@@ -388,7 +508,11 @@ class _Translated(_Function):
             self.locals[f"{name}[{given[0]}]"] = "real"
             return Array(name, (plain(given[0]),))
         name, taken, result = self.loops.add(function, given)
-        texts = [self._of(each) for each, wanted in zip(leaves(given), taken, strict=True) if wanted]
+        texts = [
+            self._of(each)
+            for each, wanted in zip(leaves(given), taken, strict=True)
+            if wanted
+        ]
         if isinstance(result, Scalar):
             return Scalar(f"{name}({', '.join(texts)})", result.kind)
         if result is None:
@@ -397,4 +521,6 @@ class _Translated(_Function):
         own = f"r{len(self.lines)}"
         self.locals[f"{own}[{len(list(leaves(result)))}]"] = "real"
         self._line(f"{name}({', '.join([*texts, own])});")
-        return mapped(result, lambda each: each._replace(text=each.text.replace("result", own)))
+        return mapped(
+            result, lambda each: each._replace(text=each.text.replace("result", own))
+        )

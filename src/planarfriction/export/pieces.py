@@ -17,12 +17,23 @@ from planarfriction._engine.cells import cells, cells_rollout
 from planarfriction._engine.codegen.derive import derive
 from planarfriction._engine.codegen.rewriting import Rewriting
 from planarfriction._engine.codegen.rules import ratio
-from planarfriction._engine.codegen.trace import Block, Mathematics, Number, Table, Trace, traced
+from planarfriction._engine.codegen.trace import (
+    Block,
+    Mathematics,
+    Number,
+    Table,
+    Trace,
+    traced,
+)
 from planarfriction._engine.codegen.twins import NAMES, SYMBOLS, finished, twin
 from planarfriction._engine.codegen.vectors import norm, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.published import published_contact, published_step
-from planarfriction._engine.published.published_contact import PublishedContact, PublishedPatch, Root
+from planarfriction._engine.published.published_contact import (
+    PublishedContact,
+    PublishedPatch,
+    Root,
+)
 from planarfriction._engine.published.surfaces import CELLS
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
@@ -56,14 +67,19 @@ def ladder_of(patch: ContactPatch) -> Ladder:
     """
     rungs = np.union1d(loads_of_change(patch), getattr(patch.pressure, "loads", ()))
     while True:
-        shares, between = patch.weights(rungs), 0.5 * (rungs[1:] + rungs[:-1])
-        off = 0.5 * np.abs(patch.weights(between) - 0.5 * (shares[1:] + shares[:-1])).sum(axis=1)
+        shares = patch.weights(rungs)
+        between = 0.5 * (rungs[1:] + rungs[:-1])
+        off = 0.5 * np.abs(
+            patch.weights(between) - 0.5 * (shares[1:] + shares[:-1])
+        ).sum(axis=1)
         coarse = (off > ERROR) & (np.diff(rungs) > NARROW * between)
         if not coarse.any():
             return Ladder(rungs, shares)
         rungs = np.union1d(rungs, between[coarse])
         if len(rungs) > MOST_RUNGS:
-            rule = f"have a patch whose shape {MOST_RUNGS} loads describe within {ERROR:g}"
+            rule = (
+                f"have a patch whose shape {MOST_RUNGS} loads describe within {ERROR:g}"
+            )
             raise InvalidValueError("model", rule, patch.name or "a patch")
 
 
@@ -103,7 +119,9 @@ class Pieces(NamedTuple):
         return self.states + 3 + len(self.parameters) + self.fixed
 
 
-def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, count: int = 0) -> Pieces:
+def pieces_of(
+    model: Any, precision: str = "double", *, fixed: bool = True, count: int = 0
+) -> Pieces:
     """Take a model apart for a `precision` of `library.PRECISIONS`.
 
     Only one of a `fixed` shape, or also cells whose pressure follows the load. If it has fewer cells than `count`,
@@ -112,23 +130,38 @@ def pieces_of(model: Any, precision: str = "double", *, fixed: bool = True, coun
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
     depends on the load, friction that differs from cell to cell in other ways than by a metric.
     """
-    whole, law = model.reduction if isinstance(model, ReducedModel) else model, getattr(model, "law", None)
+    whole = model.reduction if isinstance(model, ReducedModel) else model
+    law = getattr(model, "law", None)
     for kind, taken_apart in _KINDS.items():
-        if type(whole) is kind and isinstance(getattr(law, "numbers", None), LawNumbers) and not is_rate_law(law):
+        if (
+            type(whole) is kind
+            and isinstance(getattr(law, "numbers", None), LawNumbers)
+            and not is_rate_law(law)
+        ):
             if whole.patch.depends_on_load and (fixed or kind is not DistributedModel):
-                rule = "have a patch whose shape does not depend on the load" + ("" if fixed else ", or cells")
-                raise InvalidValueError("model", rule, model.patch.name or "a patch that does")
+                rule = "have a patch whose shape does not depend on the load" + (
+                    "" if fixed else ", or cells"
+                )
+                raise InvalidValueError(
+                    "model", rule, model.patch.name or "a patch that does"
+                )
             return taken_apart(whole, precision, count)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
     given = f"{type(model).__name__}, {type(law).__name__}"
-    raise InvalidValueError("model", f"be one of {names} with a law of LuGre bristles", given)
+    raise InvalidValueError(
+        "model", f"be one of {names} with a law of LuGre bristles", given
+    )
 
 
 # ---------------------------------------------------------------------- what they are traced with
 
 
 def _law(trace: Trace, numbers: LawNumbers) -> LawNumbers:
-    symbols: dict[str, Any] = {name: Number(trace, f"p->{name}") for name in LawNumbers._fields if name not in FIXED}
+    symbols: dict[str, Any] = {
+        name: Number(trace, f"p->{name}")
+        for name in LawNumbers._fields
+        if name not in FIXED
+    }
     return numbers._replace(**symbols)
 
 
@@ -160,9 +193,12 @@ def _sliding(u: Any) -> Any:
 
 def _sliding_of_disc(u: Any) -> Any:
     """Return what `discs.sliding` does, in a unit of speed whose fourth powers do not leave single precision."""
-    slide, spin = u[0] * u[0] + u[1] * u[1], 2.0 * u[2] * u[2]
+    slide = u[0] * u[0] + u[1] * u[1]
+    spin = 2.0 * u[2] * u[2]
     per = 1.0 / (slide + spin + math.sqrt(formulas.DISC_REST))
-    c_t, c_s, m = formulas.disc_friction_above(per * slide, per * spin, formulas.DISC_REST * per * per)
+    c_t, c_s, m = formulas.disc_friction_above(
+        per * slide, per * spin, formulas.DISC_REST * per * per
+    )
     return c_t, c_s, math.sqrt(slide + m * spin), (c_t * u[0], c_t * u[1], c_s * u[2])
 
 
@@ -190,16 +226,26 @@ def _settled(cell: Any, reference: float, lightest: float) -> Any:
 def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
-    numbers, law, size = model.compiled.numbers(), model.law.numbers, model.compiled.size
+    numbers = model.compiled.numbers()
+    law = model.law.numbers
+    size = model.compiled.size
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
-    levers, cell, sliding = (cells.POSITIONS, cells.LEVERS), points.step, _sliding
+    levers = (cells.POSITIONS, cells.LEVERS)
+    cell = points.step
+    sliding = _sliding
     if size == 3:
         sliding = discs.sliding if precision == "double" else _sliding_of_disc
-        levers, cell = (cells.DISC_POSITIONS, cells.DISC_LEVERS), _with(discs.step, sliding=sliding)
-    reference, by = model.compiled.reference, cells_rollout.by_of("law")
+        levers = (cells.DISC_POSITIONS, cells.DISC_LEVERS)
+        cell = _with(discs.step, sliding=sliding)
+    reference = model.compiled.reference
+    by = cells_rollout.by_of("law")
     fixed = reference > 0.0
-    moved, by = (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load")) if fixed else (cell, by)
+    moved, by = (
+        (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load"))
+        if fixed
+        else (cell, by)
+    )
     given = ("dt", "normal_force") if fixed else ("dt",)
     lever = twin(levers[model.patch.anisotropic])
     names = ["place_x", "place_y"] if precision == "double" else ["lever_x", "lever_y"]
@@ -210,11 +256,14 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     def step(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
         u = lever.seen(own, _vector(trace, *_TWIST))
-        new, traction = twin(moved)(_law(trace, law), _state(trace, size, n), u, *_vector(trace, *given))
+        new, traction = twin(moved)(
+            _law(trace, law), _state(trace, size, n), u, *_vector(trace, *given)
+        )
         return new, lever.wrench(own, traction)
 
     def steady(trace: Trace) -> Any:
-        own, given = _vector(trace, *(f"{name}[k]" for name in names)), _law(trace, law)
+        own = _vector(trace, *(f"{name}[k]" for name in names))
+        given = _law(trace, law)
         u = lever.seen(own, _vector(trace, *_TWIST))
         speed, pull = twin(sliding)(u)[2:]
         z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), pull)
@@ -223,42 +272,81 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
         written = derive(moved, by, ("z", "u"))
-        forth, back = twin(written.forth), twin(written.back)
-        u, none = lever.seen(own, _vector(trace, *_TWIST)), (0.0,) * size
-        (new, traction), tape = forth(_law(trace, law), _state(trace, size, n), u, *_vector(trace, *given))
-        bars = [back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()]
+        forth = twin(written.forth)
+        back = twin(written.back)
+        u = lever.seen(own, _vector(trace, *_TWIST))
+        none = (0.0,) * size
+        (new, traction), tape = forth(
+            _law(trace, law), _state(trace, size, n), u, *_vector(trace, *given)
+        )
+        bars = [
+            back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()
+        ]
         bars += [back(tape, (tuple(unit), none)) for unit in np.eye(size).tolist()]
-        kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)] + [-1] * fixed
-        rows = tuple((by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept)) for by_z, by_u, *by_law in bars)
+        kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)] + [
+            -1
+        ] * fixed
+        rows = tuple(
+            (by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept))
+            for by_z, by_u, *by_law in bars
+        )
         return new, lever.wrench(own, traction), rows
 
-    places = zip(("place_x", "place_y", *names), (*model.patch.positions.T, *numbers), strict=False)
-    tables, rungs = {name: np.pad(each, (0, more), mode="edge") for name, each in places}, 0
+    places = zip(
+        ("place_x", "place_y", *names),
+        (*model.patch.positions.T, *numbers),
+        strict=False,
+    )
+    tables = {name: np.pad(each, (0, more), mode="edge") for name, each in places}
+    rungs = 0
     if model.patch.depends_on_load:
         ladder = ladder_of(model.patch)
         tables |= {"share": ladder.shares, "rungs": ladder.rungs}
         rungs = len(ladder.rungs)
     else:
         tables["share"] = np.pad(model.patch.weights(), (0, more))
-    return Pieces(n, size, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), rungs, fixed)
+    return Pieces(
+        n,
+        size,
+        tables,
+        traced(step),
+        _parameters(law),
+        traced(steady),
+        lambda: traced(slopes),
+        rungs,
+        fixed,
+    )
 
 
 def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
     """Trace the steps of the record of the contact."""
-    found, law = model.compiled.shapes.shape_at(None), model.law.numbers
-    surface, root, shape = found.surface.numbers, found.root, PublishedPatch(*found.numbers)
+    found = model.compiled.shapes.shape_at(None)
+    law = model.law.numbers
+    surface = found.surface.numbers
+    root = found.root
+    shape = PublishedPatch(*found.numbers)
     if surface.kind == CELLS:
-        raise InvalidValueError("surface", "be an ellipsoid or a table", type(found.surface).__name__)
+        raise InvalidValueError(
+            "surface", "be an ellipsoid or a table", type(found.surface).__name__
+        )
     root = Root(float(root[0, 0]), float(root[0, 1]), float(root[1, 1]))
-    steps = Rewriting((*SYMBOLS, (published_contact.read, lambda record: record)), NAMES, finished)(published_step)
+    steps = Rewriting(
+        (*SYMBOLS, (published_contact.read, lambda record: record)), NAMES, finished
+    )(published_step)
 
     def contact(trace: Trace) -> PublishedContact:
         data: Any = Table(trace, "surface", surface.data)
-        return PublishedContact(_law(trace, law), shape, root, surface.kind, surface.size, data)
+        return PublishedContact(
+            _law(trace, law), shape, root, surface.kind, surface.size, data
+        )
 
     def step(trace: Trace) -> Any:
-        new, out, dt = [0.0] * 3, [0.0] * 3, Number(trace, "dt")
-        steps.step(contact(trace), _state(trace, 3, 1), _vector(trace, *_TWIST), dt, new, out)
+        new = [0.0] * 3
+        out = [0.0] * 3
+        dt = Number(trace, "dt")
+        steps.step(
+            contact(trace), _state(trace, 3, 1), _vector(trace, *_TWIST), dt, new, out
+        )
         return tuple(new), tuple(out)
 
     def steady(trace: Trace) -> Any:
@@ -278,18 +366,43 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
             laws.append(bar.law)
             return bar
 
-        new, out, dt = [0.0] * 3, [0.0] * 39, Number(trace, "dt")
-        given = contact(trace), _state(trace, 3, 1), _vector(trace, *_TWIST), dt, new, out
+        new = [0.0] * 3
+        out = [0.0] * 39
+        dt = Number(trace, "dt")
+        given = (
+            contact(trace),
+            _state(trace, 3, 1),
+            _vector(trace, *_TWIST),
+            dt,
+            new,
+            out,
+        )
         steps.slopes(*given, pull_back=pull_back, whole=True)
-        by_law = [tuple(getattr(each, name) for name in _parameters(law)) for each in laws]
+        by_law = [
+            tuple(getattr(each, name) for name in _parameters(law)) for each in laws
+        ]
         rows = [
-            (*out[at + 18 : at + 21], *out[at : at + 3], bar) for at, bar in zip(range(3, 21, 3), by_law, strict=True)
+            (*out[at + 18 : at + 21], *out[at : at + 3], bar)
+            for at, bar in zip(range(3, 21, 3), by_law, strict=True)
         ]
         return tuple(new), tuple(out[:3]), tuple(rows)
 
-    tables: dict[str, Any] = {"place_x": found.place[:1], "place_y": found.place[1:], "share": np.ones(1)}
+    tables: dict[str, Any] = {
+        "place_x": found.place[:1],
+        "place_y": found.place[1:],
+        "share": np.ones(1),
+    }
     tables |= {"surface": surface.data} if len(surface.data) else {}
-    return Pieces(1, 3, tables, traced(step), _parameters(law), traced(steady), lambda: traced(slopes), moves=True)
+    return Pieces(
+        1,
+        3,
+        tables,
+        traced(step),
+        _parameters(law),
+        traced(steady),
+        lambda: traced(slopes),
+        moves=True,
+    )
 
 
 _KINDS = {DistributedModel: _distributed, ReducedModelPublished: _published}

@@ -6,7 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.codegen.trace import Mathematics, Number, Table, Trace, traced
+from planarfriction._engine.codegen.trace import (
+    Mathematics,
+    Number,
+    Table,
+    Trace,
+    traced,
+)
 from planarfriction._engine.codegen.twins import twin
 from planarfriction.export.c_source import Writer
 from planarfriction.limit_surface import LimitSurfaceTable
@@ -40,7 +46,8 @@ def slip_of(patch: ContactPatch, writer: Writer) -> Slip | None:
     _, size, data = surface.numbers
     frame = surface._scaling.tolist()
 
-    axes, search = [f"c[{i}]" for i in range(9)], [f"s[{i}]" for i in range(len(Search._fields))]
+    axes = [f"c[{i}]" for i in range(9)]
+    search = [f"s[{i}]" for i in range(len(Search._fields))]
 
     def place(trace: Trace) -> tuple[Any, Search]:
         c, s = ([Number(trace, each) for each in names] for names in (axes, search))
@@ -59,24 +66,45 @@ def slip_of(patch: ContactPatch, writer: Writer) -> Slip | None:
     def attempt(trace: Trace) -> Any:
         numbers: Any = Table(trace, "normals", data)
         table = StoredPotential(numbers, size, data, 0.0)
-        lean, (axes, s) = twin(twists.lean_of)(frame), place(trace)
+        lean = twin(twists.lean_of)(frame)
+        (axes, s) = place(trace)
         evaluate = twin(twists.table_at)
-        found = twin(twists.try_place)(evaluate, table, lean, axes, LIMITS[writer.suffix], s, [0.0] * 9)
+        found = twin(twists.try_place)(
+            evaluate, table, lean, axes, LIMITS[writer.suffix], s, [0.0] * 9
+        )
         return found._replace(going=Mathematics.where(found.going, 1.0, 0.0))
 
     # the twist of unit dissipation, and the angle [rad] by which its wrench misses the given one
     def end(trace: Trace) -> Any:
-        (axes, s), twist = place(trace), [0.0] * 3
-        twin(twists.put_twist)(frame, twin(twists.place_of)(axes, s.a, s.b), s.power, twist)
+        (axes, s) = place(trace)
+        twist = [0.0] * 3
+        twin(twists.put_twist)(
+            frame, twin(twists.place_of)(axes, s.a, s.b), s.power, twist
+        )
         return (*twist, s.angle)
 
-    duals = surface._table.duals.reshape(3, -1).T.astype(np.float32)  # rough: Newton's method goes on from there
+    duals = surface._table.duals.reshape(3, -1).T.astype(
+        np.float32
+    )  # rough: Newton's method goes on from there
     tables = {"normals": data, "duals": np.unique(duals, axis=0)}
     twist = ["twist[0]", "twist[1]", "twist[2]", "*angle"]
-    outputs = {target: ["t[0]", "t[1]", "t[2]"], begin: [*axes, *search], attempt: search, end: twist}
-    words = {each.__name__: "\n".join(writer.lines(traced(each), names)) for each, names in outputs.items()}
+    outputs = {
+        target: ["t[0]", "t[1]", "t[2]"],
+        begin: [*axes, *search],
+        attempt: search,
+        end: twist,
+    }
+    words = {
+        each.__name__: "\n".join(writer.lines(traced(each), names))
+        for each, names in outputs.items()
+    }
     angle = writer.constant(LARGEST_ANGLE[writer.suffix])
-    return Slip(surface, tables, words | {"trials": twists.MOST_TRIALS, "duals": len(tables["duals"]), "angle": angle})
+    return Slip(
+        surface,
+        tables,
+        words
+        | {"trials": twists.MOST_TRIALS, "duals": len(tables["duals"]), "angle": angle},
+    )
 
 
 KINDS = {"": np.float64, "f": np.float32}
@@ -87,13 +115,16 @@ TOLERANCES = {"": 1e-9, "f": 1e-3}
 MU = 0.5
 
 
-def samples_of(model: Any, slip: Slip | None, writer: Writer, rungs: Any, count: int = 32) -> dict[str, Any]:
+def samples_of(
+    model: Any, slip: Slip | None, writer: Writer, rungs: Any, count: int = 32
+) -> dict[str, Any]:
     """Step a model from rest through random twists, normal forces and periods, from sticking to sliding; return source.
 
     `loads` are followed by the least normal forces that hold them. Normal forces are the `rungs` between which shapes
     are interpolated, if there are any.
     """
-    rng, kind = np.random.default_rng(0), KINDS[writer.suffix]
+    rng = np.random.default_rng(0)
+    kind = KINDS[writer.suffix]
     lever = 1.0 if slip is None else slip.surface.contact_radius
     speeds = model.law.numbers.v_s * 10.0 ** rng.uniform(-3.0, 2.0, (count, 1))
     rows = np.hstack([
@@ -101,8 +132,12 @@ def samples_of(model: Any, slip: Slip | None, writer: Writer, rungs: Any, count:
         10.0 ** rng.uniform([-1.0, -5.0], [1.0, -2.0], (count, 2)),
     ]).astype(kind).astype(float)  # fmt: skip
     if rungs is not None:
-        rows[:, 3] = rng.choice(rungs[np.clip(np.searchsorted(rungs, [0.1, 10.0]), 0, len(rungs) - 1)], count)
-    state, wrenches = model.rest(), []
+        rows[:, 3] = rng.choice(
+            rungs[np.clip(np.searchsorted(rungs, [0.1, 10.0]), 0, len(rungs) - 1)],
+            count,
+        )
+    state = model.rest()
+    wrenches = []
     for row in rows:
         state, wrench = model.step(state, row[:3], row[3], row[4])
         wrenches.append(wrench)
@@ -111,6 +146,9 @@ def samples_of(model: Any, slip: Slip | None, writer: Writer, rungs: Any, count:
         needed = np.einsum("ni,ni->n", slip.surface.twist(-loads), loads) / MU
         loads = np.column_stack([loads, needed])
     tables = {"steps": rows, "wrenches": wrenches, "loads": loads}
-    found = {name: [[writer.constant(float(x)) for x in row] for row in table] for name, table in tables.items()}
+    found = {
+        name: [[writer.constant(float(x)) for x in row] for row in table]
+        for name, table in tables.items()
+    }
     numbers = {"mu": MU, "lever": float(lever), "tolerance": TOLERANCES[writer.suffix]}
     return found | {name: writer.constant(each) for name, each in numbers.items()}

@@ -4,12 +4,22 @@
 suggests which motion to measure next.
 """
 
-from planarfriction.identify.experiments import MotionPlan, candidate_motions, current_estimate, design_experiment
+from planarfriction.identify.experiments import (
+    MotionPlan,
+    candidate_motions,
+    current_estimate,
+    design_experiment,
+)
 from planarfriction.identify.logs import Log, differentiated
 from planarfriction.identify.motion import identify_motion
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.result import Identification
-from planarfriction.identify.slides import MassProperties, Slide, fit_start, predict_slide
+from planarfriction.identify.slides import (
+    MassProperties,
+    Slide,
+    fit_start,
+    predict_slide,
+)
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.identify.wrenches import identify_lugre
 

@@ -33,7 +33,10 @@ MISREAD, BETTER = 5.0, 0.4
 """Median angle between the wrench and that of sliding friction [deg] from which a log may have been misread, and share
 to which another reading must lower it to be named: no reading lowers noise."""
 
-NEAR, FAR = np.geomspace(1.0 / 3.0, 3.0, 9), np.concatenate([np.geomspace(1e-4, 0.25, 28), np.geomspace(4.0, 1e4, 28)])
+NEAR, FAR = (
+    np.geomspace(1.0 / 3.0, 3.0, 9),
+    np.concatenate([np.geomspace(1e-4, 0.25, 28), np.geomspace(4.0, 1e4, 28)]),
+)
 """Factors on the size of the patch, which is estimated, that count as the same patch, and as another one."""
 
 LEVERS = {
@@ -98,12 +101,18 @@ def check_logs(logs: Sequence[Log], patch: ContactPatch) -> tuple[Finding, ...]:
     return _accepted(finding for log in logs for finding in check_log(log, patch))
 
 
-def check_slides(slides: Sequence[Slide], patch: ContactPatch, body: MassProperties) -> tuple[Finding, ...]:
+def check_slides(
+    slides: Sequence[Slide], patch: ContactPatch, body: MassProperties
+) -> tuple[Finding, ...]:
     """Check slides of a body on `patch`: units of time, places and angles, and trackers that froze.
 
     Raises InvalidValueError, one line, for what no fit can make sense of.
     """
-    return _accepted(each for each in (check_slide_units(slides, patch, body), *map(check_frozen, slides)) if each)
+    return _accepted(
+        each
+        for each in (check_slide_units(slides, patch, body), *map(check_frozen, slides))
+        if each
+    )
 
 
 def _accepted(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -114,27 +123,51 @@ def _accepted(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return findings
 
 
-def with_findings(result: Identification, logs: Sequence[Log], findings: Sequence[Finding]) -> Identification:
+def with_findings(
+    result: Identification, logs: Sequence[Log], findings: Sequence[Finding]
+) -> Identification:
     """Return the result with verdicts on the findings, and on the sampling rate that its estimates ask for."""
     found: list[Finding | None] = [*findings]
     unseen: list[Verdict] = []
-    estimates, least = result.estimates, {name: low for name, (low, _) in result.intervals().items()}
+    estimates = result.estimates
+    least = {name: low for name, (low, _) in result.intervals().items()}
     # where sigma_1 may be 0, or nobody knows it, its corner may lie anywhere
     if "sigma_0" in estimates and least.get("sigma_1", 0.0) > 0.0:
-        rates = [check_sampling(log, estimates["sigma_0"], estimates["sigma_1"]) for log in logs]
+        rates = [
+            check_sampling(log, estimates["sigma_0"], estimates["sigma_1"])
+            for log in logs
+        ]
         found += rates
         if None not in rates:
-            unseen.append(Verdict("sigma_1", False, "no log is sampled at twice the corner frequency of the bristles"))
-    verdicts = [*unseen, *(Verdict("fit", False, str(finding)) for finding in found if finding is not None)]
+            unseen.append(
+                Verdict(
+                    "sigma_1",
+                    False,
+                    "no log is sampled at twice the corner frequency of the bristles",
+                )
+            )
+    verdicts = [
+        *unseen,
+        *(
+            Verdict("fit", False, str(finding))
+            for finding in found
+            if finding is not None
+        ),
+    ]
     return dataclasses.replace(result, verdicts=(*result.verdicts, *verdicts))
 
 
 def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
     """Check one log: sign of the work, axes and units, displacement between samples, friction against load."""
-    size, sliding = size_of(log, patch), Sliding.of(log, patch)
+    size = size_of(log, patch)
+    sliding = Sliding.of(log, patch)
     work = check_work(log, sliding)
     found = [work] if work else [check_directions(log, sliding, size)]
-    found += [check_times(log, size), check_friction(log, size), check_unloaded(log, size)]
+    found += [
+        check_times(log, size),
+        check_friction(log, size),
+        check_unloaded(log, size),
+    ]
     return [finding for finding in found if finding is not None]
 
 
@@ -163,13 +196,30 @@ class Sliding(NamedTuple):
         few = patch.discs(FEW_DISCS) if patch.cells > MOST_CELLS else patch
         weights = few.weights(_load(log)) if few.depends_on_load else few.weights()
         size = size_of(log, patch)
-        speed, force = (np.linalg.norm(each, axis=1) for each in (log.twist * [1, 1, size], log.wrench / [1, 1, size]))
-        enough = [each >= share * np.quantile(each, 0.95) for each, share in ((speed, FAST), (force, STRONG))]
-        rows = np.flatnonzero(np.all([*enough, speed > 0.0, force > 0.0, log.normal_force > 0.0], axis=0))
+        speed, force = (
+            np.linalg.norm(each, axis=1)
+            for each in (log.twist * [1, 1, size], log.wrench / [1, 1, size])
+        )
+        enough = [
+            each >= share * np.quantile(each, 0.95)
+            for each, share in ((speed, FAST), (force, STRONG))
+        ]
+        rows = np.flatnonzero(
+            np.all([*enough, speed > 0.0, force > 0.0, log.normal_force > 0.0], axis=0)
+        )
         rows = rows[:: max(1, -(-len(rows) // MOST))]
         since = log.twist[1:, 2] if log.held else log.twist[:-1, 2]
-        turned = np.append(0.0, np.cumsum(0.5 * (log.twist[1:, 2] + since) * np.diff(log.time)))
-        return cls(log.twist[rows], log.wrench[rows], turned[rows], few.levers(), weights, log.channels)
+        turned = np.append(
+            0.0, np.cumsum(0.5 * (log.twist[1:, 2] + since) * np.diff(log.time))
+        )
+        return cls(
+            log.twist[rows],
+            log.wrench[rows],
+            turned[rows],
+            few.levers(),
+            weights,
+            log.channels,
+        )
 
     def friction(self, twist: np.ndarray, scale: float) -> np.ndarray:
         """Compute wrenches `[S, 3]` of dry friction under a load of 1 at the twists, on the patch times `scale`."""
@@ -181,13 +231,20 @@ class Sliding(NamedTuple):
 
     def angle(self, twist: np.ndarray, wrench: np.ndarray, scale: float) -> float:
         """Compute the median angle [deg] between wrenches and those of dry friction."""
-        size = float(np.sqrt(np.einsum("n,ni->", self.weights, self.levers[:, :, 2] ** 2)))
-        a, b = ((each / [1.0, 1.0, size])[:, self.channels] for each in (self.friction(twist, scale), wrench))
+        size = float(
+            np.sqrt(np.einsum("n,ni->", self.weights, self.levers[:, :, 2] ** 2))
+        )
+        a, b = (
+            (each / [1.0, 1.0, size])[:, self.channels]
+            for each in (self.friction(twist, scale), wrench)
+        )
         lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
         cosines = np.einsum("si,si->s", a, b) / np.where(lengths > 0.0, lengths, 1.0)
         return float(np.degrees(np.median(np.arccos(np.clip(cosines, -1.0, 1.0)))))
 
-    def best(self, twist: np.ndarray, wrench: np.ndarray, scales: np.ndarray = NEAR) -> tuple[float, float]:
+    def best(
+        self, twist: np.ndarray, wrench: np.ndarray, scales: np.ndarray = NEAR
+    ) -> tuple[float, float]:
         """Return the least median angle [deg] over sizes of the patch, and the size that has it."""
         return min((self.angle(twist, wrench, scale), scale) for scale in scales)
 
@@ -198,7 +255,9 @@ def check_work(log: Log, sliding: Sliding) -> Finding | None:
     if len(power) < LEAST or power[power > 0.0].sum() <= AGAINST * np.abs(power).sum():
         return None
     rule = f"act on the moving body, against its motion (it does {_best_reading(sliding)[1]})"
-    found = f"power > 0 in {100.0 * np.mean(power > 0.0):.4g} % of the samples that slide"
+    found = (
+        f"power > 0 in {100.0 * np.mean(power > 0.0):.4g} % of the samples that slide"
+    )
     return Finding(f"wrench of {log.name}", rule, found, refuses=True)
 
 
@@ -213,22 +272,36 @@ def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
     angle, scale = sliding.best(sliding.twist, sliding.wrench, FAR)
     if angle < found[0]:
         factor = min(LEVERS, key=lambda each: abs(np.log(scale / each)))
-        hint = f" ({LEVERS[factor]}?)" if 1.0 / SAME_LEVER < scale / factor < SAME_LEVER else ""
-        found = angle, f"with a contact radius of {1e3 * scale * size:.3g} mm in place of {1e3 * size:.3g} mm{hint}"
+        hint = (
+            f" ({LEVERS[factor]}?)"
+            if 1.0 / SAME_LEVER < scale / factor < SAME_LEVER
+            else ""
+        )
+        found = (
+            angle,
+            f"with a contact radius of {1e3 * scale * size:.3g} mm in place of {1e3 * size:.3g} mm{hint}",
+        )
     if found[0] > BETTER * as_read:
         return None
     text = f"a median deviation of {as_read:.0f} deg, and {found[0]:.0f} deg {found[1]}"
-    return Finding(f"wrench of {log.name}", "point in the direction of friction on the patch", text)
+    return Finding(
+        f"wrench of {log.name}", "point in the direction of friction on the patch", text
+    )
 
 
 def _best_reading(sliding: Sliding) -> tuple[float, str]:
     """Return the angle [deg] of the reading of the log that best has the directions of friction, and words for it."""
-    return min((sliding.best(twist, wrench)[0], words) for words, twist, wrench in _readings(sliding))
+    return min(
+        (sliding.best(twist, wrench)[0], words)
+        for words, twist, wrench in _readings(sliding)
+    )
 
 
 def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """Yield ways in which a log may have been written: words, and the twist and wrench that follow."""
-    twist, wrench, turned = sliding.twist, sliding.wrench, sliding.turned
+    twist = sliding.twist
+    wrench = sliding.wrench
+    turned = sliding.turned
     for words, signs in (
         ("with fx, fy and tau of opposite sign", (-1, -1, -1)),
         ("with fx and fy of opposite sign", (-1, -1, 1)),
@@ -243,10 +316,17 @@ def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
         yield "if the twist is in world axes", rotate(twist, -turned), wrench
         yield "if the wrench is in world axes", twist, rotate(wrench, -turned)
     for scale in NEAR[::4]:
-        expected, measured = (each[:, 0] + 1j * each[:, 1] for each in (sliding.friction(twist, scale), wrench))
+        expected, measured = (
+            each[:, 0] + 1j * each[:, 1]
+            for each in (sliding.friction(twist, scale), wrench)
+        )
         angle = float(np.angle((expected * measured.conj()).sum()))
         if abs(angle) > LEAST_MOUNTED:
-            yield f"with fx and fy turned by {np.degrees(angle):.0f} deg", twist, rotate(wrench, angle)
+            yield (
+                f"with fx and fy turned by {np.degrees(angle):.0f} deg",
+                twist,
+                rotate(wrench, angle),
+            )
 
 
 # ---------------------------------------------------------------------- times, speeds, loads
@@ -260,7 +340,11 @@ def check_times(log: Log, size: float) -> Finding | None:
     if log.interval >= SLOW and moved > TRAVEL * size:
         return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
     text = f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
-    return Finding(f"twist of {log.name}", "be in m/s and rad/s", text) if speed > SPEEDY or moved > size else None
+    return (
+        Finding(f"twist of {log.name}", "be in m/s and rad/s", text)
+        if speed > SPEEDY or moved > size
+        else None
+    )
 
 
 def check_friction(log: Log, size: float) -> Finding | None:
@@ -268,14 +352,23 @@ def check_friction(log: Log, size: float) -> Finding | None:
     loaded = log.normal_force > 0.0
     if not loaded.any():
         return None
-    each = np.linalg.norm(log.wrench[loaded, :2], axis=1), np.abs(log.wrench[loaded, 2]) / size
-    force, torque = (float(np.quantile(part / log.normal_force[loaded], 0.9)) for part in each)
+    each = (
+        np.linalg.norm(log.wrench[loaded, :2], axis=1),
+        np.abs(log.wrench[loaded, 2]) / size,
+    )
+    force, torque = (
+        float(np.quantile(part / log.normal_force[loaded], 0.9)) for part in each
+    )
     if force > HIGH:
         text = f"friction of {force:.3g} times the load: is normal_force in kg or kN?"
         return Finding(f"normal_force of {log.name}", "be in N", text)
     if torque > HIGH:
         text = f"a torque of {torque:.3g} times the load and the contact radius: is it in N mm, or about another point?"
-        return Finding(f"tau of {log.name}", "be in N m about the origin of the contact frame", text)
+        return Finding(
+            f"tau of {log.name}",
+            "be in N m about the origin of the contact frame",
+            text,
+        )
     return None
 
 
@@ -283,7 +376,9 @@ def check_unloaded(log: Log, size: float) -> Finding | None:
     """Check that there is no friction without load, as there is with a load cell that has an offset."""
     force = np.linalg.norm(log.wrench / [1.0, 1.0, size], axis=1)
     bare = log.normal_force == 0.0
-    if bare.sum() < LEAST or not np.median(force[bare]) > STRONG * np.quantile(force, 0.95):
+    if bare.sum() < LEAST or not np.median(force[bare]) > STRONG * np.quantile(
+        force, 0.95
+    ):
         return None
     rule = f"be > 0 where there is friction (it is 0 in {bare.sum()} samples)"
     text = f"friction of {np.median(force[bare]):.3g} N there: does the load cell have an offset?"
@@ -294,7 +389,8 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
     """Check that samples reach the corner `sigma_0/(2 pi sigma_1)` above which the damping of bristles shows."""
     if not (sigma_0 > 0.0 and sigma_1 > 0.0):
         return None
-    corner, rate = sigma_0 / (2.0 * np.pi * sigma_1), 1.0 / log.interval
+    corner = sigma_0 / (2.0 * np.pi * sigma_1)
+    rate = 1.0 / log.interval
     if rate >= 2.0 * corner:
         return None
     why = f"to determine sigma_1 (corner frequency sigma_0/(2 pi sigma_1): {corner:.3g} Hz)"
@@ -305,35 +401,52 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
 # ---------------------------------------------------------------------- slides
 
 
-def check_slide_units(slides: Sequence[Slide], patch: ContactPatch, body: MassProperties) -> Finding | None:
+def check_slide_units(
+    slides: Sequence[Slide], patch: ContactPatch, body: MassProperties
+) -> Finding | None:
     """Check that decelerations are those of friction, and alike in all windows of all slides, for times in s, places in
     m and angles in rad: of 281 measured slides, one at a time, 245 are doubted if they are in deg, and none in rad."""
     size = _size_at(body.mass * body.gravity, patch)
-    as_read, in_degrees = (_friction_of_slides(slides, body, size, unit) for unit in (1.0, np.pi / 180.0))
+    as_read, in_degrees = (
+        _friction_of_slides(slides, body, size, unit) for unit in (1.0, np.pi / 180.0)
+    )
     if len(as_read) == 0:
         return None
     friction = float(np.median(as_read))
     text = f"friction of {friction:.3g} times the load"
     if friction < LOW:
-        return Finding("time of the slides", "be in s", f"{text}: is it in ms?", refuses=True)
-    less, (spread, steadier) = float(np.median(in_degrees)), (np.std(np.log(each)) for each in (as_read, in_degrees))
-    if (spread > VARIES and steadier < STEADIER * spread) or (friction > USUAL and less < HALF * friction):
+        return Finding(
+            "time of the slides", "be in s", f"{text}: is it in ms?", refuses=True
+        )
+    less = float(np.median(in_degrees))
+    (spread, steadier) = (np.std(np.log(each)) for each in (as_read, in_degrees))
+    if (spread > VARIES and steadier < STEADIER * spread) or (
+        friction > USUAL and less < HALF * friction
+    ):
         text = f"friction over load {friction:.3g} ± {100 * spread:.0f} %"
         text += f", but {less:.3g} ± {100 * steadier:.0f} % if it is in deg"
         sure = (len(as_read) >= FEW and spread > SURE) or friction > HIGH
         return Finding("theta of the slides", "be in rad", text, refuses=bool(sure))
     if friction > HIGH:
-        return Finding("x and y of the slides", "be in m", f"{text}: are they in mm?", refuses=True)
+        return Finding(
+            "x and y of the slides", "be in m", f"{text}: are they in mm?", refuses=True
+        )
     return None
 
 
-def _friction_of_slides(slides: Sequence[Slide], body: MassProperties, size: float, unit: float) -> np.ndarray:
+def _friction_of_slides(
+    slides: Sequence[Slide], body: MassProperties, size: float, unit: float
+) -> np.ndarray:
     """Compute friction over load, `|(a, I alpha/(m size))|/g` > 0, between windows of moving slides."""
     found = []
     for slide in slides:
         times, twists, _ = window_twists(slide)
         speed = np.hypot(twists[:, 0], twists[:, 1])
-        rates = np.diff(twists, axis=0) / np.diff(times)[:, None] * [1.0, 1.0, unit * body.inertia / (body.mass * size)]
+        rates = (
+            np.diff(twists, axis=0)
+            / np.diff(times)[:, None]
+            * [1.0, 1.0, unit * body.inertia / (body.mass * size)]
+        )
         moving = np.minimum(speed[:-1], speed[1:]) > FAST * speed.max()
         found.append(np.linalg.norm(rates[moving], axis=1) / body.gravity)
     friction = np.concatenate(found)
@@ -347,10 +460,17 @@ def check_frozen(slide: Slide) -> Finding | None:
     for k in range(STILL, len(speed) - 3):
         after = float(np.median(speed[k + 1 : k + 4]))
         if speed[k - STILL : k].max() < SLOWED * after and speed[k] > JUMP * after:
-            still = k - int(np.argmax(np.append(speed[:k][::-1] >= SLOWED * after, True)))
+            still = k - int(
+                np.argmax(np.append(speed[:k][::-1] >= SLOWED * after, True))
+            )
             rest = f"no motion for {1e3 * (slide.time[k] - slide.time[still]):.3g} ms until t = {slide.time[k]:.4g} s"
             text = f"{rest}, then a jump of {1e3 * steps[k]:.3g} mm"
-            return Finding(f"pose of {slide.name}", "follow the body (leave out frozen samples)", text, refuses=True)
+            return Finding(
+                f"pose of {slide.name}",
+                "follow the body (leave out frozen samples)",
+                text,
+                refuses=True,
+            )
     return None
 
 
@@ -366,8 +486,12 @@ def size_of(log: Log, patch: ContactPatch) -> float:
 
 def _size_at(load: float, patch: ContactPatch) -> float:
     """Return the contact radius at a load [m]. Raises InvalidValueError for a single point."""
-    size = float(patch.contact_radius(load) if patch.depends_on_load else patch.contact_radius())
+    size = float(
+        patch.contact_radius(load) if patch.depends_on_load else patch.contact_radius()
+    )
     if not size > 0.0:
         rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"
-        raise InvalidValueError("patch", rule, f"{patch.cells} cell with a contact radius of {size:g} m")
+        raise InvalidValueError(
+            "patch", rule, f"{patch.cells} cell with a contact radius of {size:g} m"
+        )
     return size

@@ -17,13 +17,25 @@ LOAD = ("normal_force",)
 ALIASES = {
     **{"time": "t", "time_s": "t", "t_s": "t", "wz": "omega"},
     **{"fn": "normal_force", "fz": "normal_force", "mz": "tau", "tz": "tau"},
-    **{"force": "fx", "velocity": "vx", "position": "x", "torque": "tau", "angle": "theta"},
+    **{
+        "force": "fx",
+        "velocity": "vx",
+        "position": "x",
+        "torque": "tau",
+        "angle": "theta",
+    },
 }
 """Other names of columns, in small letters."""
 
 MESSAGES = {
     **{"force.x": "fx", "force.y": "fy", "force.z": "normal_force", "torque.z": "tau"},
-    **{"linear.x": "vx", "linear.y": "vy", "angular.z": "omega", "position.x": "x", "position.y": "y"},
+    **{
+        "linear.x": "vx",
+        "linear.y": "vy",
+        "angular.z": "omega",
+        "position.x": "x",
+        "position.y": "y",
+    },
 }
 """Columns by the names of ROS messages; what stands before them, as in wrench.force.x, does not count."""
 
@@ -43,7 +55,9 @@ _MESSAGE = re.compile(r"(?:.*[./_])?(force|torque|linear|angular|position)[./_](
 _HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
 
 
-def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, with_load: bool) -> dict[str, str]:
+def find_columns(
+    path: Path, headings: Sequence[str], *, contact: str | None, with_load: bool
+) -> dict[str, str]:
     """Find the heading of each column of a log: `t`, twist or else motion, wrench, and normal force if it is there.
 
     An angle beside a twist is found too: it shows if the twist is a mean (see `Log.held`). Names are read without
@@ -55,7 +69,9 @@ def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, wi
     named = _named(path, headings)
     contacts = sorted({name.rpartition(".")[0] for name in named} - {""})
     if contact is not None and not contacts:
-        raise FileError(f"{path}: contact must be left out: no column is named as pad.vx, got {shown(repr(contact))}")
+        raise FileError(
+            f"{path}: contact must be left out: no column is named as pad.vx, got {shown(repr(contact))}"
+        )
     if contact is not None:
         try:
             contact = validation.choice("contact", contact, contacts)
@@ -65,21 +81,36 @@ def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, wi
         lacks = {each: len(_missing(named, f"{each}.", with_load)) for each in contacts}
         whole = [each for each in contacts if lacks[each] == 0]
         if len(whole) > 1:
-            raise FileError(f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them")
-        nearest = min(contacts, key=lacks.__getitem__, default="")  # the message names what it lacks
-        contact = nearest if nearest and lacks[nearest] < len(_missing(named, "", with_load)) else None
+            raise FileError(
+                f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them"
+            )
+        nearest = min(
+            contacts, key=lacks.__getitem__, default=""
+        )  # the message names what it lacks
+        contact = (
+            nearest
+            if nearest and lacks[nearest] < len(_missing(named, "", with_load))
+            else None
+        )
     prefix = "" if contact is None else f"{contact}."
     if missing := _missing(named, prefix, with_load):
         raise FileError(
             f"{path}: has no column {', '.join(missing)}; found {shown(', '.join(headings))}; needed t, "
             f"{', '.join(TWIST)} (or {', '.join(MOTION)}), {', '.join((*WRENCH, *LOAD))}"
         )
-    wanted = [name for name in (*_measured(named, prefix), *LOAD) if prefix + name in named]
-    found = {"t": named.get(f"{prefix}t") or named["t"], **{name: named[prefix + name] for name in wanted}}
+    wanted = [
+        name for name in (*_measured(named, prefix), *LOAD) if prefix + name in named
+    ]
+    found = {
+        "t": named.get(f"{prefix}t") or named["t"],
+        **{name: named[prefix + name] for name in wanted},
+    }
     for name, heading in found.items():
         unit = _parts(heading)[1]
         if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
-            raise FileError(f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}")
+            raise FileError(
+                f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}"
+            )
     angle = named.get(f"{prefix}theta") or named.get("theta")
     if angle is not None and (_parts(angle)[1] or "rad").strip().lower() == "rad":
         found.setdefault("theta", angle)
@@ -92,7 +123,9 @@ def _named(path: Path, headings: Sequence[str]) -> dict[str, str]:
     for heading in headings:
         name = _column_name(_parts(heading)[0])
         if name in named:
-            raise FileError(f"{path}: columns {shown(repr(named[name]))} and {shown(repr(heading))} are the same")
+            raise FileError(
+                f"{path}: columns {shown(repr(named[name]))} and {shown(repr(heading))} are the same"
+            )
         if name:
             named[name] = heading
     for name in list(named):
@@ -123,7 +156,10 @@ def _measured(named: dict[str, str], prefix: str) -> Sequence[str]:
     for speed, place, wrench in zip(TWIST, MOTION, WRENCH, strict=True):
         if wrench in there and there <= {speed, place, wrench} and len(there) > 1:
             return (speed if speed in there else place), wrench
-    return (*(MOTION if {*MOTION} <= there and not {*TWIST} <= there else TWIST), *WRENCH)
+    return (
+        *(MOTION if {*MOTION} <= there and not {*TWIST} <= there else TWIST),
+        *WRENCH,
+    )
 
 
 def _missing(named: dict[str, str], prefix: str, with_load: bool) -> list[str]:

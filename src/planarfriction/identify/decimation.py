@@ -47,9 +47,13 @@ class Gap(NamedTuple):
 
     def until(self, time: float, twist: np.ndarray) -> Gap:
         """Return the gap without its last `time` [s], which have this `twist` `[3]`."""
-        (*_, moved), (*_, lasts) = self.twist, self.dt
+        (*_, moved) = self.twist
+        (*_, lasts) = self.dt
         mean = (moved * lasts - twist * time) / (lasts - time)
-        return self._replace(twist=np.vstack([self.twist[:-1], mean]), dt=np.append(self.dt[:-1], lasts - time))
+        return self._replace(
+            twist=np.vstack([self.twist[:-1], mean]),
+            dt=np.append(self.dt[:-1], lasts - time),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +80,26 @@ def decimated(logs: Sequence[Log], size: float, most: int) -> tuple[Log, ...]:
         return tuple(logs)
     result = []
     for log in logs:
-        count, blocks = max(most * len(log.time) // total // WINDOW, 1), len(log.time) // WINDOW
+        count = max(most * len(log.time) // total // WINDOW, 1)
+        blocks = len(log.time) // WINDOW
         result.append(
-            log if blocks <= count else _decimated(log, size, np.arange(blocks + 1) * len(log.time) // blocks, count)
+            log
+            if blocks <= count
+            else _decimated(
+                log, size, np.arange(blocks + 1) * len(log.time) // blocks, count
+            )
         )
     return tuple(result)
 
 
 def samples_of(logs: Sequence[Log]) -> tuple[int, int]:
     """Return the number of samples that are fitted, and the number of all."""
-    cut = [(len(log.inner), log.total) if isinstance(log, DecimatedLog) else (len(log.time),) * 2 for log in logs]
+    cut = [
+        (len(log.inner), log.total)
+        if isinstance(log, DecimatedLog)
+        else (len(log.time),) * 2
+        for log in logs
+    ]
     used, total = np.sum(cut, axis=0).tolist()
     return used, total
 
@@ -94,14 +108,21 @@ def redrawn(log: Log, noise: np.ndarray, random: np.random.Generator) -> Log:
     """Return the log with `noise` `[3]` of a sample's twist drawn again between its windows, if it has any."""
     if not isinstance(log, DecimatedLog):
         return log
-    draw = (gap.error[:, None] * noise * random.standard_normal(gap.twist.shape) for gap in log.gaps)
-    gaps = tuple(gap._replace(twist=gap.twist + error) for gap, error in zip(log.gaps, draw, strict=True))
+    draw = (
+        gap.error[:, None] * noise * random.standard_normal(gap.twist.shape)
+        for gap in log.gaps
+    )
+    gaps = tuple(
+        gap._replace(twist=gap.twist + error)
+        for gap, error in zip(log.gaps, draw, strict=True)
+    )
     return dataclasses.replace(log, gaps=gaps)
 
 
 def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> DecimatedLog:
     """Return `count` of the windows of a log between rows `edges`."""
-    speed, still = np.zeros(len(log.time)), []
+    speed = np.zeros(len(log.time))
+    still = []
     for values, scale in zip(log.twist.T, (1.0, 1.0, size), strict=True):
         still.append(float(NOISE * jitter(values[:, None])[0]))
         speed += scale * np.where(np.abs(values) > still[-1], np.abs(values), 0.0)
@@ -114,11 +135,21 @@ def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> Decimate
     stepped = np.flatnonzero(near)
     spans = np.split(stepped, np.flatnonzero(np.diff(stepped) > 1) + 1)
     parts = [
-        Log(log.time[s], log.twist[s], log.wrench[s], log.normal_force[s], log.name, held=log.held)
+        Log(
+            log.time[s],
+            log.twist[s],
+            log.wrench[s],
+            log.normal_force[s],
+            log.name,
+            held=log.held,
+        )
         for s in (slice(span[0], span[-1] + 1) for span in spans)
     ]
     gaps = [_gap(log, path, a[-1], b[0]) for a, b in itertools.pairwise(spans)]
-    time, twist, wrench, load = (values[stepped] for values in (log.time, log.twist, log.wrench, log.normal_force))
+    time, twist, wrench, load = (
+        values[stepped]
+        for values in (log.time, log.twist, log.wrench, log.normal_force)
+    )
     inner = np.flatnonzero(fitted[stepped])
     return DecimatedLog(
         time, twist, wrench, load, log.name, log.turns, log.held, tuple(parts), tuple(gaps), inner, len(log.time)
@@ -131,17 +162,29 @@ def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:
     These are the largest twist in either direction on a scale that is logarithmic above the speeds `still` `[3]`, the
     least and the largest load, mean and spread of the wrench, and the place in time: a slip of one sample shows.
     """
-    starts, lengths, columns = edges[:-1], np.diff(edges), [edges[:-1] / edges[-1]]
+    starts = edges[:-1]
+    lengths = np.diff(edges)
+    columns = [edges[:-1] / edges[-1]]
     for values, noise in zip(log.twist.T, still, strict=True):
         largest = max(float(np.abs(values).max()), TINY)
         least = max(noise, LEAST_SPEED * largest)
-        ends = (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
-        columns += [np.arcsinh(each / least) / np.arcsinh(largest / least) for each in ends]
+        ends = (
+            np.minimum.reduceat(values, starts),
+            np.maximum.reduceat(values, starts),
+        )
+        columns += [
+            np.arcsinh(each / least) / np.arcsinh(largest / least) for each in ends
+        ]
     for of in (np.minimum, np.maximum):
-        columns.append(of.reduceat(log.normal_force, starts) / max(log.normal_force.max(), TINY))
+        columns.append(
+            of.reduceat(log.normal_force, starts) / max(log.normal_force.max(), TINY)
+        )
     for values in log.wrench.T:
         largest = max(float(np.abs(values).max()), TINY)
-        mean, square = (np.add.reduceat((values / largest) ** power, starts) / lengths for power in (1, 2))
+        mean, square = (
+            np.add.reduceat((values / largest) ** power, starts) / lengths
+            for power in (1, 2)
+        )
         columns += [mean, np.sqrt(np.maximum(square - mean**2, 0.0))]
     return np.stack(columns, -1)
 
@@ -151,9 +194,12 @@ def farthest(points: np.ndarray, count: int) -> np.ndarray:
 
     No point is left farther from a chosen one than chosen ones are from each other (Gonzalez 1985).
     """
-    chosen, distance = [0], np.full(len(points), np.inf)
+    chosen = [0]
+    distance = np.full(len(points), np.inf)
     while len(chosen) < count:
-        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1))
+        distance = np.minimum(
+            distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1)
+        )
         chosen.append(int(np.argmax(distance)))
     return np.unique(chosen)
 
@@ -165,12 +211,24 @@ def _gap(log: Log, path: np.ndarray, first: int, last: int) -> Gap:
     """
     shares = GROWTH ** -np.arange(LEVELS)
     own = path[first : last + 1]
-    by_path = first + np.searchsorted(own, own[-1] - (own[-1] - own[0]) * shares, side="right") - 1
-    ends = first + np.searchsorted(own, own[-1]), first + np.searchsorted(own, own[0], side="right") - 1
+    by_path = (
+        first
+        + np.searchsorted(own, own[-1] - (own[-1] - own[0]) * shares, side="right")
+        - 1
+    )
+    ends = (
+        first + np.searchsorted(own, own[-1]),
+        first + np.searchsorted(own, own[0], side="right") - 1,
+    )
     by_row = last - np.round((last - first) * shares).astype(int)
-    rows = np.unique(np.clip(np.concatenate([by_path, by_row, ends, [last]]), first, last))
-    time, twist, load = (values[first : last + 1] for values in (log.time, log.twist, log.normal_force))
-    steps, at = np.diff(time), rows[:-1] - first
+    rows = np.unique(
+        np.clip(np.concatenate([by_path, by_row, ends, [last]]), first, last)
+    )
+    time, twist, load = (
+        values[first : last + 1] for values in (log.time, log.twist, log.normal_force)
+    )
+    steps = np.diff(time)
+    at = rows[:-1] - first
     since = twist[1:] if log.held else 0.5 * (twist[1:] + twist[:-1])
     dt = np.diff(log.time[rows])
     mean = np.add.reduceat(since * steps[:, None], at, axis=0) / dt[:, None]

@@ -26,7 +26,13 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log, as_tuple
 from planarfriction.identify.options import FitOptions, check_noise
-from planarfriction.identify.parameters import ALL, PRIOR, SHAPE_PRIOR, Coordinates, fitted_law
+from planarfriction.identify.parameters import (
+    ALL,
+    PRIOR,
+    SHAPE_PRIOR,
+    Coordinates,
+    fitted_law,
+)
 from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.result import WIDTH, Identification
 from planarfriction.identify.rig import GROUPS, check_groups, wrench_noise
@@ -83,13 +89,22 @@ class MotionPlan(ByValue):
     def table(self) -> str:
         """Return a text in 80 columns: the gain of each motion, and the errors before and after the best one."""
         lines = [f"{'motion':<38}{'gain [bit]':>10}   {'least certain afterwards'}"]
-        for motion, gain, errors in zip(self.motions, self.gains, self.errors, strict=True):
+        for motion, gain, errors in zip(
+            self.motions, self.gains, self.errors, strict=True
+        ):
             at = int(np.argmax(errors / self._sizes))
-            lines.append(f"{motion.name[:37]:<38}{gain:>10.1f}   {self.names[at]}, {self._share(errors, at)}")
-        after = [f"{'parameter':<18}{'value':>11}   {'error so far':>14}   {'after the best':>14}"]
+            lines.append(
+                f"{motion.name[:37]:<38}{gain:>10.1f}   {self.names[at]}, {self._share(errors, at)}"
+            )
+        after = [
+            f"{'parameter':<18}{'value':>11}   {'error so far':>14}   {'after the best':>14}"
+        ]
         for i, (name, value) in enumerate(zip(self.names, self.values, strict=True)):
-            before, then = self._share(self.errors_so_far, i), self._share(self.errors[0], i)
-            after.append(f"{name:<18}{value:>11.4g}   {before:>14}   {then:>14}   {ALL[name].unit}")
+            before = self._share(self.errors_so_far, i)
+            then = self._share(self.errors[0], i)
+            after.append(
+                f"{name:<18}{value:>11.4g}   {before:>14}   {then:>14}   {ALL[name].unit}"
+            )
         first = textwrap.fill(f"Next motion to measure: {self.best.name}.", WIDTH)
         return "\n\n".join([first, "\n".join(lines), "\n".join(after)])
 
@@ -146,35 +161,64 @@ def design_experiment(
     InvalidValueError
         A parameter breaks its rule, or a motion does not move.
     """
-    names, groups = known.check_names(parameters), check_groups("nuisance", nuisance)
+    names = known.check_names(parameters)
+    groups = check_groups("nuisance", nuisance)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "design_experiment")
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
-        raise InvalidValueError("parameters", "contain breakaway_ratio only for elasto-plastic bristles", names)
-    before = () if isinstance(logs, (list, tuple)) and not logs else as_tuple("logs", logs, Log)
+        raise InvalidValueError(
+            "parameters",
+            "contain breakaway_ratio only for elasto-plastic bristles",
+            names,
+        )
+    before = (
+        ()
+        if isinstance(logs, (list, tuple)) and not logs
+        else as_tuple("logs", logs, Log)
+    )
     chosen = names if wanted is None else known.check_names(wanted, names)
     if motions is None:
-        loads = sorted({float(f"{np.median(log.normal_force):.3g}") for log in before}) or [1.0]
+        loads = sorted(
+            {float(f"{np.median(log.normal_force):.3g}") for log in before}
+        ) or [1.0]
         motions = candidate_motions(patch, law, normal_force=loads)
     candidates = as_tuple("motions", motions, Log)
     for each in candidates:
         if not each.twist.any():
-            raise InvalidValueError(f"twist of {each.name}", "move the contact", "0 throughout")
+            raise InvalidValueError(
+                f"twist of {each.name}", "move the contact", "0 throughout"
+            )
     sigma = _noise(noise, before, candidates, patch, law)
-    information = _Information(patch, law, names, tuple(group for group in groups if group != "twist"), sigma)
-    so_far = information.prior() + (information.of_logs(before, groups) if before else 0.0)
-    start, expected = information.covariance(so_far), [information.expected(each) for each in candidates]
-    added = [information.of_logs((information.measured(each),), information.groups) for each in expected]
+    information = _Information(
+        patch, law, names, tuple(group for group in groups if group != "twist"), sigma
+    )
+    so_far = information.prior() + (
+        information.of_logs(before, groups) if before else 0.0
+    )
+    start = information.covariance(so_far)
+    expected = [information.expected(each) for each in candidates]
+    added = [
+        information.of_logs((information.measured(each),), information.groups)
+        for each in expected
+    ]
     after = [information.covariance(so_far + each) for each in added]
     pick = [names.index(name) for name in chosen]
     gains = np.array([_entropy(start, pick) - _entropy(each, pick) for each in after])
-    errors, order = np.array([information.errors(each) for each in after]), np.argsort(-gains, kind="stable")
-    ranked = tuple(expected[i] for i in order), gains[order], information.errors(start), errors[order]
+    errors = np.array([information.errors(each) for each in after])
+    order = np.argsort(-gains, kind="stable")
+    ranked = (
+        tuple(expected[i] for i in order),
+        gains[order],
+        information.errors(start),
+        errors[order],
+    )
     return MotionPlan(information.names, information.values, *ranked)
 
 
-def current_estimate(found: Identification, patch: ContactPatch, law: LuGre) -> tuple[ContactPatch, LuGre]:
+def current_estimate(
+    found: Identification, patch: ContactPatch, law: LuGre
+) -> tuple[ContactPatch, LuGre]:
     """Return patch and law to plan with: the values that `found` knows to a factor of about two, else those given.
 
     A value of `law` that lies outside the interval of `found` is moved to its middle.
@@ -183,10 +227,18 @@ def current_estimate(found: Identification, patch: ContactPatch, law: LuGre) -> 
     """
     validation.instance("found", found, Identification, "an Identification")
     validation.instance("law", law, LuGre, "a LuGre law")
-    good = [name for name, value in found.estimates.items() if found.errors[name] < KNOWN * abs(value)]
+    good = [
+        name
+        for name, value in found.estimates.items()
+        if found.errors[name] < KNOWN * abs(value)
+    ]
     given = {name: found.estimates[name] for name in good}
     for name, (low, high) in found.intervals().items():
-        if name in known.LAW and name not in (*good, "breakaway_ratio") and not low <= getattr(law, name) <= high:
+        if (
+            name in known.LAW
+            and name not in (*good, "breakaway_ratio")
+            and not low <= getattr(law, name) <= high
+        ):
             given[name] = 0.5 * (low + high)
     shape = {*known.SHAPE, *known.SOFT_FINGER} & set(found.names)
     moved = bool(shape) and shape <= {*good, "centre_x", "centre_y"}
@@ -197,18 +249,36 @@ class _Information:
     """Information of logs on the coordinates `[F]` of the contact and the disturbances `[S]` that all logs share."""
 
     def __init__(
-        self, patch: ContactPatch, law: LuGre, names: tuple[str, ...], groups: tuple[str, ...], noise: np.ndarray
+        self,
+        patch: ContactPatch,
+        law: LuGre,
+        names: tuple[str, ...],
+        groups: tuple[str, ...],
+        noise: np.ndarray,
     ) -> None:
-        self.patch, self.law, self.names, self.groups, self.noise = patch, law, names, groups, noise
+        self.patch = patch
+        self.law = law
+        self.names = names
+        self.groups = groups
+        self.noise = noise
         time = np.linspace(0.0, 1.0, 10)
-        self._probe = self.problem([Log(time, np.ones((10, 3)), np.ones((10, 3)), np.ones(10))], groups)
+        self._probe = self.problem(
+            [Log(time, np.ones((10, 3)), np.ones((10, 3)), np.ones(10))], groups
+        )
         self.values = self._probe.start_values()
         coordinates = Coordinates(names, self.values, law.mu_c)
-        self._scale, self._slopes = coordinates.scale, coordinates.slopes(coordinates.of(self.values))
+        self._scale = coordinates.scale
+        self._slopes = coordinates.slopes(coordinates.of(self.values))
 
     def problem(self, logs: Sequence[Log], groups: Sequence[str]) -> LogProblem:
         """Make the problem of a fit of these logs."""
-        return LogProblem(logs, self.patch, self.names, self.law, FitOptions(nuisance=groups, refine=REFINE))
+        return LogProblem(
+            logs,
+            self.patch,
+            self.names,
+            self.law,
+            FitOptions(nuisance=groups, refine=REFINE),
+        )
 
     def prior(self) -> np.ndarray:
         """Return the information `[F + S, F + S]` a priori: a factor of 20 either way, and the rig's widths."""
@@ -220,22 +290,29 @@ class _Information:
 
     def expected(self, motion: Log) -> Log:
         """Return the motion with its expected wrenches."""
-        problem = self.problem([dataclasses.replace(motion, wrench=np.ones_like(motion.twist))], ())
+        problem = self.problem(
+            [dataclasses.replace(motion, wrench=np.ones_like(motion.twist))], ()
+        )
         return dataclasses.replace(motion, wrench=problem.shown(self.values)[0])
 
     def measured(self, log: Log) -> Log:
         """Return the log with its noise added to the wrenches: a torque of 0 throughout would count as not measured."""
-        return dataclasses.replace(log, wrench=log.wrench + np.where(np.isfinite(self.noise), self.noise, 0.0))
+        return dataclasses.replace(
+            log, wrench=log.wrench + np.where(np.isfinite(self.noise), self.noise, 0.0)
+        )
 
     def of_logs(self, logs: Sequence[Log], groups: Sequence[str]) -> np.ndarray:
         """Compute the information `[F + S, F + S]` of logs, with the disturbances of each log estimated along."""
-        problem, count = self.problem(logs, groups), len(self.names)
+        problem = self.problem(logs, groups)
+        count = len(self.names)
         coordinates = problem.coordinates(self.values)
         values = coordinates.values(coordinates.of(self.values))
         jacobian = problem.linearised(values, problem.sigma(values, self.noise))[1]
         jacobian = jacobian @ coordinates.slopes(coordinates.of(values))
         whole = jacobian.T @ jacobian
-        own = np.array([False] * count + [column.log is not None for column in problem.rig.columns])
+        own = np.array(
+            [False] * count + [column.log is not None for column in problem.rig.columns]
+        )
         inner = whole[np.ix_(own, own)] + np.eye(int(own.sum()))
         both = whole[np.ix_(~own, own)]
         return whole[np.ix_(~own, ~own)] - both @ np.linalg.solve(inner, both.T)
@@ -255,10 +332,18 @@ class _Information:
 
 def _entropy(covariance: np.ndarray, pick: Sequence[int]) -> float:
     """Compute the entropy of the picked coordinates [bit], up to a constant."""
-    return float(0.5 * np.linalg.slogdet(covariance[np.ix_(pick, pick)])[1] / np.log(2.0))
+    return float(
+        0.5 * np.linalg.slogdet(covariance[np.ix_(pick, pick)])[1] / np.log(2.0)
+    )
 
 
-def _noise(given: Any, logs: Sequence[Log], motions: Sequence[Log], patch: ContactPatch, law: LuGre) -> np.ndarray:
+def _noise(
+    given: Any,
+    logs: Sequence[Log],
+    motions: Sequence[Log],
+    patch: ContactPatch,
+    law: LuGre,
+) -> np.ndarray:
     """Return the noise `[3]` of the wrenches: as given, that of the logs, or a share of friction."""
     if given is not None:
         return check_noise("noise", given)
@@ -309,28 +394,50 @@ def candidate_motions(
     validation.instance("law", law, LuGre, "a LuGre law")
     given = validation.numbers("normal_force", normal_force)
     if given.ndim > 1 or not 1 <= given.size <= LOADS:
-        raise InvalidValueError("normal_force", f"be one load or a list of up to {LOADS}", f"shape {given.shape}")
+        raise InvalidValueError(
+            "normal_force",
+            f"be one load or a list of up to {LOADS}",
+            f"shape {given.shape}",
+        )
     loads = [validation.positive("normal_force", each) for each in given.reshape(-1)]
     speed, duration, rate = (
-        validation.positive(name, value) for name, value in (("speed", speed), ("duration", duration), ("rate", rate))
+        validation.positive(name, value)
+        for name, value in (("speed", speed), ("duration", duration), ("rate", rate))
     )
     samples = duration * rate
     if not SAMPLES[0] <= samples <= SAMPLES[1]:
-        raise InvalidValueError("duration * rate", f"be between {SAMPLES[0]} and {SAMPLES[1]} samples", f"{samples:g}")
+        raise InvalidValueError(
+            "duration * rate",
+            f"be between {SAMPLES[0]} and {SAMPLES[1]} samples",
+            f"{samples:g}",
+        )
     time = np.arange(round(samples)) / rate
     result = []
     for load in loads:
-        turn = speed / float(patch.contact_radius(load)) if spin is None else validation.positive("spin", spin)
-        for name, twist in _twists(time, speed, turn, law.mu_s / law.sigma_0, rate).items():
+        turn = (
+            speed / float(patch.contact_radius(load))
+            if spin is None
+            else validation.positive("spin", spin)
+        )
+        for name, twist in _twists(
+            time, speed, turn, law.mu_s / law.sigma_0, rate
+        ).items():
             called = f"{name}, {load:g} N" if len(loads) > 1 else name
-            result.append(Log(time, twist, np.zeros_like(twist), np.full_like(time, load), called))
+            result.append(
+                Log(time, twist, np.zeros_like(twist), np.full_like(time, load), called)
+            )
     return tuple(result)
 
 
-def _twists(time: np.ndarray, speed: float, spin: float, breakaway: float, rate: float) -> dict[str, np.ndarray]:
+def _twists(
+    time: np.ndarray, speed: float, spin: float, breakaway: float, rate: float
+) -> dict[str, np.ndarray]:
     """Return the twists `[T, 3]` of the motions by name."""
-    share, zero = time / time[-1], np.zeros_like(time)
-    grown = SLOWEST ** (1.0 - share) - SLOWEST * (1.0 - share)  # from 0, soon by the same factor in the same time
+    share = time / time[-1]
+    zero = np.zeros_like(time)
+    grown = SLOWEST ** (1.0 - share) - SLOWEST * (
+        1.0 - share
+    )  # from 0, soon by the same factor in the same time
     sines = [np.sin(2.0 * np.pi * hertz * time) for hertz in SINES]
     swept = (0.03 + 0.97 * share**2) * np.array(sines)
 

@@ -77,12 +77,17 @@ class Log(ByValue):
         validation.instance("held", self.held, bool, "True or False")
         validation.count("turns", self.turns, at_least=0)
         time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
-        twist, wrench = (validation.array(name, getattr(self, name), (len(time), 3)) for name in ("twist", "wrench"))
+        twist, wrench = (
+            validation.array(name, getattr(self, name), (len(time), 3))
+            for name in ("twist", "wrench")
+        )
         load = validation.numbers("normal_force", self.normal_force)
         load = np.broadcast_to(load, len(time)) if load.ndim == 0 else load
         if (load <= 0.0).all() and (load < 0.0).any():
             rule = "be >= 0; negate it if the sensor counts pressure as negative"
-            raise InvalidValueError("normal_force", rule, f"{load.min():.3g} to {load.max():.3g} N")
+            raise InvalidValueError(
+                "normal_force", rule, f"{load.min():.3g} to {load.max():.3g} N"
+            )
         load = validation.non_negative_array("normal_force", load, (len(time),))
         self._set(time=time, twist=twist, wrench=wrench, normal_force=load)
         for value in (time, twist, wrench, load):
@@ -102,8 +107,14 @@ class Log(ByValue):
     @property
     def even(self) -> bool:
         """True if the samples are evenly spaced in time."""
-        steps = np.arange(len(self.time)) * (self.time[-1] - self.time[0]) / (len(self.time) - 1)
-        return bool(np.abs(self.time - self.time[0] - steps).max() <= EVEN * self.interval)
+        steps = (
+            np.arange(len(self.time))
+            * (self.time[-1] - self.time[0])
+            / (len(self.time) - 1)
+        )
+        return bool(
+            np.abs(self.time - self.time[0] - steps).max() <= EVEN * self.interval
+        )
 
     @property
     def parts(self) -> tuple[Log, ...]:
@@ -118,7 +129,9 @@ class Log(ByValue):
     @property
     def durations(self) -> np.ndarray:
         """Times since the sample before, `[T]` [s]; 0 where there is none."""
-        return np.concatenate([np.diff(part.time, prepend=part.time[0]) for part in self.parts])
+        return np.concatenate(
+            [np.diff(part.time, prepend=part.time[0]) for part in self.parts]
+        )
 
     @classmethod
     def from_motion(
@@ -143,7 +156,14 @@ class Log(ByValue):
         time = increasing(time)
         motion = validation.array("motion", motion, (len(time), 3))
         motion[:, 2], turns = unwrapped(time, motion[:, 2], f"theta of {name}")
-        return cls(time, differentiated(time, motion, window=window), wrench, normal_force, name, turns)
+        return cls(
+            time,
+            differentiated(time, motion, window=window),
+            wrench,
+            normal_force,
+            name,
+            turns,
+        )
 
     @classmethod
     def from_axis(
@@ -168,7 +188,9 @@ class Log(ByValue):
         """
         place = MOTION.index(validation.choice("axis", axis, MOTION))
         if (velocity is None) == (position is None):
-            raise InvalidValueError("velocity", "be given, or position, and not both", "both or neither")
+            raise InvalidValueError(
+                "velocity", "be given, or position, and not both", "both or neither"
+            )
         time = increasing(time)
         motion, wrench = np.zeros((2, len(time), 3))
         moved = ("velocity", velocity) if position is None else ("position", position)
@@ -176,11 +198,18 @@ class Log(ByValue):
         wrench[:, place] = validation.array("force", force, (len(time),))
         if position is None:
             return cls(time, motion, wrench, normal_force, name)
-        return cls.from_motion(time, motion, wrench, normal_force, window=window, name=name)
+        return cls.from_motion(
+            time, motion, wrench, normal_force, window=window, name=name
+        )
 
     @classmethod
     def from_csv(
-        cls, path: str | Path, *, normal_force: float | None = None, window: int = 7, contact: str | None = None
+        cls,
+        path: str | Path,
+        *,
+        normal_force: float | None = None,
+        window: int = 7,
+        contact: str | None = None,
     ) -> Log:
         """Read a log from a CSV file with a heading: columns t, vx, vy, omega (or x, y, theta), fx, fy, tau,
         normal_force [SI]. A file of one coordinate has only t, vx (or x) and fx, or `velocity` (or `position`) and
@@ -202,23 +231,33 @@ class Log(ByValue):
         if normal_force is not None:
             normal_force = validation.non_negative("normal_force", normal_force)
         table = Table(path)
-        found = find_columns(path, table.names, contact=contact, with_load=normal_force is None)
+        found = find_columns(
+            path, table.names, contact=contact, with_load=normal_force is None
+        )
         motion = TWIST if "vx" in found or "omega" in found else MOTION
         spare = [found["theta"]] if motion is TWIST and "theta" in found else []
         values = table.numbers(list(found.values()), spare)
         columns = dict(zip(found, values.T, strict=True))
-        moved, wrench = values[:, 1:4], values[:, 4:7]  # no copies
+        moved = values[:, 1:4]
+        wrench = values[:, 4:7]  # no copies
         if not {*WRENCH} <= found.keys():
             moved, wrench = np.zeros((2, len(values), 3))
             place = next(k for k, each in enumerate(WRENCH) if each in found)
             motion = TWIST if TWIST[place] in found else MOTION
-            moved[:, place], wrench[:, place] = columns[motion[place]], columns[WRENCH[place]]
+            moved[:, place] = columns[motion[place]]
+            wrench[:, place] = columns[WRENCH[place]]
         loads: Any = columns.get("normal_force", normal_force)
         try:
             if motion is TWIST:
-                held = "theta" in found and "omega" in found and is_mean(columns["t"], moved[:, 2], columns["theta"])
+                held = (
+                    "theta" in found
+                    and "omega" in found
+                    and is_mean(columns["t"], moved[:, 2], columns["theta"])
+                )
                 return cls(columns["t"], moved, wrench, loads, path.stem, held=held)
-            return cls.from_motion(columns["t"], moved, wrench, loads, window=window, name=path.stem)
+            return cls.from_motion(
+                columns["t"], moved, wrench, loads, window=window, name=path.stem
+            )
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
 
@@ -231,17 +270,31 @@ class Log(ByValue):
         Raises InvalidValueError for a contact that does not exist, FileError for a solution without its scene.
         """
         if not isinstance(solution, Solution):
-            raise InvalidValueError("solution", "be a Solution", type(solution).__name__)
-        twist, index = solution.contact_twist(contact), solution.contact_index(contact)
-        time, *wrench, load = (np.asarray(solution.histories[name].values) for name in ("time", *WRENCH, *LOAD))
+            raise InvalidValueError(
+                "solution", "be a Solution", type(solution).__name__
+            )
+        twist = solution.contact_twist(contact)
+        index = solution.contact_index(contact)
+        time, *wrench, load = (
+            np.asarray(solution.histories[name].values)
+            for name in ("time", *WRENCH, *LOAD)
+        )
         name = f"{solution.scene.name}, {solution.scene.contacts[index].name}"
         held = is_mean(time, twist[:, 2], solution.data["theta"].values)
-        return cls(time, twist, np.stack(wrench, -1)[:, index], load[:, index], name, held=held)
+        return cls(
+            time, twist, np.stack(wrench, -1)[:, index], load[:, index], name, held=held
+        )
 
 
 def as_tuple(name: str, value: Any, kind: type) -> tuple[Any, ...]:
     """Return one record of a kind or several as a tuple, or raise InvalidValueError."""
-    result = (value,) if isinstance(value, kind) else tuple(value) if isinstance(value, Sequence) else ()
+    result = (
+        (value,)
+        if isinstance(value, kind)
+        else tuple(value)
+        if isinstance(value, Sequence)
+        else ()
+    )
     if not result or not all(isinstance(each, kind) for each in result):
         raise InvalidValueError(name, f"be a {kind.__name__} or a list of them", value)
     return result
@@ -269,11 +322,15 @@ def loads(log: Log) -> np.ndarray:
     """Return the loads > 0 of a log [N], or raise InvalidValueError if there is none."""
     found = log.normal_force[log.normal_force > 0.0]
     if not len(found):
-        raise InvalidValueError(f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere")
+        raise InvalidValueError(
+            f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere"
+        )
     return found
 
 
-def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:
+def differentiated(
+    time: ArrayLike, motion: ArrayLike, *, window: int = 7
+) -> np.ndarray:
     """Compute the twist `[T, 3]` of a frame, in its axes, from poses x, y, theta `[T, 3]` [m, m, rad] over time [s].
 
     The twist is the slope of a parabola through `window` samples. Jumps of theta by whole turns are removed first.
@@ -285,7 +342,9 @@ def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np
     motion[:, 2] = unwrapped(time, motion[:, 2])[0]
     window = validation.count("window", window, at_least=3)
     if len(time) < window:
-        raise InvalidValueError("motion", f"hold at least window={window} samples", f"{len(time)}")
+        raise InvalidValueError(
+            "motion", f"hold at least window={window} samples", f"{len(time)}"
+        )
     return rotate(slopes(time, motion, window), -motion[:, 2])
 
 
@@ -294,12 +353,18 @@ def slopes(time: np.ndarray, values: np.ndarray, window: int = 7) -> np.ndarray:
     found = np.empty_like(values)
     for begin in range(0, len(time), AT_ONCE):
         rows = np.arange(begin, min(begin + AT_ONCE, len(time)))
-        around = np.clip(rows - window // 2, 0, len(time) - window)[:, None] + np.arange(window)
+        around = np.clip(rows - window // 2, 0, len(time) - window)[
+            :, None
+        ] + np.arange(window)
         since = time[around] - time[rows, None]
         scale = np.abs(since).max(axis=1, keepdims=True)
         powers = np.stack([(since / scale) ** n for n in range(3)], -1)
         across = powers.swapaxes(1, 2)
-        parabolas = np.linalg.pinv(across @ powers, hermitian=True) @ across @ (values[around] - values[rows, None])
+        parabolas = (
+            np.linalg.pinv(across @ powers, hermitian=True)
+            @ across
+            @ (values[around] - values[rows, None])
+        )
         found[rows] = parabolas[:, 1] / scale
     return found
 
@@ -308,11 +373,15 @@ def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.nda
     """Return increasing times `[T]`, `at_least` as many, or raise InvalidValueError."""
     result = validation.array("time", time, (None,))
     if len(result) < at_least:
-        raise InvalidValueError(name, f"hold at least {at_least} samples", f"{len(result)}")
+        raise InvalidValueError(
+            name, f"hold at least {at_least} samples", f"{len(result)}"
+        )
     falls = np.flatnonzero(np.diff(result) <= 0.0).tolist()
     if falls:
         before, after = result[falls[0] : falls[0] + 2].tolist()
-        raise InvalidValueError(name, "increase", f"{after} after {before} s in sample {falls[0] + 2}")
+        raise InvalidValueError(
+            name, "increase", f"{after} after {before} s in sample {falls[0] + 2}"
+        )
     return result
 
 
@@ -321,23 +390,36 @@ def is_mean(time: np.ndarray, omega: np.ndarray, angle: np.ndarray) -> bool:
 
     The angle `[T]` may be wrapped to one turn; samples of it that are not known (NaN) are left out.
     """
-    steps, turned = np.diff(time), np.diff(angle)
-    of_mean, of_ends = turned - steps * omega[1:], turned - 0.5 * steps * (omega[1:] + omega[:-1])
+    steps = np.diff(time)
+    turned = np.diff(angle)
+    of_mean = turned - steps * omega[1:]
+    of_ends = turned - 0.5 * steps * (omega[1:] + omega[:-1])
     known = np.isfinite(turned)
-    missed, usual = (np.abs(each - TURN * np.round(each / TURN))[known].max(initial=0.0) for each in (of_mean, of_ends))
+    missed, usual = (
+        np.abs(each - TURN * np.round(each / TURN))[known].max(initial=0.0)
+        for each in (of_mean, of_ends)
+    )
     return bool(missed < MEAN * usual)
 
 
 def columns_of(log: Log) -> Mapping[str, np.ndarray]:
     """Return the columns of a log by the names that `Log.from_csv` reads."""
     names = ("t", *TWIST, *WRENCH, "normal_force")
-    return dict(zip(names, [log.time, *log.twist.T, *log.wrench.T, log.normal_force], strict=True))
+    return dict(
+        zip(
+            names,
+            [log.time, *log.twist.T, *log.wrench.T, log.normal_force],
+            strict=True,
+        )
+    )
 
 
 # ---------------------------------------------------------------------- angles
 
 
-def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple[np.ndarray, int]:
+def unwrapped(
+    time: np.ndarray, angle: np.ndarray, name: str = "theta"
+) -> tuple[np.ndarray, int]:
     """Remove the jumps by whole turns from an angle `[T]` [rad]; returns the angle and the number of jumps.
 
     An angle whose range exceeds a turn was not wrapped and stays as it is.
@@ -352,15 +434,26 @@ def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple
     wrapped = bool(turns.any()) and np.ptp(angle) <= (1.0 + ROUNDED) * TURN
     turns = turns if wrapped else np.zeros_like(turns)
     steps = measured - TURN * turns
-    padded = np.pad(steps, NEIGHBOURS, mode="reflect" if len(steps) > NEIGHBOURS else "edge")
-    usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1), axis=1)
-    jump, fast = np.abs(steps - usual) > QUARTER, wrapped & (np.abs(steps) > QUARTER)
+    padded = np.pad(
+        steps, NEIGHBOURS, mode="reflect" if len(steps) > NEIGHBOURS else "edge"
+    )
+    usual = np.median(
+        np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1), axis=1
+    )
+    jump = np.abs(steps - usual) > QUARTER
+    fast = wrapped & (np.abs(steps) > QUARTER)
     for where, shown_steps, rule in (
         (jump, measured, "only jump by whole turns"),
-        (fast, steps, "turn by less than a quarter turn between samples, or be unwrapped"),
+        (
+            fast,
+            steps,
+            "turn by less than a quarter turn between samples, or be unwrapped",
+        ),
     ):
         if where.any():
             i = int(np.argmax(where))
             found = f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s"
             raise InvalidValueError(f"{name} [rad]", rule, found)
-    return angle - TURN * np.concatenate([[0.0], np.cumsum(turns)]), int(np.count_nonzero(turns))
+    return angle - TURN * np.concatenate([[0.0], np.cumsum(turns)]), int(
+        np.count_nonzero(turns)
+    )

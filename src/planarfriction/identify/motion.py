@@ -27,8 +27,17 @@ from planarfriction.identify.slides import (
     verdicts_on_weights,
     weights,
 )
-from planarfriction.identify.uncertainty import Fit, correlations, uncertainty_over_slides
-from planarfriction.identify.verdicts import Evidence, Verdict, judge_parameter, verdicts_on_turns
+from planarfriction.identify.uncertainty import (
+    Fit,
+    correlations,
+    uncertainty_over_slides,
+)
+from planarfriction.identify.verdicts import (
+    Evidence,
+    Verdict,
+    judge_parameter,
+    verdicts_on_turns,
+)
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -37,7 +46,15 @@ from planarfriction.patch.metric import refuse_anisotropy
 MOTION_PARAMETERS = ("mu_c", "mu_s", "v_s", "gamma", "sigma_2", "contact_radius")
 """Parameters that slides can determine; `mu_s` equals `mu_c` if only the latter is estimated."""
 
-DRY = LuGre(mu_c=0.3, mu_s=0.3, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0, elasto_plastic=ElastoPlastic(0.9))
+DRY = LuGre(
+    mu_c=0.3,
+    mu_s=0.3,
+    v_s=1e-3,
+    sigma_0=1e6,
+    sigma_1=20.0,
+    sigma_2=0.0,
+    elasto_plastic=ElastoPlastic(0.9),
+)
 """Dry friction with bristles so stiff that only the coefficient counts."""
 
 CHANNELS = (("x", "m"), ("y", "m"), ("theta", "rad"))
@@ -120,7 +137,9 @@ def identify_motion(
     slides = as_tuple("slides", slides, Slide)
     names = check_names(parameters, MOTION_PARAMETERS)
     validation.instance("body", body, MassProperties, "MassProperties")
-    if type(start) is not LuGre:  # a subclass may compute something else from the parameters that are fitted
+    if (
+        type(start) is not LuGre
+    ):  # a subclass may compute something else from the parameters that are fitted
         raise InvalidValueError("start", "be a LuGre law", start)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "identify_motion")
@@ -131,11 +150,16 @@ def identify_motion(
     doubts = [Verdict("fit", False, str(finding)) for finding in findings]
     doubts += [Verdict(name, False, "a unit is doubtful") for name in names if findings]
     strange = contradictions(slides, body) if robust else {}
-    left_out = [Verdict("fit", True, f"{slides[i].name} is left out: {why}") for i, why in strange.items()]
+    left_out = [
+        Verdict("fit", True, f"{slides[i].name} is left out: {why}")
+        for i, why in strange.items()
+    ]
     slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)
     problem = SlideProblem(slides, patch, body, names, start, model, samples, robust)
     problem.progress = progress
-    noise = np.array([FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / float(patch.contact_radius())])
+    noise = np.array(
+        [FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / float(patch.contact_radius())]
+    )
     with interruptible([problem]):
         fit = refine(multistart(problem, [problem.start_values()], noise=noise))
         return _identification(fit, problem, [*doubts, *left_out])
@@ -147,7 +171,9 @@ class SlideProblem(Problem):
     Noise is that of the channels of each slide, `[S, 3]`: slides with large residuals count as noisier.
     """
 
-    least_change = 1e-4  # far below the standard errors, and above the errors of the solver
+    least_change = (
+        1e-4  # far below the standard errors, and above the errors of the solver
+    )
 
     def __init__(
         self,
@@ -160,10 +186,18 @@ class SlideProblem(Problem):
         samples: int | None,
         robust: bool,
     ) -> None:
-        self.slides, self.patch, self.body, self.names = slides, patch, body, names
-        self.law, self.build, self.samples, self.robust = law, build, samples, robust
+        self.slides = slides
+        self.patch = patch
+        self.body = body
+        self.names = names
+        self.law = law
+        self.build = build
+        self.samples = samples
+        self.robust = robust
         self.starts: list[np.ndarray] = [start_of(slide) for slide in slides]
-        self._turns = 3  # of the first evaluation; later ones begin where the last one ended
+        self._turns = (
+            3  # of the first evaluation; later ones begin where the last one ended
+        )
 
     @property
     def numbers(self) -> int:
@@ -175,7 +209,12 @@ class SlideProblem(Problem):
     def start_values(self) -> np.ndarray:
         """Return the values `[F]` of the names in the start."""
         radius = float(self.patch.contact_radius())
-        return np.array([radius if name == "contact_radius" else getattr(self.law, name) for name in self.names])
+        return np.array(
+            [
+                radius if name == "contact_radius" else getattr(self.law, name)
+                for name in self.names
+            ]
+        )
 
     def fitted_law(self, values: np.ndarray) -> LuGre:
         """Return the law with values `[F]`; `mu_s` equals `mu_c` if only the latter is estimated."""
@@ -188,25 +227,41 @@ class SlideProblem(Problem):
         """Make the friction model with values `[F]`."""
         patch = self.patch
         if "contact_radius" in self.names:
-            patch = scaled_patch(patch, values[self.names.index("contact_radius")] / patch.contact_radius())
+            patch = scaled_patch(
+                patch,
+                values[self.names.index("contact_radius")] / patch.contact_radius(),
+            )
         return self.build(patch, self.fitted_law(values))
 
     def poses(self, values: np.ndarray) -> list[np.ndarray]:
         """Simulate the poses `[T, 3]` of each slide from its best start so far."""
-        model, both = self.fitted_model(values), zip(self.slides, self.starts, strict=True)
-        return [slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both]
+        model = self.fitted_model(values)
+        both = zip(self.slides, self.starts, strict=True)
+        return [
+            slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both
+        ]
 
     def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
         rows = np.broadcast_to(noise, (len(self.slides), 3))
-        return [np.broadcast_to(row, slide.pose.shape) for row, slide in zip(rows, self.slides, strict=True)]
+        return [
+            np.broadcast_to(row, slide.pose.shape)
+            for row, slide in zip(rows, self.slides, strict=True)
+        ]
 
-    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    def estimate_noise(
+        self, values: np.ndarray, noise: np.ndarray
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
         """Estimate the noise `[S, 3]`, equal for x and y, from the residuals at `values`, and sigma of each sample."""
-        residuals = [slide.pose - poses for slide, poses in zip(self.slides, self.poses(values), strict=True)]
+        residuals = [
+            slide.pose - poses
+            for slide, poses in zip(self.slides, self.poses(values), strict=True)
+        ]
         weighed = np.ones(len(self.slides))
         if self.robust:
             before = np.atleast_2d(noise).min(axis=0)
-            weighed = weights(np.array([np.sqrt(np.mean((each / before) ** 2)) for each in residuals]))
+            weighed = weights(
+                np.array([np.sqrt(np.mean((each / before) ** 2)) for each in residuals])
+            )
         counts = weighed @ [len(slide.time) for slide in self.slides]
         unknown = len(self.names) + 6.0 * weighed.sum()
         squares = weighed @ [np.sum(each**2, axis=0) for each in residuals] / counts
@@ -217,33 +272,48 @@ class SlideProblem(Problem):
             noise = channels / np.sqrt(weighed)[:, None]
         return noise, self.even_sigma(noise)
 
-    def linearised(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(
+        self, values: np.ndarray, sigma: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Compute the residuals over `sigma`, `[M]`, at the best starts, and derivatives `[M, F]` with the starts free.
 
         The start answers every change: `q' = -B^+ (r, J)` with B of the poses from which it is estimated.
         """
         noise = np.min([each[0] for each in sigma], axis=0)
         model = self.fitted_model(values)
-        changes = CHANGE * np.maximum(np.abs(values), np.abs(self.start_values()) + 1e-2 * (values == 0.0))
+        changes = CHANGE * np.maximum(
+            np.abs(values), np.abs(self.start_values()) + 1e-2 * (values == 0.0)
+        )
         changed = [self.fitted_model(values + row) for row in np.diag(changes)]
-        residuals, jacobian = [], []
+        residuals = []
+        jacobian = []
         for i, slide in enumerate(self.slides):
             if i % 20 == 0:
-                self.report(f"slide {i + 1} of {len(self.slides)}, " + ", ".join(f"{v:.4g}" for v in values))
+                self.report(
+                    f"slide {i + 1} of {len(self.slides)}, "
+                    + ", ".join(f"{v:.4g}" for v in values)
+                )
             if self._turns > 0:
                 part = slide if self.samples is None else slide.first(self.samples)
-                self.starts[i] = improve_start(model, self.body, part, self.starts[i], noise, self._turns)
+                self.starts[i] = improve_start(
+                    model, self.body, part, self.starts[i], noise, self._turns
+                )
             start = self.starts[i]
             poses, of_start = start_slopes(model, self.body, slide, start)
             of_values = [
-                (slide_poses(each, self.body, slide.time, start[:3], start[3:]) - poses) / change
+                (slide_poses(each, self.body, slide.time, start[:3], start[3:]) - poses)
+                / change
                 for each, change in zip(changed, changes, strict=True)
             ]
             residual = ((poses - slide.pose) / noise).ravel()
-            slope = (np.stack(of_values, -1) / noise[:, None]).reshape(len(residual), -1)
+            slope = (np.stack(of_values, -1) / noise[:, None]).reshape(
+                len(residual), -1
+            )
             basis = (of_start / noise[:, None]).reshape(len(residual), 6)
             known = None if self.samples is None else 3 * self.samples
-            answer = np.linalg.lstsq(basis[:known], np.column_stack([residual, slope])[:known], rcond=None)[0]
+            answer = np.linalg.lstsq(
+                basis[:known], np.column_stack([residual, slope])[:known], rcond=None
+            )[0]
             self.starts[i] = start - answer[:, 0]
             weight = (noise / sigma[i]).reshape(-1)
             residuals.append(weight * (residual - basis @ answer[:, 0]))
@@ -252,13 +322,20 @@ class SlideProblem(Problem):
         return np.concatenate(residuals), np.concatenate(jacobian)
 
 
-def _identification(fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]) -> Identification:
+def _identification(
+    fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
+) -> Identification:
     """Make the result of a fit of slides."""
     noise = fit.noise.min(axis=0)
     covariance, moved, jacobian = uncertainty_over_slides(fit)
-    errors, together = np.sqrt(np.diag(covariance)), correlations(covariance)
-    poses, starts = problem.poses(fit.values), np.stack(problem.starts)
-    left = [np.sqrt(np.mean(((s.pose - p) / noise) ** 2)) for s, p in zip(problem.slides, poses, strict=True)]
+    errors = np.sqrt(np.diag(covariance))
+    together = correlations(covariance)
+    poses = problem.poses(fit.values)
+    starts = np.stack(problem.starts)
+    left = [
+        np.sqrt(np.mean(((s.pose - p) / noise) ** 2))
+        for s, p in zip(problem.slides, poses, strict=True)
+    ]
     evidence = Evidence(
         names=problem.names,
         values=fit.values,
@@ -267,13 +344,19 @@ def _identification(fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
         at_bound=fit.at_bound,
         jacobian=jacobian,
         speeds=np.outer(np.hypot(starts[:, 3], starts[:, 4]), FADING).ravel(),
-        spins=np.outer(float(problem.patch.contact_radius()) * np.abs(starts[:, 5]), FADING).ravel(),
+        spins=np.outer(
+            float(problem.patch.contact_radius()) * np.abs(starts[:, 5]), FADING
+        ).ravel(),
         loads=np.array([problem.body.mass * problem.body.gravity]),
     )
     weighed = np.min((noise / fit.noise) ** 2, axis=1)
     found = [judge_parameter(evidence, i) for i in range(len(problem.names))]
-    if "contact_radius" in problem.names and not evidence.spinning:  # its spread over few slides may be small by chance
-        found[problem.names.index("contact_radius")] = Verdict("contact_radius", False, "no spin")
+    if (
+        "contact_radius" in problem.names and not evidence.spinning
+    ):  # its spread over few slides may be small by chance
+        found[problem.names.index("contact_radius")] = Verdict(
+            "contact_radius", False, "no spin"
+        )
     if (count := int((weighed > 0.0).sum())) < FEW:
         found.append(Verdict("fit", False, f"the errors come from only {count} slides"))
     verdicts = (
@@ -284,8 +367,16 @@ def _identification(fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
         *verdicts_on_influence(problem.slides, moved, problem.names, errors),
     )
     histories = [
-        {"name": slide.name, "time": slide.time, "measured": slide.pose, "predicted": predicted, "start": start}
-        for slide, start, predicted in zip(problem.slides, problem.starts, poses, strict=True)
+        {
+            "name": slide.name,
+            "time": slide.time,
+            "measured": slide.pose,
+            "predicted": predicted,
+            "start": start,
+        }
+        for slide, start, predicted in zip(
+            problem.slides, problem.starts, poses, strict=True
+        )
     ]
     return Identification(
         names=problem.names,

@@ -35,7 +35,11 @@ def _surface(name: str, value: Any) -> type[LimitSurface]:
 
 
 def _bristles(_: str, value: Any) -> ElastoPlastic | float | str | None:
-    return value if isinstance(value, str) and value == "auto" else LuGre(elasto_plastic=value).elasto_plastic  # pyright: ignore
+    return (
+        value
+        if isinstance(value, str) and value == "auto"
+        else LuGre(elasto_plastic=value).elasto_plastic
+    )  # pyright: ignore
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,9 @@ class FitOptions(Checked):
     samples: int = checked(validation.count, 1000, default=20_000)
     """Most samples that a fit takes of all logs together: of longer logs, the windows that differ most are taken, and
     the result says so."""
-    elasto_plastic: ElastoPlastic | float | str | None = checked(_bristles, default="auto")
+    elasto_plastic: ElastoPlastic | float | str | None = checked(
+        _bristles, default="auto"
+    )
     """Kind of bristles, None for plain ones, unless a whole law is given as start. "auto" takes what fits better: plain
     ones or a breakaway ratio of 0.9; and for loads that clearly differ, a stiffness that grows with the load or one
     that does not (`LuGre.reference_load`)."""

@@ -64,10 +64,21 @@ SOFT_FINGER = {
 
 ALL = {**LAW, **SHAPE, **SOFT_FINGER}
 
-USUAL = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
+USUAL = (
+    "mu_c",
+    "mu_s",
+    "v_s",
+    "gamma",
+    "sigma_0",
+    "sigma_1",
+    "sigma_2",
+    "contact_radius",
+)
 """Parameters that `identify_lugre` estimates by default."""
 
-STIFFNESS, RADIUS, SECOND_MOMENT = (PARAMETERS.index(each) for each in ("sigma_0", "contact_radius", "second_moment"))
+STIFFNESS, RADIUS, SECOND_MOMENT = (
+    PARAMETERS.index(each) for each in ("sigma_0", "contact_radius", "second_moment")
+)
 """Places of the stiffness and of the numbers of the shape in the vector of a model."""
 
 PRIOR, SHAPE_PRIOR = 3.0, 1.0
@@ -77,32 +88,60 @@ CONSTANT = 0.1
 """Share by which the load of a log may stray from its mean if the patch changes with the load."""
 
 
-def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tuple[str, ...]:
+def check_names(
+    names: Sequence[str], known: Collection[str] = tuple(ALL)
+) -> tuple[str, ...]:
     """Return the names as a tuple, each one of the `known` and given once, or raise InvalidValueError."""
-    names = tuple(validation.choices("parameters", (names,) if isinstance(names, str) else names, known))
+    names = tuple(
+        validation.choices(
+            "parameters", (names,) if isinstance(names, str) else names, known
+        )
+    )
     for name in names:
         if names.count(name) > 1:
-            raise InvalidValueError("parameters", "contain each name once", f"{name!r} {names.count(name)} times")
+            raise InvalidValueError(
+                "parameters",
+                "contain each name once",
+                f"{name!r} {names.count(name)} times",
+            )
     if not names:
         raise InvalidValueError("parameters", "contain at least one name", "none")
     if any(name in SOFT_FINGER for name in names) and "contact_radius" in names:
         raise InvalidValueError(
-            "parameters", "contain contact_radius or soft-finger constants, not both", ", ".join(names)
+            "parameters",
+            "contain contact_radius or soft-finger constants, not both",
+            ", ".join(names),
         )
     return names
 
 
-def check_loads(logs: Sequence[Log], loads: Sequence[float], patch: ContactPatch, names: Sequence[str]) -> None:
+def check_loads(
+    logs: Sequence[Log],
+    loads: Sequence[float],
+    patch: ContactPatch,
+    names: Sequence[str],
+) -> None:
     """Check that a fit can take the logs and their mean loads on a patch, and estimate `names` of a soft finger."""
     if names and not isinstance(patch.pressure, SoftFinger):
-        raise InvalidValueError("patch", f"have a SoftFinger pressure to estimate {', '.join(names)}", patch.name)
+        raise InvalidValueError(
+            "patch",
+            f"have a SoftFinger pressure to estimate {', '.join(names)}",
+            patch.name,
+        )
     for name in ("k", "k_per_newton"):
         if name in names and getattr(patch.pressure, name) is None:
-            raise InvalidValueError("parameters", f"contain {name} only if the SoftFinger has it", name)
+            raise InvalidValueError(
+                "parameters", f"contain {name} only if the SoftFinger has it", name
+            )
     for log, load in zip(logs, loads, strict=True):
         if not log.wrench.any():
-            raise InvalidValueError(f"wrench of {log.name}", "not be 0 throughout", "0 in every sample")
-        if patch.depends_on_load and np.abs(log.normal_force / load - 1.0).max() > CONSTANT:
+            raise InvalidValueError(
+                f"wrench of {log.name}", "not be 0 throughout", "0 in every sample"
+            )
+        if (
+            patch.depends_on_load
+            and np.abs(log.normal_force / load - 1.0).max() > CONSTANT
+        ):
             rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
             found = f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
             raise InvalidValueError(f"normal_force of {log.name}", rule, found)
@@ -117,29 +156,46 @@ class Coordinates:
     """
 
     def __init__(
-        self, names: Sequence[str], start: np.ndarray, held_mu_c: float, widths: Any = (), limits: Any = ()
+        self,
+        names: Sequence[str],
+        start: np.ndarray,
+        held_mu_c: float,
+        widths: Any = (),
+        limits: Any = (),
     ) -> None:
-        self.names, count = tuple(names), len(names)
+        self.names = tuple(names)
+        count = len(names)
         self.rig = np.arange(count + len(widths)) >= count
-        self.start = np.concatenate([np.asarray(start, dtype=float)[:count], np.zeros(len(widths))])
-        self._held_mu_c, self._limits = held_mu_c, np.asarray(limits, dtype=float)
+        self.start = np.concatenate(
+            [np.asarray(start, dtype=float)[:count], np.zeros(len(widths))]
+        )
+        self._held_mu_c = held_mu_c
+        self._limits = np.asarray(limits, dtype=float)
         self._mu_s = self.names.index("mu_s") if "mu_s" in self.names else None
         self._mu_c = self.names.index("mu_c") if "mu_c" in self.names else None
         self.logarithmic = np.zeros(len(self.start), dtype=bool)
-        self.logarithmic[:count] = [ALL[name].logarithmic and name != "mu_s" for name in self.names]
+        self.logarithmic[:count] = [
+            ALL[name].logarithmic and name != "mu_s" for name in self.names
+        ]
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
         self.scale[:count][[name == "mu_s" for name in self.names]] = 1.0
         self.scale[self.rig] = widths
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the lower and the upper bounds of the coordinates, `[F + K]` each."""
-        low, high = -np.inf * np.ones(len(self.start)), np.inf * np.ones(len(self.start))
-        low[self.rig], high[self.rig] = -self._limits, self._limits
-        for bound, edges in ((low, [ALL[name].low for name in self.names]), (high, [ALL[n].high for n in self.names])):
+        low = -np.inf * np.ones(len(self.start))
+        high = np.inf * np.ones(len(self.start))
+        low[self.rig] = -self._limits
+        high[self.rig] = self._limits
+        for bound, edges in (
+            (low, [ALL[name].low for name in self.names]),
+            (high, [ALL[n].high for n in self.names]),
+        ):
             bound[~self.rig] = edges / self.scale[~self.rig]
             bound[self.logarithmic] = np.log(bound[self.logarithmic])
         if self._mu_s is not None:
-            low[self._mu_s], high[self._mu_s] = 0.0, 5.0
+            low[self._mu_s] = 0.0
+            high[self._mu_s] = 5.0
         return low, high
 
     def of(self, values: np.ndarray) -> np.ndarray:
@@ -167,7 +223,9 @@ class Coordinates:
     def values(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the values `[F + K]` of coordinates."""
         result = self.scale * np.where(
-            self.logarithmic, np.exp(np.where(self.logarithmic, coordinates, 0.0)), coordinates
+            self.logarithmic,
+            np.exp(np.where(self.logarithmic, coordinates, 0.0)),
+            coordinates,
         )
         if self._mu_s is not None:
             result[self._mu_s] = self._mu(result) * (1.0 + coordinates[self._mu_s])
@@ -180,7 +238,9 @@ class Coordinates:
         if self._mu_s is not None:
             result[self._mu_s, self._mu_s] = self._mu(values)
             if self._mu_c is not None:
-                result[self._mu_s, self._mu_c] = (1.0 + coordinates[self._mu_s]) * values[self._mu_c]
+                result[self._mu_s, self._mu_c] = (
+                    1.0 + coordinates[self._mu_s]
+                ) * values[self._mu_c]
         return result
 
     def _mu(self, values: np.ndarray) -> float:
@@ -189,7 +249,9 @@ class Coordinates:
 
 def fitted_law(law: LuGre, given: Mapping[str, float]) -> LuGre:
     """Return the law with estimates by name; a `mu_s` that was held grows with a `mu_c` that passes it."""
-    fields: dict[str, Any] = {name: given[name] for name in LAW if name in given and name != "breakaway_ratio"}
+    fields: dict[str, Any] = {
+        name: given[name] for name in LAW if name in given and name != "breakaway_ratio"
+    }
     fields["mu_s"] = max(fields.get("mu_s", law.mu_s), fields.get("mu_c", law.mu_c))
     if "breakaway_ratio" in given:
         fields["elasto_plastic"] = ElastoPlastic(given["breakaway_ratio"])
@@ -200,9 +262,17 @@ def bristles_of(law: LuGre, names: Sequence[str]) -> str:
     """Return the kind of bristles of a law in words, of which `names` are estimated."""
     kind = "plain bristles"
     if isinstance(law.elasto_plastic, ElastoPlastic):
-        given = "" if "breakaway_ratio" in names else f" ({law.elasto_plastic.breakaway_ratio:g})"
+        given = (
+            ""
+            if "breakaway_ratio" in names
+            else f" ({law.elasto_plastic.breakaway_ratio:g})"
+        )
         kind = f"elasto-plastic bristles{given}"
-    return kind if law.reference_load is None else f"{kind} of a stiffness that does not grow with the load"
+    return (
+        kind
+        if law.reference_load is None
+        else f"{kind} of a stiffness that does not grow with the load"
+    )
 
 
 def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> ContactPatch:
@@ -215,12 +285,23 @@ def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> Conta
     grid = patch.grid
     if grid is not None:
         x, y = new + scale * (np.array([grid.x_min, grid.y_min]) - old)
-        size = {"cell_width": scale * grid.cell_width, "cell_height": scale * grid.cell_height}
+        size = {
+            "cell_width": scale * grid.cell_width,
+            "cell_height": scale * grid.cell_height,
+        }
         grid = dataclasses.replace(grid, x_min=float(x), y_min=float(y), **size)
     positions = new + scale * (patch.positions - old)
     pressure = patch.weights() / patch.areas if patch.point_shares is None else None
-    sizes = {"cell_size": None if patch.cell_size is None else tuple(scale * each for each in patch.cell_size)}
-    sizes |= {"areas": scale**2 * patch.areas, "radii": scale * patch.radii, "grid": grid}
+    sizes = {
+        "cell_size": None
+        if patch.cell_size is None
+        else tuple(scale * each for each in patch.cell_size)
+    }
+    sizes |= {
+        "areas": scale**2 * patch.areas,
+        "radii": scale * patch.radii,
+        "grid": grid,
+    }
     return dataclasses.replace(patch, positions=positions, pressure=pressure, **sizes)
 
 
@@ -231,12 +312,21 @@ class VectorMap:
     """
 
     def __init__(
-        self, names: Sequence[str], base: np.ndarray, patch: Any, normal_force: float, reference: float | None = None
+        self,
+        names: Sequence[str],
+        base: np.ndarray,
+        patch: Any,
+        normal_force: float,
+        reference: float | None = None,
     ):
-        self.names, self.base, self.load = tuple(names), np.array(base, dtype=float), normal_force
+        self.names = tuple(names)
+        self.base = np.array(base, dtype=float)
+        self.load = normal_force
         self._stiffness = 1.0 if reference is None else reference / normal_force
         self._ratio = float(base[SECOND_MOMENT] / base[RADIUS] ** 2)
-        self._finger = patch.pressure if any(name in SOFT_FINGER for name in names) else None
+        self._finger = (
+            patch.pressure if any(name in SOFT_FINGER for name in names) else None
+        )
 
     def vector(self, values: np.ndarray) -> np.ndarray:
         """Return the vector `[P]` of the model for values `[F]`."""
@@ -244,16 +334,20 @@ class VectorMap:
 
     def linearised(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the vector and its derivatives with respect to the values, `[P, F]`."""
-        vector, slopes = self.base.copy(), np.zeros((len(PARAMETERS), len(self.names)))
+        vector = self.base.copy()
+        slopes = np.zeros((len(PARAMETERS), len(self.names)))
         for i, name in enumerate(self.names):
             if name in PARAMETERS:
                 row = PARAMETERS.index(name)
-                vector[row], slopes[row, i] = values[i], 1.0
+                vector[row] = values[i]
+                slopes[row, i] = 1.0
             if name == "contact_radius":
                 vector[SECOND_MOMENT] = self._ratio * values[i] ** 2
                 slopes[SECOND_MOMENT, i] = 2.0 * self._ratio * values[i]
         if self._finger is not None:
-            moments = soft_finger_moments(self._finger, self.load, dict(zip(self.names, values, strict=True)))
+            moments = soft_finger_moments(
+                self._finger, self.load, dict(zip(self.names, values, strict=True))
+            )
             for row, (moment, by) in zip((RADIUS, SECOND_MOMENT), moments, strict=True):
                 vector[row] = moment
                 slopes[row] += [by.get(name, 0.0) for name in self.names]
@@ -274,16 +368,28 @@ def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, Any])
     c: Any = given.get("c", finger.c)
     n: Any = given.get("n", finger.n)
     per_newton = finger.k is None
-    k: Any = given.get("k_per_newton", finger.k_per_newton) * normal_force if per_newton else given.get("k", finger.k)
+    k: Any = (
+        given.get("k_per_newton", finger.k_per_newton) * normal_force
+        if per_newton
+        else given.get("k", finger.k)
+    )
     grown: Any = c * normal_force**n
     free = finger.radius_max is None or grown < finger.radius_max
     size: Any = grown if free else finger.radius_max
     results = []
     for power in (1, 2):
-        value = size**power * np.exp(betaln((power + 2) / k, 1 + 1 / k) - betaln(2 / k, 1 + 1 / k))
+        value = size**power * np.exp(
+            betaln((power + 2) / k, 1 + 1 / k) - betaln(2 / k, 1 + 1 / k)
+        )
         of_k = value * (_log_beta_slope(power + 2, k) - _log_beta_slope(2, k))
-        slopes = {"c": power * value / c, "n": power * value * np.log(normal_force)} if free else {}
-        slopes["k_per_newton" if per_newton else "k"] = of_k * (normal_force if per_newton else 1.0)
+        slopes = (
+            {"c": power * value / c, "n": power * value * np.log(normal_force)}
+            if free
+            else {}
+        )
+        slopes["k_per_newton" if per_newton else "k"] = of_k * (
+            normal_force if per_newton else 1.0
+        )
         results.append((float(value), slopes))
     return results[0], results[1]
 

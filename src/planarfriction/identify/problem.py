@@ -14,7 +14,12 @@ from planarfriction.identify import parameters as known
 from planarfriction.identify.decimation import redrawn
 from planarfriction.identify.logs import Log, mean_load
 from planarfriction.identify.options import FitOptions
-from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap, check_loads
+from planarfriction.identify.parameters import (
+    RADIUS,
+    Coordinates,
+    VectorMap,
+    check_loads,
+)
 from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
 from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
 from planarfriction.identify.uncertainty import covariance
@@ -43,7 +48,9 @@ noise, and share of such ones up to which a robust fit ends without them."""
 def softened(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return residuals whose squares are the loss "soft_l1" at a scale of `SOFT`, `[M]`, and their derivatives."""
     root = np.sqrt(1.0 + (residual / SOFT) ** 2)
-    factor = np.sqrt(2.0 / (1.0 + root))  # no difference of like numbers at small residuals
+    factor = np.sqrt(
+        2.0 / (1.0 + root)
+    )  # no difference of like numbers at small residuals
     return residual * factor, 1.0 / (root * factor)
 
 
@@ -101,7 +108,9 @@ class Problem:
         def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             residual, jacobian = self.linearised(coordinates.values(x), sigma)
             pull, per_pull = coordinates.prior(x)
-            return np.concatenate([residual, pull]), np.concatenate([jacobian @ coordinates.slopes(x), per_pull])
+            return np.concatenate([residual, pull]), np.concatenate(
+                [jacobian @ coordinates.slopes(x), per_pull]
+            )
 
         return evaluate
 
@@ -130,10 +139,17 @@ class LogProblem(Problem):
         model: str = "reduced-published",
         progress: Callable[[str], Any] | None = None,
     ) -> None:
-        self.logs, self.patch, self.names, self.law = logs, patch, names, law
-        self.options, self.model, self.progress = options, model, progress
+        self.logs = logs
+        self.patch = patch
+        self.names = names
+        self.law = law
+        self.options = options
+        self.model = model
+        self.progress = progress
         loads = [mean_load(log) for log in logs]
-        check_loads(logs, loads, patch, [name for name in names if name in known.SOFT_FINGER])
+        check_loads(
+            logs, loads, patch, [name for name in names if name in known.SOFT_FINGER]
+        )
         self.reference_load = float(np.median(loads))
         self.fixed_patch = patch
         if patch.depends_on_load:
@@ -141,11 +157,18 @@ class LogProblem(Problem):
             self.fixed_patch = dataclasses.replace(patch, pressure=density)
         self.maps = self._maps(loads)
         self.rig = Rig(logs, options.nuisance)
-        self.twists = [smoothed(log) if "twist" in options.nuisance else as_measured(log) for log in logs]
+        self.twists = [
+            smoothed(log) if "twist" in options.nuisance else as_measured(log)
+            for log in logs
+        ]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
         self.used = [log.inner[1 if options.begins == "rest" else 0 :] for log in logs]
         kind = SIMULATORS[model]
-        self.simulator = kind(self.fixed_patch, self._per_load if kind.own_radius else self.law, options.surface)
+        self.simulator = kind(
+            self.fixed_patch,
+            self._per_load if kind.own_radius else self.law,
+            options.surface,
+        )
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)
         self._shown: tuple[np.ndarray, list[np.ndarray]] | None = None
@@ -160,28 +183,49 @@ class LogProblem(Problem):
         """Make the map from values to the vector of the model at the load of each log."""
         patch = self.patch
         surface = self.options.surface
-        base = parameters_of(SIMULATORS["reduced-published"].model(self.fixed_patch, self._per_load, surface))
+        base = parameters_of(
+            SIMULATORS["reduced-published"].model(
+                self.fixed_patch, self._per_load, surface
+            )
+        )
         self.base = dict(zip(PARAMETERS, base.tolist(), strict=True))
-        reference = self.law.reference_load if SIMULATORS[self.model].own_radius else None
+        reference = (
+            self.law.reference_load if SIMULATORS[self.model].own_radius else None
+        )
         maps = [VectorMap(self.names, base, patch, load, reference) for load in loads]
         for each, load in zip(maps, loads, strict=True):
-            if patch.depends_on_load and not any(name in known.SOFT_FINGER for name in self.names):
+            if patch.depends_on_load and not any(
+                name in known.SOFT_FINGER for name in self.names
+            ):
                 x, y = patch.centre_of_pressure(load)
-                shape = {"contact_radius": patch.contact_radius(load), "second_moment": patch.second_moment(load)}
+                shape = {
+                    "contact_radius": patch.contact_radius(load),
+                    "second_moment": patch.second_moment(load),
+                }
                 for name, value in {**shape, "centre_x": x, "centre_y": y}.items():
                     each.base[PARAMETERS.index(name)] = float(value)
-            if not SIMULATORS[self.model].own_radius:  # the radius of the cells, where that of a surface is its own
+            if not SIMULATORS[
+                self.model
+            ].own_radius:  # the radius of the cells, where that of a surface is its own
                 each.base[RADIUS] = float(self.fixed_patch.contact_radius())
         return maps
 
     def _predictions(
-        self, steps: int, twists: Sequence[np.ndarray] | None = None, logs: Sequence[Log] | None = None
+        self,
+        steps: int,
+        twists: Sequence[np.ndarray] | None = None,
+        logs: Sequence[Log] | None = None,
     ) -> list[Prediction]:
-        twists, logs = [each.values for each in self.twists] if twists is None else twists, logs or self.logs
+        twists = [each.values for each in self.twists] if twists is None else twists
+        logs = logs or self.logs
         result = []
         for log, twist in zip(logs, twists, strict=True):
             kind: Any = PartsPrediction if len(log.parts) > 1 else Prediction
-            result.append(kind(self.simulator, log, twist, begins=self.options.begins, refine=steps))
+            result.append(
+                kind(
+                    self.simulator, log, twist, begins=self.options.begins, refine=steps
+                )
+            )
         return result
 
     def report(self, text: str) -> None:
@@ -190,17 +234,26 @@ class LogProblem(Problem):
     @property
     def work(self) -> float:
         """Rough time of one evaluation with derivatives [s]."""
-        return 2e-6 * sum(each.steps for each in self.predictions) * self.simulator.work(len(self.names))
+        return (
+            2e-6
+            * sum(each.steps for each in self.predictions)
+            * self.simulator.work(len(self.names))
+        )
 
     @property
     def numbers(self) -> int:
         return sum(int(log.channels.sum()) * len(log.time) for log in self.logs)
 
     def coordinates(self, start: np.ndarray) -> Coordinates:
-        return Coordinates(self.names, start, self.law.mu_c, self.rig.widths, self.rig.limits)
+        return Coordinates(
+            self.names, start, self.law.mu_c, self.rig.widths, self.rig.limits
+        )
 
     def sizes(self) -> list[int]:
-        return [3 * len(log.time[used]) for log, used in zip(self.logs, self.used, strict=True)]
+        return [
+            3 * len(log.time[used])
+            for log, used in zip(self.logs, self.used, strict=True)
+        ]
 
     def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
         """Take as many steps as keep the estimates within `COARSE` standard errors; returns True if these are more.
@@ -209,19 +262,28 @@ class LogProblem(Problem):
         """
         if self.options.refine is not None or self.steps >= FINEST:
             return False
-        jacobian, residual = self.linearised(values, sigma)[1], self.distances(values, sigma)
-        twice = self._scaled(self.shown(values, self._predictions(2 * self.steps)), sigma)
+        jacobian = self.linearised(values, sigma)[1]
+        residual = self.distances(values, sigma)
+        twice = self._scaled(
+            self.shown(values, self._predictions(2 * self.steps)), sigma
+        )
         count = len(self.names)
         pull = np.eye(len(values))[count:] / self.rig.widths[:, None]
-        inverse = covariance(np.concatenate([jacobian, pull]), np.full(len(values), True))
+        inverse = covariance(
+            np.concatenate([jacobian, pull]), np.full(len(values), True)
+        )
         errors = np.sqrt(np.diag(inverse))[:count]
         sure = errors < KNOWN * np.abs(values[:count])
-        moved = (np.where(np.isfinite(inverse), inverse, 0.0) @ (jacobian.T @ (twice - residual)))[:count]
+        moved = (
+            np.where(np.isfinite(inverse), inverse, 0.0)
+            @ (jacobian.T @ (twice - residual))
+        )[:count]
         most = float((np.abs(moved)[sure] / (COARSE * errors[sure])).max(initial=0.0))
         if most <= 1.0:
             return False
         self.steps *= min(int(2 ** np.ceil(0.5 * np.log2(most))), FINEST // self.steps)
-        self.predictions, self._shown = self._predictions(self.steps), None
+        self.predictions = self._predictions(self.steps)
+        self._shown = None
         return True
 
     def forget(self) -> None:
@@ -229,9 +291,18 @@ class LogProblem(Problem):
 
     def start_values(self) -> np.ndarray:
         """Return the values `[F]` of the names in the law, the patch and its pressure."""
-        values = {**self.base, **{name: getattr(self.law, name) for name in known.LAW if name != "breakaway_ratio"}}
+        values = {
+            **self.base,
+            **{
+                name: getattr(self.law, name)
+                for name in known.LAW
+                if name != "breakaway_ratio"
+            },
+        }
         if any(name in known.SOFT_FINGER for name in self.names):
-            values |= {name: getattr(self.patch.pressure, name) for name in known.SOFT_FINGER}
+            values |= {
+                name: getattr(self.patch.pressure, name) for name in known.SOFT_FINGER
+            }
         return np.array([float(values[name]) for name in self.names])
 
     def split(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -240,26 +311,39 @@ class LogProblem(Problem):
         rig = values[count:] if len(values) > count else np.zeros(len(self.rig.columns))
         return values[:count], rig
 
-    def shown(self, values: np.ndarray, predictions: Sequence[Prediction] | None = None) -> list[np.ndarray]:
+    def shown(
+        self, values: np.ndarray, predictions: Sequence[Prediction] | None = None
+    ) -> list[np.ndarray]:
         """Compute the wrenches `[T, 3]` that the sensors of each log should show, for values `[F]` or `[F + K]`."""
-        if predictions is None and self._shown is not None and np.array_equal(self._shown[0], values):
+        if (
+            predictions is None
+            and self._shown is not None
+            and np.array_equal(self._shown[0], values)
+        ):
             return self._shown[1]
         contact, rig = self.split(values)
         result = []
-        for i, (prediction, each) in enumerate(zip(predictions or self.predictions, self.maps, strict=True)):
+        for i, (prediction, each) in enumerate(
+            zip(predictions or self.predictions, self.maps, strict=True)
+        ):
             wrench = prediction.wrenches(each.vector(contact), self.rig.delay(rig))
             result.append(self.rig.added(i, rig, wrench, np.zeros_like(wrench))[0])
         if predictions is None:
             self._shown = values.copy(), result
         return result
 
-    def linearised(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(
+        self, values: np.ndarray, sigma: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Compute the residuals over `sigma`, `[M]`, and derivatives `[M, F + K]`, at `values` or nearby (`NEARBY`)."""
         if self._slopes is None or not self._near(values, self._slopes[0]):
             self._derive(values)
         assert self._slopes is not None
         both = zip(self._slopes[1], self.logs, self.used, sigma, strict=True)
-        rows = [(slope * (log.channels / each)[..., None])[used] for slope, log, used, each in both]
+        rows = [
+            (slope * (log.channels / each)[..., None])[used]
+            for slope, log, used, each in both
+        ]
         jacobian = np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
         residual = self.distances(values, sigma)
         if self.options.loss == "linear":
@@ -268,36 +352,54 @@ class LogProblem(Problem):
         return residual, slopes[:, None] * jacobian
 
     def slopes_of(
-        self, names: Sequence[str], held: np.ndarray, values: np.ndarray, sigma: Sequence[np.ndarray]
+        self,
+        names: Sequence[str],
+        held: np.ndarray,
+        values: np.ndarray,
+        sigma: Sequence[np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute the residuals `[M]` at `values`, and derivatives `[M, H]` by `names` of the law, `held` at these."""
         wide = copy.copy(self)
-        wide.names, wide._slopes, wide._shown = (*self.names, *names), None, None
+        wide.names = (*self.names, *names)
+        wide._slopes = None
+        wide._shown = None
         wide.maps = wide._maps([each.load for each in self.maps])
         count = len(self.names)
-        residual, slopes = wide.linearised(np.concatenate([values[:count], held, values[count:]]), sigma)
+        residual, slopes = wide.linearised(
+            np.concatenate([values[:count], held, values[count:]]), sigma
+        )
         return residual, slopes[:, count : count + len(names)]
 
     def _near(self, values: np.ndarray, others: np.ndarray) -> bool:
         """Return True if no value differs by more than `NEARBY` from another one, as a share of its size."""
-        centre = [self.base["contact_radius"] if name in ("centre_x", "centre_y") else 0.0 for name in self.names]
-        sizes = np.concatenate([np.maximum(np.abs(values[: len(centre)]), centre), self.rig.widths])
+        centre = [
+            self.base["contact_radius"] if name in ("centre_x", "centre_y") else 0.0
+            for name in self.names
+        ]
+        sizes = np.concatenate(
+            [np.maximum(np.abs(values[: len(centre)]), centre), self.rig.widths]
+        )
         return bool((np.abs(values - others) <= NEARBY * sizes).all())
 
     def _derive(self, values: np.ndarray) -> None:
         """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`, and remember them."""
         contact, rig = self.split(values)
         found = []
-        for i, (prediction, each) in enumerate(zip(self.predictions, self.maps, strict=True)):
+        for i, (prediction, each) in enumerate(
+            zip(self.predictions, self.maps, strict=True)
+        ):
             vector, per_value = each.linearised(contact)
             rows = np.flatnonzero(per_value.any(axis=1))
             names = [PARAMETERS[row] for row in rows]
-            wrench, slope, later = prediction.sensitivities(vector, names, self.rig.delay(rig))
+            wrench, slope, later = prediction.sensitivities(
+                vector, names, self.rig.delay(rig)
+            )
             shown, factor, of_rig = self.rig.added(i, rig, wrench, later)
             slope = factor[:, None, None] * (slope @ per_value[rows])
             found.append((shown, np.concatenate([slope, of_rig], axis=-1)))
         shown, slopes = zip(*found, strict=True)
-        self._shown, self._slopes = (values.copy(), [*shown]), (values.copy(), [*slopes])
+        self._shown = (values.copy(), [*shown])
+        self._slopes = (values.copy(), [*slopes])
 
     def residual(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, as the loss counts them."""
@@ -308,7 +410,9 @@ class LogProblem(Problem):
         """Compute the residuals over `sigma`, `[M]`, whatever the loss."""
         return self._scaled(self.shown(values), sigma)
 
-    def _scaled(self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]) -> np.ndarray:
+    def _scaled(
+        self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]
+    ) -> np.ndarray:
         """Subtract the measured wrenches and divide by `sigma`; returns all used samples flat."""
         rows = zip(self._apart(wrenches, sigma), self.used, strict=True)
         return np.concatenate([each[used].ravel() for each, used in rows])
@@ -316,22 +420,34 @@ class LogProblem(Problem):
     def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
         return [np.broadcast_to(noise, log.wrench.shape) for log in self.logs]
 
-    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    def estimate_noise(
+        self, values: np.ndarray, noise: np.ndarray
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
         """Estimate the noise of each channel `[3]`, unless it is given, and sigma `[T, 3]` of each log's residuals."""
         if self.options.noise is None:
             both = zip(self.shown(values), self.logs, strict=True)
             noise = wrench_noise(self.logs, [shown - log.wrench for shown, log in both])
         sigma = self.sigma(values, noise)
         if self.options.loss != "linear":
-            spoiled = [np.abs(each) > SPOILED for each in self._apart(self.shown(values), sigma)]
+            spoiled = [
+                np.abs(each) > SPOILED
+                for each in self._apart(self.shown(values), sigma)
+            ]
             if sum(each.sum() for each in spoiled) < FEW * self.numbers:
-                sigma = [np.where(out, np.inf, each) for out, each in zip(spoiled, sigma, strict=True)]
+                sigma = [
+                    np.where(out, np.inf, each)
+                    for out, each in zip(spoiled, sigma, strict=True)
+                ]
         return noise, sigma
 
-    def _apart(self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def _apart(
+        self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]
+    ) -> list[np.ndarray]:
         """Subtract the measured wrenches and divide by `sigma`, `[T, 3]` of each log."""
         both = zip(wrenches, self.logs, sigma, strict=True)
-        return [(wrench - log.wrench) * (log.channels / each) for wrench, log, each in both]
+        return [
+            (wrench - log.wrench) * (log.channels / each) for wrench, log, each in both
+        ]
 
     def sigma(self, values: np.ndarray, noise: np.ndarray) -> list[np.ndarray]:
         """Compute the standard deviation `[T, 3]` of each log's residuals from the noise `[3]` and that of the twist.
@@ -341,17 +457,23 @@ class LogProblem(Problem):
         """
         contact, _ = self.split(values)
         sigma = []
-        for prediction, each, log, twist in zip(self.predictions, self.maps, self.logs, self.twists, strict=True):
+        for prediction, each, log, twist in zip(
+            self.predictions, self.maps, self.logs, self.twists, strict=True
+        ):
             square = np.broadcast_to(noise**2, log.wrench.shape).copy()
             vector = each.vector(contact)
             channels = np.diag(twist.noisy & ("twist" in self.rig.groups))
             base = prediction.wrenches(vector) if channels.any() else None
             for one in channels[channels.any(axis=1)]:
-                square += (prediction.moved(vector, one * twist.left, one * twist.noise) - base) ** 2
+                square += (
+                    prediction.moved(vector, one * twist.left, one * twist.noise) - base
+                ) ** 2
             sigma.append(np.sqrt(square))
         return sigma
 
-    def twist_residuals(self, values: np.ndarray, sigma: Sequence[np.ndarray], draws: int) -> np.ndarray | None:
+    def twist_residuals(
+        self, values: np.ndarray, sigma: Sequence[np.ndarray], draws: int
+    ) -> np.ndarray | None:
         """Compute the changes `[draws, M]` of the residuals over `sigma` for drawn errors of the twists.
 
         The draws are always the same ones. Returns None if no twist has noise.
@@ -359,14 +481,21 @@ class LogProblem(Problem):
         noisy = [twist.noisy & ("twist" in self.rig.groups) for twist in self.twists]
         if not np.any(noisy):
             return None
-        random, base = np.random.default_rng(0), self.shown(values)
+        random = np.random.default_rng(0)
+        base = self.shown(values)
         result = []
         both = [*zip(self.twists, noisy, self.logs, strict=True)]
         for _ in range(draws):
-            drawn = [twist.values + np.where(on, twist.error(random), 0.0) for twist, on, _ in both]
+            drawn = [
+                twist.values + np.where(on, twist.error(random), 0.0)
+                for twist, on, _ in both
+            ]
             logs = [redrawn(log, twist.noise * on, random) for twist, on, log in both]
             shown = self.shown(values, self._predictions(self.steps, drawn, logs))
-            change = [new - old + log.wrench for new, old, log in zip(shown, base, self.logs, strict=True)]
+            change = [
+                new - old + log.wrench
+                for new, old, log in zip(shown, base, self.logs, strict=True)
+            ]
             result.append(self._scaled(change, sigma))
         return np.array(result)
 
@@ -374,8 +503,14 @@ class LogProblem(Problem):
         """Compute friction over load [-], `[T]` of each log; NaN without load."""
         contact, _ = self.split(values)
         radii = [each.vector(contact)[RADIUS] for each in self.maps]
-        sizes = [np.linalg.norm(log.wrench / [1.0, 1.0, r], axis=1) for log, r in zip(self.logs, radii, strict=True)]
-        loads = [np.where(log.normal_force > 0.0, log.normal_force, np.nan) for log in self.logs]
+        sizes = [
+            np.linalg.norm(log.wrench / [1.0, 1.0, r], axis=1)
+            for log, r in zip(self.logs, radii, strict=True)
+        ]
+        loads = [
+            np.where(log.normal_force > 0.0, log.normal_force, np.nan)
+            for log in self.logs
+        ]
         return [size / load for size, load in zip(sizes, loads, strict=True)]
 
     def sliding(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -70,7 +70,10 @@ class Identification(ByValue):
     @property
     def residuals(self) -> list[np.ndarray]:
         """Residuals (measured - predicted) / noise, `[T, C]` for each log or slide; NaN where nothing was measured."""
-        return [(each["measured"] - each["predicted"]) / self.noise for each in self.histories]
+        return [
+            (each["measured"] - each["predicted"]) / self.noise
+            for each in self.histories
+        ]
 
     @property
     def estimates(self) -> dict[str, float]:
@@ -99,26 +102,46 @@ class Identification(ByValue):
         """
         generator = np.random.default_rng(validation.count("seed", seed, 0))
         normal = generator.standard_normal(
-            (validation.count("count", count, at_most=validation.MOST_DRAWS), len(self.names))
+            (
+                validation.count("count", count, at_most=validation.MOST_DRAWS),
+                len(self.names),
+            )
         )
-        drawn = draws(self.names, self.values, self.standard_errors, self.correlations, normal)
+        drawn = draws(
+            self.names, self.values, self.standard_errors, self.correlations, normal
+        )
         found = dict(zip(self.names, drawn.T.copy(), strict=True))
         result = {name: values for name, values in found.items() if name in NUMBERS}
         if "mu_c" in found or "mu_s" in found:
-            result["mu_s"] = np.maximum(found.get("mu_s", self.law.mu_s), found.get("mu_c", self.law.mu_c))
-        if not {"contact_radius", "centre_x", "centre_y"}.isdisjoint(found) and not self.model.depends_on_load:
+            result["mu_s"] = np.maximum(
+                found.get("mu_s", self.law.mu_s), found.get("mu_c", self.law.mu_c)
+            )
+        if (
+            not {"contact_radius", "centre_x", "centre_y"}.isdisjoint(found)
+            and not self.model.depends_on_load
+        ):
             result |= self._places(found, count)
         return result
 
-    def _places(self, found: Mapping[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+    def _places(
+        self, found: Mapping[str, np.ndarray], count: int
+    ) -> dict[str, np.ndarray]:
         """Return size and displacement of the fitted patch for draws of its radius and its centre of pressure."""
-        scale = found.get("contact_radius", np.ones(count)) / self.estimates.get("contact_radius", 1.0)
-        middle = zip(("centre_x", "centre_y"), self.model.patch.centre_of_pressure(), strict=True)
-        return {"scale": scale} | {name: found.get(name, own) - scale * own for name, own in middle}
+        scale = found.get("contact_radius", np.ones(count)) / self.estimates.get(
+            "contact_radius", 1.0
+        )
+        middle = zip(
+            ("centre_x", "centre_y"), self.model.patch.centre_of_pressure(), strict=True
+        )
+        return {"scale": scale} | {
+            name: found.get(name, own) - scale * own for name, own in middle
+        }
 
     def identifiable(self, name: str) -> bool:
         """Return True if the data determine this parameter."""
-        return not any(each.parameter == name and not each.identifiable for each in self.verdicts)
+        return not any(
+            each.parameter == name and not each.identifiable for each in self.verdicts
+        )
 
     def residual_correlations(self, lags: int = 50) -> np.ndarray:
         """Compute the autocorrelations of the residuals at 0 to `lags` samples, `[lags + 1, C]`.
@@ -139,27 +162,49 @@ class Identification(ByValue):
     def summary(self) -> str:
         """Return the verdict in plain words: the parameters that the data determine, and the trust in the fit."""
         known = [name for name in self.names if self.identifiable(name)]
-        lines = [f"Identified: {', '.join(known)}." if known else "None of the parameters is identifiable."]
+        lines = [
+            f"Identified: {', '.join(known)}."
+            if known
+            else "None of the parameters is identifiable."
+        ]
         if 0 < len(known) < len(self.names):
-            lines[0] += f" Not identifiable: {', '.join(name for name in self.names if name not in known)}."
+            lines[0] += (
+                f" Not identifiable: {', '.join(name for name in self.names if name not in known)}."
+            )
         reasons = [each.reason for each in self.verdicts if each.parameter == "fit"]
         lines += [f"{reason[0].upper()}{reason[1:]}." for reason in reasons]
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 
     def table(self) -> str:
         """Return text in 80 columns: estimates, goodness of fit, correlations, then the verdicts and the rig."""
-        lines, remarks, intervals = [], [], self.intervals()
-        for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
+        lines = []
+        remarks = []
+        intervals = self.intervals()
+        for name, value, error in zip(
+            self.names, self.values, self.standard_errors, strict=True
+        ):
             shown = " to ".join(_digits(end, 4) for end in intervals[name])
-            spread = _digits(error, 2) if error < 1e3 * max(abs(value), 1e-12) else "unknown"
+            spread = (
+                _digits(error, 2) if error < 1e3 * max(abs(value), 1e-12) else "unknown"
+            )
             between = shown if self.identifiable(name) else "not identifiable"
-            lines.append(f"{name:<15}{_digits(value, 5):>12}{spread:>12}  {between:<25}{ALL[name].unit}".rstrip())
-            if reasons := [each.reason for each in self.verdicts if each.parameter == name]:
-                remarks.append(textwrap.fill(f"{name}: {'; '.join(reasons)}", WIDTH, subsequent_indent="  "))
+            lines.append(
+                f"{name:<15}{_digits(value, 5):>12}{spread:>12}  {between:<25}{ALL[name].unit}".rstrip()
+            )
+            if reasons := [
+                each.reason for each in self.verdicts if each.parameter == name
+            ]:
+                remarks.append(
+                    textwrap.fill(
+                        f"{name}: {'; '.join(reasons)}", WIDTH, subsequent_indent="  "
+                    )
+                )
         heading = f"{'parameter':<15}{'value':>12}{'std. error':>12}  {'95 % interval':<25}unit"
         if self.scores:
             samples = f"{self.samples[0]:,} samples, {len(self.names)} parameters"
-            lines.append(f"reduced chi-square {_digits(self.scores[0].reduced_chi2, 4)} ({samples})")
+            lines.append(
+                f"reduced chi-square {_digits(self.scores[0].reduced_chi2, 4)} ({samples})"
+            )
         rig = [
             f"{_short(each):<27}{each.value:>11.3g}  {' to '.join(f'{end:.3g}' for end in each.interval)} {each.unit}"
             for each in self.rig
@@ -169,15 +214,27 @@ class Identification(ByValue):
             self._pairs(),
             [self.summary()],
             remarks,
-            [f"{'disturbance of the rig':<27}{'value':>11}  95 % interval, unit", *rig] if rig else [],
+            [f"{'disturbance of the rig':<27}{'value':>11}  95 % interval, unit", *rig]
+            if rig
+            else [],
         ]
         return "\n\n".join("\n".join(block) for block in blocks if block)
 
     def _pairs(self) -> list[str]:
         """Return lines on the most strongly correlated pairs of estimates, the strongest first."""
-        pairs = [(self.correlations[i, j], i, j) for j in range(len(self.names)) for i in range(j)]
-        pairs = sorted((each for each in pairs if abs(each[0]) >= CORRELATED), key=lambda each: -abs(each[0]))[:PAIRS]
-        lines = [f"{f'{self.names[i]}, {self.names[j]}':<27}{value:+.3f}" for value, i, j in pairs]
+        pairs = [
+            (self.correlations[i, j], i, j)
+            for j in range(len(self.names))
+            for i in range(j)
+        ]
+        pairs = sorted(
+            (each for each in pairs if abs(each[0]) >= CORRELATED),
+            key=lambda each: -abs(each[0]),
+        )[:PAIRS]
+        lines = [
+            f"{f'{self.names[i]}, {self.names[j]}':<27}{value:+.3f}"
+            for value, i, j in pairs
+        ]
         return [f"correlations of {CORRELATED} and more", *lines] if lines else []
 
     def __repr__(self) -> str:
@@ -192,29 +249,53 @@ class Identification(ByValue):
         def plain(value: float) -> float | None:
             return float(value) if np.isfinite(value) else None
 
-        def estimate(value: float, error: float, interval: tuple[float, float], unit: str) -> dict[str, Any]:
+        def estimate(
+            value: float, error: float, interval: tuple[float, float], unit: str
+        ) -> dict[str, Any]:
             edges = [plain(edge) for edge in interval]
-            return {"estimate": float(value), "standard_error": plain(error), "interval_95": edges, "unit": unit}
+            return {
+                "estimate": float(value),
+                "standard_error": plain(error),
+                "interval_95": edges,
+                "unit": unit,
+            }
 
         intervals = self.intervals()
         parameters = {
-            name: {**estimate(value, error, intervals[name], ALL[name].unit), "identifiable": self.identifiable(name)}
-            for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True)
+            name: {
+                **estimate(value, error, intervals[name], ALL[name].unit),
+                "identifiable": self.identifiable(name),
+            }
+            for name, value, error in zip(
+                self.names, self.values, self.standard_errors, strict=True
+            )
         }
         return {
             "parameters": parameters,
-            "correlations": {name: row.tolist() for name, row in zip(self.names, self.correlations, strict=True)},
+            "correlations": {
+                name: row.tolist()
+                for name, row in zip(self.names, self.correlations, strict=True)
+            },
             "verdicts": [str(each) for each in self.verdicts],
-            "noise": {name: plain(value) for (name, _), value in zip(self.channels, self.noise, strict=True)},
+            "noise": {
+                name: plain(value)
+                for (name, _), value in zip(self.channels, self.noise, strict=True)
+            },
             "rig": [
-                {"name": each.name, "log": each.log, **estimate(each.value, each.error, each.interval, each.unit)}
+                {
+                    "name": each.name,
+                    "log": each.log,
+                    **estimate(each.value, each.error, each.interval, each.unit),
+                }
                 for each in self.rig
             ],
             "model": self.chosen,
             "models": [each._asdict() for each in self.scores],
             "residual_correlations": {
                 name: column.tolist()
-                for (name, _), column in zip(self.channels, self.residual_correlations().T, strict=True)
+                for (name, _), column in zip(
+                    self.channels, self.residual_correlations().T, strict=True
+                )
             },
             "samples": {"used": self.samples[0], "total": self.samples[1]},
             "starts": {"agreeing": self.starts[0], "total": self.starts[1]},
@@ -228,7 +309,11 @@ class Identification(ByValue):
 def _digits(value: float, count: int) -> str:
     """Return a number with `count` significant digits, without an exponent where it has few zeros."""
     text = f"{value:.{count}g}"
-    return np.format_float_positional(float(text), trim="-") if 1e-3 <= abs(value) < 1e6 else text
+    return (
+        np.format_float_positional(float(text), trim="-")
+        if 1e-3 <= abs(value) < 1e6
+        else text
+    )
 
 
 def _short(each: Nuisance) -> str:

@@ -89,7 +89,8 @@ class Rig:
     """Nuisance parameters of logs, K of them, in the order of `columns`."""
 
     def __init__(self, logs: Sequence[Log], groups: Sequence[str]):
-        self.logs, self.groups = logs, tuple(groups)
+        self.logs = logs
+        self.groups = tuple(groups)
         columns = [_Column("delay", "s", None, DELAY)] if "delay" in groups else []
         columns += [_Column("load_scale", "-", None, SCALE)] if "load" in groups else []
         for i, log in enumerate(logs):
@@ -97,23 +98,47 @@ class Rig:
             largest[:2] = np.maximum(largest[:2], LEAST_FORCE * largest[:2].max())
             for k, (channel, unit) in enumerate(CHANNELS):
                 if "bias" in groups and log.channels[k]:
-                    columns.append(_Column(f"bias_{channel}", unit, i, BIAS * largest[k], 0, k))
-                    columns.append(_Column(f"zero_drift_{channel}", unit, i, ZERO_DRIFT * largest[k], 1, k))
+                    columns.append(
+                        _Column(f"bias_{channel}", unit, i, BIAS * largest[k], 0, k)
+                    )
+                    columns.append(
+                        _Column(
+                            f"zero_drift_{channel}",
+                            unit,
+                            i,
+                            ZERO_DRIFT * largest[k],
+                            1,
+                            k,
+                        )
+                    )
             for k, width in enumerate(DRIFT if "load" in groups else (), start=1):
-                columns.append(_Column("load_drift" if k == 1 else f"load_drift_{k}", "-", i, width, k))
+                columns.append(
+                    _Column(
+                        "load_drift" if k == 1 else f"load_drift_{k}", "-", i, width, k
+                    )
+                )
         self.columns = tuple(columns)
         self.widths = np.array([each.width for each in columns])
-        self.limits = np.array([LONGEST / DELAY if each.name == "delay" else np.inf for each in columns])
+        self.limits = np.array(
+            [LONGEST / DELAY if each.name == "delay" else np.inf for each in columns]
+        )
         """Largest sizes of the values, over their widths, `[K]`."""
 
     def _effects(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivatives `[T, K]` of the factor on the wrench of log i, and those `[T, 3, K]` of its zeros."""
         time = self.logs[i].time
-        shapes = np.polynomial.legendre.legvander(2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0, len(DRIFT))
-        factor, zeros = np.zeros((len(time), len(self.columns))), np.zeros((len(time), 3, len(self.columns)))
+        shapes = np.polynomial.legendre.legvander(
+            2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0, len(DRIFT)
+        )
+        factor = np.zeros((len(time), len(self.columns)))
+        zeros = np.zeros((len(time), 3, len(self.columns)))
         for j, column in enumerate(self.columns):
             if column.log in (None, i) and column.name != "delay":
-                changed = factor[:, j] if column.channel is None else zeros[:, column.channel, j]
+                changed = (
+                    factor[:, j]
+                    if column.channel is None
+                    else zeros[:, column.channel, j]
+                )
                 changed[:] = shapes[:, column.degree]
         return factor, zeros
 
@@ -129,21 +154,30 @@ class Rig:
         `later` is the derivative of the wrench with respect to the delay.
         """
         by_factor, by_zeros = self._effects(i)
-        factor, slopes = 1.0 + by_factor @ values, by_factor[:, None] * wrench[:, :, None] + by_zeros
+        factor = 1.0 + by_factor @ values
+        slopes = by_factor[:, None] * wrench[:, :, None] + by_zeros
         if "delay" in self.groups:
             slopes[:, :, 0] = factor[:, None] * later
         return factor[:, None] * wrench + by_zeros @ values, factor, slopes
 
     def with_drift(self, values: np.ndarray) -> np.ndarray:
         """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift, half its largest range."""
-        drift = max(0.5 * float(np.ptp(self._effects(i)[0] @ values)) for i in range(len(self.logs)))
-        scales = np.array([each.name == "load_scale" for each in self.columns], dtype=bool)
+        drift = max(
+            0.5 * float(np.ptp(self._effects(i)[0] @ values))
+            for i in range(len(self.logs))
+        )
+        scales = np.array(
+            [each.name == "load_scale" for each in self.columns], dtype=bool
+        )
         return np.where(scales, np.hypot(SCALE, drift / EDGE), self.widths)
 
     def strains(self, values: np.ndarray) -> list[tuple[float, str]]:
         """Return the size of each value `[K]` over its width and in words, the largest first."""
         both = zip(self.columns, values, strict=True)
-        words = [f"{column.name} {value:.2g} {column.unit}".removesuffix(" -") for column, value in both]
+        words = [
+            f"{column.name} {value:.2g} {column.unit}".removesuffix(" -")
+            for column, value in both
+        ]
         sizes = np.abs(values / self.with_drift(values))
         return sorted(zip(sizes.tolist(), words, strict=True), reverse=True)
 
@@ -151,7 +185,13 @@ class Rig:
         """Return the estimates `[K]` with their standard errors `[K]` as records."""
         several = len(self.logs) > 1
         return tuple(
-            Nuisance(c.name, c.unit, float(v), float(e), self.logs[c.log].name if several and c.log is not None else "")
+            Nuisance(
+                c.name,
+                c.unit,
+                float(v),
+                float(e),
+                self.logs[c.log].name if several and c.log is not None else "",
+            )
             for c, v, e in zip(self.columns, values, errors, strict=True)
         )
 
@@ -174,7 +214,10 @@ def jitter(values: np.ndarray) -> np.ndarray:
     sigma = MEDIAN * np.median(differences, axis=0)
     for _ in range(CLIPPED):
         kept = differences <= CLIP * sigma
-        sigma = np.sqrt(np.sum(np.where(kept, differences, 0.0) ** 2, axis=0) / np.maximum(kept.sum(axis=0), 1))
+        sigma = np.sqrt(
+            np.sum(np.where(kept, differences, 0.0) ** 2, axis=0)
+            / np.maximum(kept.sum(axis=0), 1)
+        )
         sigma = sigma / np.sqrt(CLIP_VARIANCE)
     return sigma
 
@@ -194,11 +237,16 @@ def wrench_noise(logs: Sequence[Log], *residuals: Sequence[np.ndarray]) -> np.nd
     """
     sigmas = []
     for values in ([log.wrench for log in logs], *residuals):
-        squares = [len(v) * np.where(log.channels, jitter(v), 0.0) ** 2 for log, v in zip(logs, values, strict=True)]
+        squares = [
+            len(v) * np.where(log.channels, jitter(v), 0.0) ** 2
+            for log, v in zip(logs, values, strict=True)
+        ]
         samples = np.sum([len(log.time) * log.channels for log in logs], axis=0)
         sigmas.append(np.sqrt(np.sum(squares, axis=0) / np.maximum(samples, 1)))
     measured = np.any([log.channels for log in logs], axis=0)
-    return np.where(measured, np.maximum(np.min(sigmas, axis=0), least_noise(logs)), np.inf)
+    return np.where(
+        measured, np.maximum(np.min(sigmas, axis=0), least_noise(logs)), np.inf
+    )
 
 
 class SmoothTwist(NamedTuple):
@@ -216,7 +264,9 @@ class SmoothTwist(NamedTuple):
     @property
     def noisy(self) -> np.ndarray:
         """Mask `[3]` of the channels whose remaining error counts."""
-        size = np.maximum(np.sqrt(np.mean(self.values**2, axis=0)), np.finfo(float).tiny)
+        size = np.maximum(
+            np.sqrt(np.mean(self.values**2, axis=0)), np.finfo(float).tiny
+        )
         return self.left > QUIET * size
 
     def error(self, random: np.random.Generator) -> np.ndarray:
@@ -225,7 +275,9 @@ class SmoothTwist(NamedTuple):
         for k, weight in enumerate(self.weights):
             if weight > 0.0:
                 drawn[:, k] = _solved(drawn[:, k], weight)
-            drawn[:, k] *= self.left[k] / max(np.sqrt(np.mean(drawn[:, k] ** 2)), np.finfo(float).tiny)
+            drawn[:, k] *= self.left[k] / max(
+                np.sqrt(np.mean(drawn[:, k] ** 2)), np.finfo(float).tiny
+            )
         return drawn
 
 
@@ -240,7 +292,9 @@ def smoothed(log: Log) -> SmoothTwist:
     if log.even and len(log.time) >= LEAST_TO_SMOOTH:
         size = np.maximum(np.sqrt(np.mean(log.twist**2, axis=0)), np.finfo(float).tiny)
         for k in np.flatnonzero(found.noise > QUIET * size):
-            found.values[:, k], found.noise[k], found.left[k], found.weights[k] = _smooth(log.twist[:, k])
+            found.values[:, k], found.noise[k], found.left[k], found.weights[k] = (
+                _smooth(log.twist[:, k])
+            )
     return found
 
 
@@ -254,11 +308,17 @@ def _joined(parts: Sequence[SmoothTwist]) -> SmoothTwist:
     """Join the parts of a log: mean squares of errors, and the median weights."""
     sizes = [len(part.values) for part in parts]
     noise, left = (
-        np.sqrt(np.average([getattr(part, name) ** 2 for part in parts], axis=0, weights=sizes))
+        np.sqrt(
+            np.average(
+                [getattr(part, name) ** 2 for part in parts], axis=0, weights=sizes
+            )
+        )
         for name in ("noise", "left")
     )
     weights = np.median([part.weights for part in parts], axis=0)
-    return SmoothTwist(np.concatenate([part.values for part in parts]), noise, left, weights)
+    return SmoothTwist(
+        np.concatenate([part.values for part in parts]), noise, left, weights
+    )
 
 
 def _smooth(values: np.ndarray) -> tuple[np.ndarray, float, float, float]:
@@ -278,8 +338,16 @@ def _smooth(values: np.ndarray) -> tuple[np.ndarray, float, float, float]:
         score = square / (1.0 - freedom) ** 2
         if score < best[0]:
             variance = square / (1.0 - freedom)
-            error = max(square + 2.0 * variance * freedom - variance, variance * freedom)
-            best = score, smooth, float(np.sqrt(variance)), float(np.sqrt(error)), float(weight)
+            error = max(
+                square + 2.0 * variance * freedom - variance, variance * freedom
+            )
+            best = (
+                score,
+                smooth,
+                float(np.sqrt(variance)),
+                float(np.sqrt(error)),
+                float(weight),
+            )
     return best[1:]
 
 
@@ -287,10 +355,13 @@ def _solved(values: np.ndarray, weight: float) -> np.ndarray:
     """Solve `(1 + weight D'D) x = values` for x `[T]`, with D the matrix of third differences."""
     from scipy.linalg import solveh_banded
 
-    count, row = len(values), (-1.0, 3.0, -3.0, 1.0)
+    count = len(values)
+    row = (-1.0, 3.0, -3.0, 1.0)
     bands = np.zeros((ORDER + 1, count))
     for shift in range(ORDER + 1):  # upper bands
         for i in range(ORDER + 1 - shift):
-            bands[ORDER - shift, i + shift : count - ORDER + i + shift] += weight * row[i] * row[i + shift]
+            bands[ORDER - shift, i + shift : count - ORDER + i + shift] += (
+                weight * row[i] * row[i + shift]
+            )
     bands[ORDER] += 1.0
     return solveh_banded(bands, values)

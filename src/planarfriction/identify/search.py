@@ -42,16 +42,21 @@ SCATTER = 0.7
 """Standard deviation of the logarithms of starts around a given one."""
 
 
-def multistart(problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray) -> Fit:
+def multistart(
+    problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray
+) -> Fit:
     """Find the best rough fit from starts `[F]` or `[F + K]`, with the same noise for all samples of a channel."""
-    coordinates, sigma = problem.coordinates(starts[0]), problem.even_sigma(noise)
+    coordinates = problem.coordinates(starts[0])
+    sigma = problem.even_sigma(noise)
     points = [coordinates.of(each) for each in starts]
     return _best(problem, coordinates, points, noise, sigma, ROUGH)
 
 
 def refine(fit: Fit) -> Fit:
     """Find the best fit that a rough one leads to: noise from what is left, steps as fine as the errors ask for."""
-    problem, coordinates, starts = fit.problem, fit.coordinates, fit.starts
+    problem = fit.problem
+    coordinates = fit.coordinates
+    starts = fit.starts
     for turn in range(ROUNDS):
         noise, sigma = problem.estimate_noise(fit.values, fit.noise)
         settled = turn > 0 and np.allclose(noise, fit.noise, rtol=STEADY, atol=0.0)
@@ -61,13 +66,17 @@ def refine(fit: Fit) -> Fit:
             problem.report(f"{problem.steps} steps between two samples")
         elif settled:
             break
-        fit = _best(problem, coordinates, [fit.x], noise, sigma, ROUGH if finer else FINE)
+        fit = _best(
+            problem, coordinates, [fit.x], noise, sigma, ROUGH if finer else FINE
+        )
     problem.forget()
     found = _best(problem, coordinates, [fit.x], noise, sigma, FINE)
     return found._replace(starts=starts)
 
 
-def warm_start(problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray) -> Fit:
+def warm_start(
+    problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray
+) -> Fit:
     """Find the best rough fit of another model than that of `lead`, from where this ended and from the best guess.
 
     A lead that does not fit ends far away, and one that fits may stay where the corner of the bristles is not seen.
@@ -84,7 +93,9 @@ def interruptible(problems: Sequence[Problem]) -> Iterator[None]:
     except KeyboardInterrupt:
         for problem in reversed(problems):
             if problem.so_far is not None:
-                raise IdentificationInterrupted(problem.by_name(problem.so_far)) from None
+                raise IdentificationInterrupted(
+                    problem.by_name(problem.so_far)
+                ) from None
         raise
 
 
@@ -99,24 +110,45 @@ class Descent:
     its steps vanish, if derivatives that are kept from nearby promise a gain that is not there.
     """
 
-    def __init__(self, residuals: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], x: np.ndarray, share: float):
-        self.residuals, self.x, self.share = residuals, x, share
-        self.cost, self._last = np.inf, (np.empty(0), np.empty(0))
+    def __init__(
+        self,
+        residuals: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+        x: np.ndarray,
+        share: float,
+    ):
+        self.residuals = residuals
+        self.x = x
+        self.share = share
+        self.cost = np.inf
+        self._last = (np.empty(0), np.empty(0))
 
     def run(self, bounds: tuple[np.ndarray, np.ndarray]) -> None:
         """Minimise the sum of squares."""
         from scipy.optimize import least_squares
 
-        settings: Any = {"jac": self._jacobian, "x_scale": "jac", "xtol": 1e-9, "ftol": self.share, "gtol": 1e-12}
+        settings: Any = {
+            "jac": self._jacobian,
+            "x_scale": "jac",
+            "xtol": 1e-9,
+            "ftol": self.share,
+            "gtol": 1e-12,
+        }
         with contextlib.suppress(_SettledError):
-            least_squares(self._residual, self.x, bounds=bounds, max_nfev=MOST_EVALUATIONS, **settings)
+            least_squares(
+                self._residual,
+                self.x,
+                bounds=bounds,
+                max_nfev=MOST_EVALUATIONS,
+                **settings,
+            )
 
     def _residual(self, x: np.ndarray) -> np.ndarray:
         self._last = condensed(*self.residuals(x))
         cost = 0.5 * float(self._last[0] @ self._last[0])
         settled = abs(cost - self.cost) < self.share * cost
         if cost < self.cost:
-            self.x, self.cost = x.copy(), cost
+            self.x = x.copy()
+            self.cost = cost
         if settled:
             raise _SettledError
         return self._last[0]
@@ -137,11 +169,16 @@ def _best(
 
     Coordinates at a bound are set to it.
     """
-    residuals, bounds, evaluations = problem.residuals(coordinates, sigma), coordinates.bounds(), itertools.count(1)
-    share, found = max(change / (0.5 * problem.numbers), problem.least_change), []
+    residuals = problem.residuals(coordinates, sigma)
+    bounds = coordinates.bounds()
+    evaluations = itertools.count(1)
+    share = max(change / (0.5 * problem.numbers), problem.least_change)
+    found = []
 
     def told(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        problem.report(f"start {len(found)} of {len(points)}, evaluation {next(evaluations)}")
+        problem.report(
+            f"start {len(found)} of {len(points)}, evaluation {next(evaluations)}"
+        )
         problem.so_far = coordinates.values(min(found, key=lambda each: each.cost).x)
         return residuals(x)
 
@@ -150,22 +187,43 @@ def _best(
         found[-1].run(bounds)
     best = min(found, key=lambda each: each.cost)
     agreeing = sum(each.cost <= best.cost * (1.0 + SAME_COST) for each in found)
-    low, high = (np.abs(best.x - each) <= TOUCHING * np.maximum(1.0, np.abs(best.x)) for each in bounds)
+    low, high = (
+        np.abs(best.x - each) <= TOUCHING * np.maximum(1.0, np.abs(best.x))
+        for each in bounds
+    )
     x = np.where(low, bounds[0], np.where(high, bounds[1], best.x))
     return Fit(
-        problem, coordinates, x, coordinates.values(x), low | high, noise, sigma, (agreeing, len(points)), best.cost
+        problem,
+        coordinates,
+        x,
+        coordinates.values(x),
+        low | high,
+        noise,
+        sigma,
+        (agreeing, len(points)),
+        best.cost,
     )
 
 
-def condensed(residual: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def condensed(
+    residual: np.ndarray, jacobian: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Reduce residuals `[M]` and derivatives `[M, F]` to `F + 1` rows with the same sums of squares and products.
 
     They are the triangle of `[J, r] = Q R`: all that least squares needs, at a fraction of the cost.
     """
     rows = np.column_stack([jacobian, residual])
-    count, width = len(rows) // IN_CACHE, rows.shape[1]
-    blocks = np.asarray(np.linalg.qr(rows[: count * IN_CACHE].reshape(count, IN_CACHE, width), mode="r"))
-    triangle = np.asarray(np.linalg.qr(np.concatenate([blocks.reshape(-1, width), rows[count * IN_CACHE :]]), mode="r"))
+    count = len(rows) // IN_CACHE
+    width = rows.shape[1]
+    blocks = np.asarray(
+        np.linalg.qr(rows[: count * IN_CACHE].reshape(count, IN_CACHE, width), mode="r")
+    )
+    triangle = np.asarray(
+        np.linalg.qr(
+            np.concatenate([blocks.reshape(-1, width), rows[count * IN_CACHE :]]),
+            mode="r",
+        )
+    )
     return triangle[:, -1], triangle[:, :-1]
 
 
@@ -173,7 +231,12 @@ def condensed(residual: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, n
 
 
 def guess_starts(
-    problem: LogProblem, given: dict[str, float] | None, *, starts: int, seed: int, noise: np.ndarray
+    problem: LogProblem,
+    given: dict[str, float] | None,
+    *,
+    starts: int,
+    seed: int,
+    noise: np.ndarray,
 ) -> list[np.ndarray]:
     """Return `starts` vectors of values `[F]`, the best first.
 
@@ -183,9 +246,17 @@ def guess_starts(
     random = np.random.default_rng(seed)
     if given is None:
         first = problem.start_values()
-        return [first, *(_scattered(first, problem.names, random) for _ in range(starts - 1))]
-    ranked = sorted(_grid(problem, given), key=lambda values: misfit(problem, values, noise))
-    return ranked[:starts] + [_scattered(ranked[0], problem.names, random) for _ in range(starts - len(ranked))]
+        return [
+            first,
+            *(_scattered(first, problem.names, random) for _ in range(starts - 1)),
+        ]
+    ranked = sorted(
+        _grid(problem, given), key=lambda values: misfit(problem, values, noise)
+    )
+    return ranked[:starts] + [
+        _scattered(ranked[0], problem.names, random)
+        for _ in range(starts - len(ranked))
+    ]
 
 
 def _grid(problem: LogProblem, given: dict[str, float]) -> list[np.ndarray]:
@@ -196,10 +267,25 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> list[np.ndarray]:
     wanted = [name for name in problem.names if name not in given]
     interval = min(log.interval for log in problem.logs)
     results = []
-    for v_s in _speeds(np.concatenate(speeds)) if "v_s" in wanted else [problem.law.v_s]:
-        for sigma_0 in _stiffnesses(problem, speeds, mu_c) if "sigma_0" in wanted else [problem.law.sigma_0]:
-            guess = {"mu_c": mu_c, "mu_s": mu_s, "v_s": v_s, "gamma": 1.5, "sigma_0": sigma_0}
-            guess |= {"sigma_1": 0.3 * sigma_0 * interval, "sigma_2": 0.02 * mu_c / max(np.max(speeds[0]), 1e-9)}
+    for v_s in (
+        _speeds(np.concatenate(speeds)) if "v_s" in wanted else [problem.law.v_s]
+    ):
+        for sigma_0 in (
+            _stiffnesses(problem, speeds, mu_c)
+            if "sigma_0" in wanted
+            else [problem.law.sigma_0]
+        ):
+            guess = {
+                "mu_c": mu_c,
+                "mu_s": mu_s,
+                "v_s": v_s,
+                "gamma": 1.5,
+                "sigma_0": sigma_0,
+            }
+            guess |= {
+                "sigma_1": 0.3 * sigma_0 * interval,
+                "sigma_2": 0.02 * mu_c / max(np.max(speeds[0]), 1e-9),
+            }
             picked = {name: guess[name] for name in wanted if name in guess}
             results.append(np.array([*(problem.by_name(base) | picked).values()]))
     return results
@@ -207,9 +293,11 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> list[np.ndarray]:
 
 def _friction(problem: LogProblem, speeds: list[np.ndarray]) -> tuple[float, float]:
     """Estimate the friction coefficients of fast sliding and of the largest friction."""
-    coefficient, speed = np.concatenate(problem.coefficients(problem.start_values())), np.concatenate(speeds)
+    coefficient = np.concatenate(problem.coefficients(problem.start_values()))
+    speed = np.concatenate(speeds)
     usable = np.isfinite(coefficient)
-    coefficient, speed = coefficient[usable], speed[usable]
+    coefficient = coefficient[usable]
+    speed = speed[usable]
     fast = coefficient[speed >= np.quantile(speed, 0.7)]
     mu_c = float(np.clip(np.median(fast), 0.01, 10.0))
     return mu_c, float(np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c))
@@ -224,13 +312,18 @@ def _speeds(speeds: np.ndarray) -> np.ndarray:
     return np.geomspace(max(low, 1e-3 * high), high, SPEEDS)
 
 
-def _stiffnesses(problem: LogProblem, speeds: list[np.ndarray], mu_c: float) -> np.ndarray:
+def _stiffnesses(
+    problem: LogProblem, speeds: list[np.ndarray], mu_c: float
+) -> np.ndarray:
     """Return stiffnesses to try [1/m]: full deflection after a tenth of a usual step up to a tenth of all travel."""
-    steps = np.concatenate([s * log.durations for s, log in zip(speeds, problem.logs, strict=True)])
+    steps = np.concatenate(
+        [s * log.durations for s, log in zip(speeds, problem.logs, strict=True)]
+    )
     moving = steps[steps > 0.0]
     if not len(moving):
         return np.array([LuGre.sigma_0])
-    short, long = 0.1 * np.median(moving), 0.1 * moving.sum()
+    short = 0.1 * np.median(moving)
+    long = 0.1 * moving.sum()
     return np.geomspace(mu_c / short, mu_c / max(long, 10.0 * short), STIFFNESSES)
 
 
@@ -239,9 +332,13 @@ def misfit(problem: LogProblem, values: np.ndarray, noise: np.ndarray) -> float:
     return float((problem.residual(values, problem.even_sigma(noise)) ** 2).sum())
 
 
-def _scattered(values: np.ndarray, names: Sequence[str], random: np.random.Generator) -> np.ndarray:
+def _scattered(
+    values: np.ndarray, names: Sequence[str], random: np.random.Generator
+) -> np.ndarray:
     factor = np.exp(SCATTER * random.standard_normal(len(values)))
-    positive = np.array([ALL[name].logarithmic or name.startswith("sigma") for name in names])
+    positive = np.array(
+        [ALL[name].logarithmic or name.startswith("sigma") for name in names]
+    )
     return np.where(positive, values * factor, values)
 
 
@@ -276,24 +373,35 @@ def stretches(fit: Fit, u: Uncertainty) -> np.ndarray:
 
 def _stretch(fit: Fit, i: int, way: np.ndarray, sign: float) -> float:
     """Return the factor on the standard error of value i on one side, along the `way` `[F + K]` that it would take."""
-    problem, coordinates = fit.problem, fit.coordinates
-    residuals, share = problem.residuals(coordinates, fit.sigma), way[i] / fit.values[i]
+    problem = fit.problem
+    coordinates = fit.coordinates
+    residuals = problem.residuals(coordinates, fit.sigma)
+    share = way[i] / fit.values[i]
     own = ALL[problem.names[i]]
     factor: float = 1.0
     wanted = 0.5 * REACH**2
     for _ in range(TRIES):
-        by = np.exp(sign * factor * share) if own.logarithmic else 1.0 + sign * factor * share
+        by = (
+            np.exp(sign * factor * share)
+            if own.logarithmic
+            else 1.0 + sign * factor * share
+        )
         target = fit.values[i] * by
         if not own.low < target < own.high:
             break
 
         def held(x: np.ndarray, at: float = target) -> tuple[np.ndarray, np.ndarray]:
             rows, slopes = residuals(x)
-            off, slope = coordinates.values(x)[i] / at - 1.0, coordinates.slopes(x)[i] / at
-            return np.append(rows, STIFF * off), np.concatenate([slopes, STIFF * slope[None]])
+            off = coordinates.values(x)[i] / at - 1.0
+            slope = coordinates.slopes(x)[i] / at
+            return np.append(rows, STIFF * off), np.concatenate(
+                [slopes, STIFF * slope[None]]
+            )
 
         start = fit.values + way * (target - fit.values[i]) / way[i]
-        search: Descent = Descent(held, coordinates.of(start), SETTLED / max(fit.cost, 1.0))
+        search: Descent = Descent(
+            held, coordinates.of(start), SETTLED / max(fit.cost, 1.0)
+        )
         search.run(coordinates.bounds())
         rise: float = search.cost - fit.cost
         factor *= min(max(np.sqrt(wanted / max(rise, 1e-9)), 1.0), 2.0)

@@ -48,7 +48,12 @@ class PublishedSimulator:
     own_radius = True
     """True if the contact radius is a number of its own, not that of the cells; the patch may then change with load."""
 
-    def __init__(self, patch: ContactPatch, law: LuGre, surface: type[LimitSurface] = LimitSurfaceTablePublished):
+    def __init__(
+        self,
+        patch: ContactPatch,
+        law: LuGre,
+        surface: type[LimitSurface] = LimitSurfaceTablePublished,
+    ):
         self._model = self.model(patch, law, surface)
 
     @classmethod
@@ -56,13 +61,19 @@ class PublishedSimulator:
         """Make the friction model of a patch and a law."""
         return ReducedModelPublished(patch, law, surface=surface(patch))
 
-    def wrenches(self, twists: np.ndarray, loads: np.ndarray, dt: float, vector: np.ndarray) -> np.ndarray:
+    def wrenches(
+        self, twists: np.ndarray, loads: np.ndarray, dt: float, vector: np.ndarray
+    ) -> np.ndarray:
         """Compute the wrenches `[N, 3]`."""
         return rollout(self._model, None, twists, loads, dt, parameters=vector).wrenches
 
-    def sensitivities(self, twists, loads, dt, vector, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    def sensitivities(
+        self, twists, loads, dt, vector, names: Sequence[str]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Compute the wrenches `[N, 3]` and their derivatives `[N, 3, P]`."""
-        found = rollout_jacobian(self._model, None, twists, loads, dt, names, parameters=vector)
+        found = rollout_jacobian(
+            self._model, None, twists, loads, dt, names, parameters=vector
+        )
         return found.wrenches, found.d_wrenches
 
     def work(self, parameters: int) -> float:
@@ -81,8 +92,13 @@ class DistributedSimulator(PublishedSimulator):
     own_radius = False
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
-        self._radius, self._centre = float(patch.contact_radius()), patch.centre_of_pressure()
-        few = patch.discs(DISCS) if self.model_class is DistributedModel and patch.cells > CELLS else patch
+        self._radius = float(patch.contact_radius())
+        self._centre = patch.centre_of_pressure()
+        few = (
+            patch.discs(DISCS)
+            if self.model_class is DistributedModel and patch.cells > CELLS
+            else patch
+        )
         self._model = self.model(few, law, surface)
 
     @classmethod
@@ -91,34 +107,46 @@ class DistributedSimulator(PublishedSimulator):
 
     def wrenches(self, twists, loads, dt, vector):
         own = vector[: len(LAW_NAMES)]
-        roll = lambda inner: rollout(self._model, None, inner, loads, dt, parameters=own).wrenches  # noqa: E731
+        roll = lambda inner: (
+            rollout(self._model, None, inner, loads, dt, parameters=own).wrenches
+        )
         return self._placed(vector, twists, roll)
 
     def _placed(self, vector, twists, work):
         s = vector[RADIUS] / self._radius
         dx, dy = vector[CENTRE] - s * self._centre
         vx, vy, omega = twists.T
-        inner = np.ascontiguousarray(np.stack([vx - omega * dy, vy + omega * dx, s * omega], -1))
+        inner = np.ascontiguousarray(
+            np.stack([vx - omega * dy, vy + omega * dx, s * omega], -1)
+        )
         fx, fy, tau = np.moveaxis(work(inner), 1, 0)
         return np.stack([fx, fy, s * tau + dx * fy - dy * fx], 1)
 
     def sensitivities(self, twists, loads, dt, vector, names):
-        of_law, shape = ([name for name in names if name in group] for group in (LAW_NAMES, SHAPE))
-        own, slopes = vector[: len(LAW_NAMES)], np.zeros((len(twists), 3, len(names)))
+        of_law, shape = (
+            [name for name in names if name in group] for group in (LAW_NAMES, SHAPE)
+        )
+        own = vector[: len(LAW_NAMES)]
+        slopes = np.zeros((len(twists), 3, len(names)))
 
         def work(inner):
-            found = rollout_jacobian(self._model, None, inner, loads, dt, of_law, parameters=own)
+            found = rollout_jacobian(
+                self._model, None, inner, loads, dt, of_law, parameters=own
+            )
             return np.concatenate([found.wrenches[..., None], found.d_wrenches], -1)
 
         found = self._placed(vector, twists, work)
-        base, slopes[..., [names.index(name) for name in of_law]] = found[..., 0], found[..., 1:]
+        base = found[..., 0]
+        slopes[..., [names.index(name) for name in of_law]] = found[..., 1:]
 
         def differences(first: int, last: int) -> None:
             for name in shape[first:last]:
                 at = PARAMETERS.index(name)
                 change = CHANGE * max(abs(vector[at]), LEAST_CHANGE)
                 moved = vector + change * (np.arange(len(vector)) == at)
-                slopes[..., names.index(name)] = (self.wrenches(twists, loads, dt, moved) - base) / change
+                slopes[..., names.index(name)] = (
+                    self.wrenches(twists, loads, dt, moved) - base
+                ) / change
 
         threads.share(len(shape), len(shape), differences)
         return base, slopes
@@ -152,12 +180,25 @@ class Prediction:
     later than the motion by a `delay` [s] are read between the nodes, by cubic polynomials with continuous slopes.
     """
 
-    def __init__(self, simulator: Any, log: Log, twist: np.ndarray, *, begins: str = "rest", refine: int = 1):
+    def __init__(
+        self,
+        simulator: Any,
+        log: Log,
+        twist: np.ndarray,
+        *,
+        begins: str = "rest",
+        refine: int = 1,
+    ):
         from scipy.interpolate import Akima1DInterpolator
 
-        self.simulator, self.log = simulator, log
+        self.simulator = simulator
+        self.log = log
         length = log.time[-1] - log.time[0]
-        steps = len(log.time) - 1 if log.even else int(np.ceil(length / np.diff(log.time).min()))
+        steps = (
+            len(log.time) - 1
+            if log.even
+            else int(np.ceil(length / np.diff(log.time).min()))
+        )
         self.steps = min(steps * refine, MOST_STEPS)
         self._half = 0.5 * length / self.steps
         grid = np.linspace(log.time[0], log.time[-1], self.steps + 1)
@@ -166,18 +207,28 @@ class Prediction:
         else:
             twists = Akima1DInterpolator(log.time, twist)(grid)
         loads = np.interp(grid, log.time, log.normal_force)
-        order = np.repeat(np.arange(self.steps + 1), 2)  # 0, 0, 1, 1, 2, 2, ..., steps, steps
+        order = np.repeat(
+            np.arange(self.steps + 1), 2
+        )  # 0, 0, 1, 1, 2, 2, ..., steps, steps
         order = order[2:] if log.held else order[1:-1]
         self._first = STEADY_STEPS - 1 if begins == "steady" else 0
         order = np.pad(order, (self._first + 1, 0))
-        self._inputs: tuple[np.ndarray, np.ndarray, Any] = twists[order], loads[order], self._half
+        self._inputs: tuple[np.ndarray, np.ndarray, Any] = (
+            twists[order],
+            loads[order],
+            self._half,
+        )
         self._between: Any = 0.0
 
     def wrenches(self, vector: np.ndarray, delay: float = 0.0) -> np.ndarray:
         """Compute the wrenches `[T, 3]` at the samples."""
-        return self._read(self._nodes(self.simulator.wrenches(*self._inputs, vector)), delay)[0]
+        return self._read(
+            self._nodes(self.simulator.wrenches(*self._inputs, vector)), delay
+        )[0]
 
-    def moved(self, vector: np.ndarray, change: np.ndarray, noise: np.ndarray) -> np.ndarray:
+    def moved(
+        self, vector: np.ndarray, change: np.ndarray, noise: np.ndarray
+    ) -> np.ndarray:
         """Compute the wrenches `[T, 3]` at the samples with `change` `[3]` added to all twists.
 
         Between the windows of a decimated log it is what means leave of the `noise` `[3]` of single samples.
@@ -185,7 +236,9 @@ class Prediction:
         twists, loads, half = self._inputs
         between = np.multiply.outer(self._between, noise)
         changed = twists + np.where(between > 0.0, between, change)
-        return self._read(self._nodes(self.simulator.wrenches(changed, loads, half, vector)), 0.0)[0]
+        return self._read(
+            self._nodes(self.simulator.wrenches(changed, loads, half, vector)), 0.0
+        )[0]
 
     def sensitivities(
         self, vector: np.ndarray, names: Sequence[str], delay: float = 0.0
@@ -209,7 +262,9 @@ class Prediction:
         share = np.where(np.abs(share - np.round(share)) < 1e-9, np.round(share), share)
         t = share.reshape(-1, *(1,) * (nodes.ndim - 1))
         a, b, c, d = (nodes[np.clip(node + k, 0, self.steps)] for k in (-1, 0, 1, 2))
-        one, two, three = 0.5 * (c - a), a - 2.5 * b + 2.0 * c - 0.5 * d, 0.5 * (d - a) + 1.5 * (b - c)
+        one = 0.5 * (c - a)
+        two = a - 2.5 * b + 2.0 * c - 0.5 * d
+        three = 0.5 * (d - a) + 1.5 * (b - c)
         inside = (wanted == place).reshape(t.shape)  # before the log the contact rests
         slopes = np.where(inside, (one + t * (2.0 * two + 3.0 * t * three)) / step, 0.0)
         return b + t * (one + t * (two + t * three)), slopes
@@ -218,30 +273,58 @@ class Prediction:
 class PartsPrediction(Prediction):
     """Simulated wrenches of a decimated log: of its parts, with the motion between them in longer steps."""
 
-    def __init__(self, simulator: Any, log: DecimatedLog, twist: np.ndarray, *, begins="rest", refine: int = 1):
-        self.simulator, self.log = simulator, log
+    def __init__(
+        self,
+        simulator: Any,
+        log: DecimatedLog,
+        twist: np.ndarray,
+        *,
+        begins="rest",
+        refine: int = 1,
+    ):
+        self.simulator = simulator
+        self.log = log
         ends = np.cumsum([len(part.time) for part in log.parts])
         self._parts = [
-            Prediction(simulator, part, own, begins=begins if number == 0 else "rest", refine=refine)
-            for number, (part, own) in enumerate(zip(log.parts, np.split(twist, ends[:-1]), strict=True))
+            Prediction(
+                simulator,
+                part,
+                own,
+                begins=begins if number == 0 else "rest",
+                refine=refine,
+            )
+            for number, (part, own) in enumerate(
+                zip(log.parts, np.split(twist, ends[:-1]), strict=True)
+            )
         ]
         self.steps = sum(part.steps for part in self._parts)
-        pieces, self._spans, at = [], [], 0
+        pieces = []
+        self._spans = []
+        at = 0
         for gap, part in zip((None, *log.gaps), self._parts, strict=True):
             twists, loads, half = part._inputs
             if gap is not None:
                 pieces.append(gap.until(half, twists[0]))
                 at += len(gap.dt)
-            pieces.append((twists, loads, np.full(len(loads), half), np.zeros(len(loads))))
+            pieces.append(
+                (twists, loads, np.full(len(loads), half), np.zeros(len(loads)))
+            )
             self._spans.append(slice(at, at + len(loads)))
             at += len(loads)
-        twists, loads, dt, self._between = (np.concatenate(each) for each in zip(*pieces, strict=True))
+        twists, loads, dt, self._between = (
+            np.concatenate(each) for each in zip(*pieces, strict=True)
+        )
         self._inputs = twists, loads, dt
 
     def _nodes(self, values):
-        return [part._nodes(values[span]) for part, span in zip(self._parts, self._spans, strict=True)]
+        return [
+            part._nodes(values[span])
+            for part, span in zip(self._parts, self._spans, strict=True)
+        ]
 
     def _read(self, nodes, delay):
-        found = [part._read(own, delay) for part, own in zip(self._parts, nodes, strict=True)]
+        found = [
+            part._read(own, delay) for part, own in zip(self._parts, nodes, strict=True)
+        ]
         read, slopes = zip(*found, strict=True)
         return np.concatenate(read), np.concatenate(slopes)

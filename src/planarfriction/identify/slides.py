@@ -65,7 +65,11 @@ class Slide(ByValue):
         time = increasing(self.time, f"time of {self.name}", 5)
         pose = validation.array("pose", self.pose, (len(time), 3))
         pose[:, 2], turns = unwrapped(time, pose[:, 2], f"theta of {self.name}")
-        twist = parabola(time, pose) if self.twist is None else validation.vector("twist", self.twist, 3)
+        twist = (
+            parabola(time, pose)
+            if self.twist is None
+            else validation.vector("twist", self.twist, 3)
+        )
         self._set(time=time - time[0], pose=pose, twist=twist, turns=turns)
         for value in (self.time, self.pose, twist):
             value.setflags(write=False)
@@ -100,7 +104,9 @@ def parabola(time: np.ndarray, pose: np.ndarray, samples: int = 8) -> np.ndarray
     return np.polynomial.polynomial.polyfit(time[:count] - time[0], pose[:count], 2)[1]
 
 
-def slide_poses(model: Any, body: MassProperties, time: np.ndarray, pose: Any, twist: Any) -> np.ndarray:
+def slide_poses(
+    model: Any, body: MassProperties, time: np.ndarray, pose: Any, twist: Any
+) -> np.ndarray:
     """Simulate poses x, y, theta `[T, 3]` at `time` `[T]` of a body on `model`, from a start pose and twist `[3]` each.
 
     A body that stopped stays where it is.
@@ -111,14 +117,28 @@ def slide_poses(model: Any, body: MassProperties, time: np.ndarray, pose: Any, t
     every = max(length / max(len(time) - 1, 1), 1e-3)
     start = {"position": tuple(pose[:2]), "angle": float(pose[2]), "twist": twist}
     load = body.mass * body.gravity
-    scene = free_slide(model, mass=body.mass, inertia=body.inertia, normal_force=load, t_end=length, **start)
+    scene = free_slide(
+        model,
+        mass=body.mass,
+        inertia=body.inertia,
+        normal_force=load,
+        t_end=length,
+        **start,
+    )
     data = simulate(scene, save_every=every, **TOLERANCES).histories
     saved = data["time"].values
-    poses, twists = (np.stack([data[name].values for name in names], -1) for names in (STATES[3:], STATES[:3]))
-    return CubicHermiteSpline(saved, poses, twists)(np.minimum(time - time[0], saved[-1]))
+    poses, twists = (
+        np.stack([data[name].values for name in names], -1)
+        for names in (STATES[3:], STATES[:3])
+    )
+    return CubicHermiteSpline(saved, poses, twists)(
+        np.minimum(time - time[0], saved[-1])
+    )
 
 
-def start_slopes(model: Any, body: MassProperties, slide: Slide, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def start_slopes(
+    model: Any, body: MassProperties, slide: Slide, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Simulate poses `[T, 3]` from a start (pose, then twist, `[6]`), with derivatives `[T, 3, 6]` by differences.
 
     The start pose shifts the motion as a whole; the start angle of a contact that is not round changes more than that,
@@ -128,13 +148,20 @@ def start_slopes(model: Any, body: MassProperties, slide: Slide, start: np.ndarr
     slopes = np.zeros((*poses.shape, 6))
     slopes[:, [0, 1, 2], [0, 1, 2]] = 1.0
     for i, change in enumerate(CHANGES):
-        changed = slide_poses(model, body, slide.time, start[:3], start[3:] + change * np.eye(3)[i])
+        changed = slide_poses(
+            model, body, slide.time, start[:3], start[3:] + change * np.eye(3)[i]
+        )
         slopes[:, :, 3 + i] = (changed - poses) / change
     return poses, slopes
 
 
 def fit_start(
-    model: Any, body: MassProperties, slide: Slide, *, samples: int | None = None, noise: Any = (1e-3, 1e-3, 2e-2)
+    model: Any,
+    body: MassProperties,
+    slide: Slide,
+    *,
+    samples: int | None = None,
+    noise: Any = (1e-3, 1e-3, 2e-2),
 ) -> np.ndarray:
     """Estimate the initial pose and twist `[6]` of a slide from its first `samples` poses (None: all).
 
@@ -144,7 +171,9 @@ def fit_start(
     """
     _check(body, slide)
     part = slide if samples is None else slide.first(samples)
-    return improve_start(model, body, part, start_of(slide), check_noise("noise", noise), 3)
+    return improve_start(
+        model, body, part, start_of(slide), check_noise("noise", noise), 3
+    )
 
 
 def _check(body: Any, slide: Any) -> None:
@@ -157,16 +186,30 @@ def start_of(slide: Slide) -> np.ndarray:
     return np.concatenate([slide.pose[0], np.asarray(slide.twist)])
 
 
-def improve_start(model: Any, body: MassProperties, slide: Slide, start: np.ndarray, noise: np.ndarray, turns: int):
+def improve_start(
+    model: Any,
+    body: MassProperties,
+    slide: Slide,
+    start: np.ndarray,
+    noise: np.ndarray,
+    turns: int,
+):
     """Improve a start `[6]` by some Gauss-Newton steps."""
     for _ in range(turns):
         poses, slopes = start_slopes(model, body, slide, start)
         residual = ((slide.pose - poses) / noise).ravel()
-        start = start + np.linalg.lstsq((slopes / noise[:, None]).reshape(-1, 6), residual, rcond=None)[0]
+        start = (
+            start
+            + np.linalg.lstsq(
+                (slopes / noise[:, None]).reshape(-1, 6), residual, rcond=None
+            )[0]
+        )
     return start
 
 
-def predict_slide(model: Any, body: MassProperties, slide: Slide, *, samples: int | None = None) -> np.ndarray:
+def predict_slide(
+    model: Any, body: MassProperties, slide: Slide, *, samples: int | None = None
+) -> np.ndarray:
     """Predict the poses `[T, 3]` of a slide by the model from its initial state.
 
     The initial state is the measured one or, with `samples`, the one that `fit_start` finds from that many poses.
@@ -197,10 +240,16 @@ def window_twists(slide: Slide) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     The twist of a window is the slope of a parabola through its poses.
     """
-    times, twists, left = [], [], []
-    for rows in np.array_split(np.arange(len(slide.time)), max(len(slide.time) // WINDOW, 1)):
+    times = []
+    twists = []
+    left = []
+    for rows in np.array_split(
+        np.arange(len(slide.time)), max(len(slide.time) // WINDOW, 1)
+    ):
         since = slide.time[rows] - slide.time[rows].mean()
-        fit = np.polynomial.polynomial.polyfit(since, slide.pose[rows], 2 if len(rows) > 4 else 1)
+        fit = np.polynomial.polynomial.polyfit(
+            since, slide.pose[rows], 2 if len(rows) > 4 else 1
+        )
         left.append(slide.pose[rows] - np.polynomial.polynomial.polyval(since, fit).T)
         times.append(slide.time[rows].mean())
         twists.append(fit[1])
@@ -222,11 +271,16 @@ def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, s
         first = int(speed[: last + 1].argmin())
         free = _free(time, speed, FREE * usual)
         if grown[last] > max(GROWS * speed.max(), NOISE * noise):
-            found[i] = f"its speed grows from {speed[first]:.2g} to {speed[last]:.2g} m/s: it was pushed"
+            found[i] = (
+                f"its speed grows from {speed[first]:.2g} to {speed[last]:.2g} m/s: it was pushed"
+            )
         elif len(slides) > 2 and free > max(
-            LONG * (time[-1] - time[0]), 1.5 * (time[1] - time[0] if len(time) > 1 else 0)
+            LONG * (time[-1] - time[0]),
+            1.5 * (time[1] - time[0] if len(time) > 1 else 0),
         ):
-            found[i] = f"its speed hardly falls for {1e3 * free:.0f} ms: it lost contact, or was pushed"
+            found[i] = (
+                f"its speed hardly falls for {1e3 * free:.0f} ms: it lost contact, or was pushed"
+            )
     return found if 2 * len(found) < len(slides) else {}
 
 
@@ -241,7 +295,9 @@ def _free(time: np.ndarray, speed: np.ndarray, least: float) -> float:
     """Compute the longest time over which a moving body decelerates by less than `least` [m/s^2]."""
     brakes = -np.diff(speed) / np.diff(time) if len(time) > 1 else np.zeros(0)
     longest = since = 0.0
-    for brake, before, after, step in zip(brakes, speed[:-1], speed[1:], np.diff(time), strict=True):
+    for brake, before, after, step in zip(
+        brakes, speed[:-1], speed[1:], np.diff(time), strict=True
+    ):
         moves = min(before, after) > 0.25 * speed.max()
         since = since + step if moves and brake < least else 0.0
         longest = max(longest, since)
@@ -252,16 +308,23 @@ def weights(errors: np.ndarray) -> np.ndarray:
     """Compute the weights `[S]` of slides from their root mean square residuals: 1 near the median, 0 beyond `FAR`."""
     middle = float(np.median(errors))
     ratio = errors / middle if middle > 0.0 else np.ones(len(errors))
-    return np.where(ratio > FAR, 0.0, np.minimum(1.0, MODEST / np.maximum(ratio, 1e-300)) ** 2)
+    return np.where(
+        ratio > FAR, 0.0, np.minimum(1.0, MODEST / np.maximum(ratio, 1e-300)) ** 2
+    )
 
 
-def verdicts_on_weights(slides: Sequence[Slide], weighed: np.ndarray, errors: np.ndarray) -> list[Verdict]:
+def verdicts_on_weights(
+    slides: Sequence[Slide], weighed: np.ndarray, errors: np.ndarray
+) -> list[Verdict]:
     """Return verdicts on slides whose weight `[S]` is 0 or below 1; `errors` are residuals over the median slide's."""
     found = []
     for i in np.flatnonzero(weighed == 0.0).tolist():
         why = f"its residuals are {errors[i]:.2g} times those of the median slide"
         found.append(Verdict("fit", True, f"{slides[i].name} is left out: {why}"))
-    less = [slides[i].name for i in np.flatnonzero((weighed > 0.0) & (weighed < 1.0)).tolist()]
+    less = [
+        slides[i].name
+        for i in np.flatnonzero((weighed > 0.0) & (weighed < 1.0)).tolist()
+    ]
     if less:
         names = f"{', '.join(less[:5])}{' ...' if len(less) > 5 else ''}"
         found.append(Verdict("fit", True, f"{names} have less weight: large residuals"))
@@ -276,7 +339,12 @@ def verdicts_on_influence(
     `moved` `[S, F]` is the change of the estimates `names` without each slide, `errors` `[F]` their standard errors.
     """
     known = np.isfinite(errors) & (errors > 0.0)
-    share = np.divide(np.abs(moved), errors, out=np.zeros_like(moved), where=known & np.ones_like(moved, dtype=bool))
+    share = np.divide(
+        np.abs(moved),
+        errors,
+        out=np.zeros_like(moved),
+        where=known & np.ones_like(moved, dtype=bool),
+    )
     if len(slides) <= 2 or share.max() <= STRONG:
         return []
     i, j = (int(place) for place in np.unravel_index(int(share.argmax()), share.shape))

@@ -94,7 +94,11 @@ class Uncertainty(NamedTuple):
     @property
     def rejected(self) -> bool:
         """True if the fit leaves more than the noise, here or in held-out parts, or asks for a rig that nobody has."""
-        return bool(self.reduced_chi2 > self.limit or self.score > HELD_OUT or self.strain > STRAIN)
+        return bool(
+            self.reduced_chi2 > self.limit
+            or self.score > HELD_OUT
+            or self.strain > STRAIN
+        )
 
     @property
     def strain(self) -> float:
@@ -120,8 +124,15 @@ def uncertainty(fit: Fit) -> Uncertainty:
     used = zip(problem.logs, problem.used, strict=True)
     measured = sum(int(log.channels.sum()) * len(log.time[rows]) for log, rows in used)
     inverse = covariance_of(fit, np.concatenate([jacobian, pull]), free)
-    plain, bread = inverse * max(reduced_chi2, 1.0), np.where(np.isfinite(inverse), inverse, 0.0)
-    factor = np.sqrt(np.maximum(_over_time(fit, residual, jacobian, pull, neighbours, bread) / np.diag(plain), 1.0))
+    plain = inverse * max(reduced_chi2, 1.0)
+    bread = np.where(np.isfinite(inverse), inverse, 0.0)
+    factor = np.sqrt(
+        np.maximum(
+            _over_time(fit, residual, jacobian, pull, neighbours, bread)
+            / np.diag(plain),
+            1.0,
+        )
+    )
     factor = np.where(np.isfinite(factor), factor, 1.0)
     moved = problem.twist_residuals(fit.values, fit.sigma, DRAWS)
     shifts = np.zeros((1, len(bread))) if moved is None else moved @ jacobian @ bread
@@ -145,12 +156,21 @@ def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarra
     change `[S, F]` of the values without each slide, and the derivatives `[M, F]` of the scaled residuals.
     """
     residual, jacobian = fit.problem.linearised(fit.values, fit.sigma)
-    votes = np.array([rows.sum(axis=(0, 1)) for rows in fit.problem.by_log(jacobian * residual[:, None])])
+    votes = np.array(
+        [
+            rows.sum(axis=(0, 1))
+            for rows in fit.problem.by_log(jacobian * residual[:, None])
+        ]
+    )
     bread = covariance_of(fit, jacobian, ~fit.at_bound)
     if not np.isfinite(bread).all():
         return bread, np.zeros_like(votes), jacobian
     counted = sum(bool(np.isfinite(each).all()) for each in fit.sigma)
-    covariance = bread if counted < 2 else bread @ (votes.T @ votes) @ bread * len(votes) / (len(votes) - 1)
+    covariance = (
+        bread
+        if counted < 2
+        else bread @ (votes.T @ votes) @ bread * len(votes) / (len(votes) - 1)
+    )
     return covariance, votes @ bread, jacobian
 
 
@@ -158,7 +178,9 @@ def _pull(fit: Fit) -> np.ndarray:
     """Compute the derivatives `[F + K, F + K]` of the pull of contact and rig to their starts."""
     problem = fit.problem
     count = len(problem.names)
-    result = np.linalg.solve(fit.coordinates.slopes(fit.x).T, fit.coordinates.prior(fit.x)[1]).T
+    result = np.linalg.solve(
+        fit.coordinates.slopes(fit.x).T, fit.coordinates.prior(fit.x)[1]
+    ).T
     result[count:, count:] = np.diag(1.0 / problem.rig.with_drift(fit.values[count:]))
     return result
 
@@ -169,22 +191,34 @@ def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
     inner = np.minimum(covariance(rows @ slopes, free), HUGE)
     result = slopes @ inner @ slopes.T
     diagonal = np.diag(result)
-    result[np.diag_indices(len(result))] = np.where(diagonal >= 1e-50 * HUGE, np.inf, diagonal)
+    result[np.diag_indices(len(result))] = np.where(
+        diagonal >= 1e-50 * HUGE, np.inf, diagonal
+    )
     return result
 
 
 def _left(fit: Fit, residual: np.ndarray) -> tuple[float, float]:
     """Compute the mean square of the scaled residuals, and their correlation one sample apart."""
     sums = np.zeros(4)
-    for rows, log in zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True):
+    for rows, log in zip(
+        fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True
+    ):
         each = rows[:, log.channels, 0]
-        now, before = each[1:], each[:-1]
-        sums += each.size, (each**2).sum(), (now * before).sum(), 0.5 * (now**2 + before**2).sum()
+        now = each[1:]
+        before = each[:-1]
+        sums += (
+            each.size,
+            (each**2).sum(),
+            (now * before).sum(),
+            0.5 * (now**2 + before**2).sum(),
+        )
     samples, squares, products, pairs = sums.tolist()
     return squares / max(samples, 1), products / pairs if pairs > 0.0 else 0.0
 
 
-def _over_time(fit: Fit, residual, jacobian, pull, neighbours: float, bread: np.ndarray) -> np.ndarray:
+def _over_time(
+    fit: Fit, residual, jacobian, pull, neighbours: float, bread: np.ndarray
+) -> np.ndarray:
     """Compute variances `[F + K]` with the covariance that the votes `J' r` of the samples have over time.
 
     Weights fall linearly with the lag; the longest is three times the memory of the residuals, `(1 + c)/(1 - c)`
@@ -211,16 +245,24 @@ def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarra
     Noise leaves residuals `r` of covariance `I - H` in a fold of M, and `e = (I - H)^-1 r` if it is held out, so that
     `r' e/M` is 1 in the mean: also if little but this fold shows a parameter, and `e` is large.
     """
-    fold, seen = [], []
-    for rows, log in zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True):
+    fold = []
+    seen = []
+    for rows, log in zip(
+        fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True
+    ):
         place = np.arange(len(rows)) * BLOCKS // len(rows) % FOLDS
         fold.append(np.repeat(place, 3))
         seen.append(np.tile(log.channels, len(rows)))
-    fold, seen = np.concatenate(fold), np.concatenate(seen)
-    size = np.maximum(np.linalg.norm(np.concatenate([jacobian, pull]), axis=0), np.finfo(float).tiny)
-    slopes, base = jacobian / size, pull / size
+    fold = np.concatenate(fold)
+    seen = np.concatenate(seen)
+    size = np.maximum(
+        np.linalg.norm(np.concatenate([jacobian, pull]), axis=0), np.finfo(float).tiny
+    )
+    slopes = jacobian / size
+    base = pull / size
     whole = slopes.T @ slopes + base.T @ base + RIDGE * np.eye(len(fit.values))
-    result, unseen = [], np.empty_like(residual)
+    result = []
+    unseen = np.empty_like(residual)
     for k in range(FOLDS):
         out = fold == k
         kept = whole - slopes[out].T @ slopes[out]
@@ -246,9 +288,13 @@ def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
     size = np.where(size**2 * HUGE > 1.0, size, 0.0)
     seen = free & (size > 0.0)
     result = np.zeros((count, count))
-    result[np.diag_indices(count)] = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0) ** 2, np.inf)
+    result[np.diag_indices(count)] = np.where(
+        size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0) ** 2, np.inf
+    )
     if seen.any():
-        _, strengths, axes = np.linalg.svd(jacobian[:, seen] / size[seen], full_matrices=False)
+        _, strengths, axes = np.linalg.svd(
+            jacobian[:, seen] / size[seen], full_matrices=False
+        )
         strengths = np.maximum(strengths, 1e-12 * strengths[0])
         inner = (axes.T / strengths**2) @ axes
         result[np.ix_(seen, seen)] = inner / np.outer(size[seen], size[seen])
@@ -256,7 +302,11 @@ def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
 
 
 def draws(
-    names: Sequence[str], values: np.ndarray, errors: np.ndarray, correlations: np.ndarray, normal: np.ndarray
+    names: Sequence[str],
+    values: np.ndarray,
+    errors: np.ndarray,
+    correlations: np.ndarray,
+    normal: np.ndarray,
 ) -> np.ndarray:
     """Return values `[n, F]` of parameters with these errors and correlations, from `normal` numbers `[n, F]`.
 
@@ -282,7 +332,11 @@ def correlations(covariance: np.ndarray) -> np.ndarray:
     errors = np.sqrt(np.diag(covariance))
     usable = np.isfinite(errors) & (errors > 0.0)
     safe = np.where(usable, errors, 1.0)
-    result = np.where(np.outer(usable, usable), np.where(np.isfinite(covariance), covariance, 0.0), 0.0)
+    result = np.where(
+        np.outer(usable, usable),
+        np.where(np.isfinite(covariance), covariance, 0.0),
+        0.0,
+    )
     result = result / np.outer(safe, safe)
     result[np.diag_indices(len(errors))] = 1.0
     return np.clip(result, -1.0, 1.0)
@@ -315,7 +369,8 @@ class Pull(NamedTuple):
         text = f"{self.name} is held at {self.value:.3g} {unit}".rstrip()
         if not self.error < abs(self.value):
             return f"{text}; the data do not show it"
-        to, low = self.value + self.step, ALL[self.name].low
+        to = self.value + self.step
+        low = ALL[self.name].low
         free = f"{to:.3g} +/- {self.error:.2g}" if to > low else f"below {low:g}"
         return f"{text}; the residuals {'agree' if self.agrees else 'contradict it'}: {free} if it were free"
 
@@ -330,8 +385,11 @@ def pulls_of_held(fit: Fit, u: Uncertainty) -> list[Pull]:
     law = fitted_law(problem.law, problem.by_name(fit.values))
     values = [float(getattr(law, name)) for name in held]
     residual, slopes = problem.slopes_of(held, np.array(values), fit.values, fit.sigma)
-    free = np.concatenate([~fit.at_bound[:count], np.full(len(fit.values) - count, True)])
-    rows, result = np.concatenate([u.jacobian, u.pull]), []
+    free = np.concatenate(
+        [~fit.at_bound[:count], np.full(len(fit.values) - count, True)]
+    )
+    rows = np.concatenate([u.jacobian, u.pull])
+    result = []
     below = np.concatenate([residual, np.zeros(len(u.pull))])
     for i, (name, value) in enumerate(zip(held, values, strict=True)):
         if not slopes[:, i].any():
@@ -340,7 +398,9 @@ def pulls_of_held(fit: Fit, u: Uncertainty) -> list[Pull]:
         column = np.concatenate([slopes[:, i], np.zeros(len(u.pull))])
         both = np.column_stack([rows * free, column])
         size = np.maximum(np.linalg.norm(both, axis=0), np.finfo(float).tiny)
-        curvature = np.linalg.inv((both / size).T @ (both / size) + RIDGE * np.eye(len(size)))
+        curvature = np.linalg.inv(
+            (both / size).T @ (both / size) + RIDGE * np.eye(len(size))
+        )
         # at the minimum, what was fitted has no slope left; its remainder is the pull's
         score = np.append(np.zeros(len(size) - 1), column @ below) / size
         step = -(curvature @ score) / size

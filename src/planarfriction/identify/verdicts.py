@@ -82,7 +82,13 @@ def verdicts_on_samples(logs: Sequence[Log]) -> list[Verdict]:
         return []
     windows = sum(len(log.parts) for log in logs)
     text = f"of {total:,} samples, {used:,} were used: {windows} windows in which motion, load and friction differ most"
-    return [Verdict("fit", True, f"{text}; between them the model follows the motion in longer steps")]
+    return [
+        Verdict(
+            "fit",
+            True,
+            f"{text}; between them the model follows the motion in longer steps",
+        )
+    ]
 
 
 def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
@@ -91,7 +97,13 @@ def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
     if not turned:
         return []
     count = f"{sum(turned.values())} jumps of theta by a whole turn were taken out"
-    return [Verdict("fit", True, f"{count}, in {', '.join(list(turned)[:3])}{' ...' if len(turned) > 3 else ''}")]
+    return [
+        Verdict(
+            "fit",
+            True,
+            f"{count}, in {', '.join(list(turned)[:3])}{' ...' if len(turned) > 3 else ''}",
+        )
+    ]
 
 
 def interval(name: str, value: float, error: float) -> tuple[float, float]:
@@ -100,7 +112,9 @@ def interval(name: str, value: float, error: float) -> tuple[float, float]:
         with np.errstate(over="ignore"):
             factor = float(np.exp(TWO_SIDED * error / value))
         return float(value / factor), float(value * factor)
-    return max(float(value - TWO_SIDED * error), ALL[name].low), float(value + TWO_SIDED * error)
+    return max(float(value - TWO_SIDED * error), ALL[name].low), float(
+        value + TWO_SIDED * error
+    )
 
 
 # ---------------------------------------------------------------------- choice of the model
@@ -135,15 +149,21 @@ class Candidate(NamedTuple):
     @property
     def score(self) -> ModelScore:
         """Measures of how well the model explains the data."""
-        problem, u = self.fit.problem, self.uncertainty
-        bristles, estimates = bristles_of(problem.law, problem.names), problem.by_name(self.fit.values)
-        return ModelScore(problem.model, bristles, u.score, u.reduced_chi2, u.rejected, estimates)
+        problem = self.fit.problem
+        u = self.uncertainty
+        bristles = bristles_of(problem.law, problem.names)
+        estimates = problem.by_name(self.fit.values)
+        return ModelScore(
+            problem.model, bristles, u.score, u.reduced_chi2, u.rejected, estimates
+        )
 
     def cost(self, sigma: list[np.ndarray]) -> float:
         """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""
         fit = self.fit
         pull = fit.coordinates.prior(fit.x)[0]
-        return 0.5 * float((fit.problem.residual(fit.values, sigma) ** 2).sum() + (pull**2).sum())
+        return 0.5 * float(
+            (fit.problem.residual(fit.values, sigma) ** 2).sum() + (pull**2).sum()
+        )
 
 
 def rivals(best: Candidate, candidates: Sequence[Candidate]) -> list[ModelScore]:
@@ -152,7 +172,9 @@ def rivals(best: Candidate, candidates: Sequence[Candidate]) -> list[ModelScore]
     return [
         each.score
         for each in candidates
-        if each is not best and not each.uncertainty.rejected and each.cost(best.fit.sigma) < most
+        if each is not best
+        and not each.uncertainty.rejected
+        and each.cost(best.fit.sigma) < most
     ]
 
 
@@ -198,7 +220,11 @@ class Evidence:
 
     def value(self, name: str, otherwise: float) -> float:
         """Return the estimate of a parameter, or `otherwise` if it was not estimated."""
-        return float(self.values[self.names.index(name)]) if name in self.names else otherwise
+        return (
+            float(self.values[self.names.index(name)])
+            if name in self.names
+            else otherwise
+        )
 
     @property
     def spinning(self) -> bool:
@@ -208,17 +234,28 @@ class Evidence:
 
 
 def judge(
-    evidence: Evidence, best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str], held: Sequence[Pull]
+    evidence: Evidence,
+    best: Candidate,
+    candidates: Sequence[Candidate],
+    skipped: Sequence[str],
+    held: Sequence[Pull],
 ) -> tuple[Verdict, ...]:
     """Return the verdicts on the fit, then on all parameters: if it is rejected, none of them is identifiable."""
-    u, chosen, others = best.uncertainty, best.score, rivals(best, candidates)
+    u = best.uncertainty
+    chosen = best.score
+    others = rivals(best, candidates)
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
     if len(candidates) > 1:
-        scores = sorted((each.score for each in candidates if each is not best), key=lambda each: each.held_out)
+        scores = sorted(
+            (each.score for each in candidates if each is not best),
+            key=lambda each: each.held_out,
+        )
         rest = ", ".join(f"{each.held_out:.3g} times for {each}" for each in scores)
         text = f"on held-out parts of the logs, its errors are {chosen.held_out:.3g} times what noise explains ({rest})"
         verdicts.append(Verdict("fit", True, text))
-    verdicts += _on_data(evidence, u) + [Verdict("fit", each.agrees, str(each)) for each in held]
+    verdicts += _on_data(evidence, u) + [
+        Verdict("fit", each.agrees, str(each)) for each in held
+    ]
     if skipped:
         text = f'{" and ".join(skipped)} would take minutes and was not tried: choose it by model="{skipped[0]}"'
         verdicts.append(Verdict("fit", True, text))
@@ -227,8 +264,16 @@ def judge(
         if verdict is None or verdict.identifiable:
             low, high = interval(name, evidence.values[i], evidence.errors[i])
             meaningless = f"{chosen.model} does not explain the data, so this value has no meaning"
-            denied = [each for each in held if not each.agrees and abs(each.moves[i]) > MOVED * evidence.errors[i]]
-            resting = f"it changes by {denied[0].moves[i]:+.2g} if {denied[0].name} is not held" if denied else ""
+            denied = [
+                each
+                for each in held
+                if not each.agrees and abs(each.moves[i]) > MOVED * evidence.errors[i]
+            ]
+            resting = (
+                f"it changes by {denied[0].moves[i]:+.2g} if {denied[0].name} is not held"
+                if denied
+                else ""
+            )
             for each in others if not u.rejected and not resting else ():
                 if not low <= each.estimates[name] <= high:
                     resting = f"depends on the model: {each}, which also fits, gives {each.estimates[name]:.3g}"
@@ -248,11 +293,17 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
     text = []
     if u.reduced_chi2 > u.limit:
         most = f"at most {np.sqrt(u.limit):.2f} times can be chance"
-        text.append(f"its residuals are {size:.2f} times the noise of the sensors ({most})")
+        text.append(
+            f"its residuals are {size:.2f} times the noise of the sensors ({most})"
+        )
     if u.score > HELD_OUT:
-        text.append(f"its errors on held-out parts of the logs are {u.score:.1f} times what noise explains")
+        text.append(
+            f"its errors on held-out parts of the logs are {u.score:.1f} times what noise explains"
+        )
     if u.strain > STRAIN:
-        text.append(f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of such a rig")
+        text.append(
+            f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of such a rig"
+        )
     if u.neighbours > CORRELATED:
         text.append(f"neighbouring residuals are correlated ({u.neighbours:.2f})")
     cause = "The patch, the kind of bristles or the measurement is wrong"
@@ -262,17 +313,29 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
 def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
     """Return cautions: disturbances that a fit leans on, channels that were not measured, spoiled samples, one load."""
     found = []
-    if leaning := [f"{words} ({size:.1f} times the usual)" for size, words in u.strains if size > LEANING]:
+    if leaning := [
+        f"{words} ({size:.1f} times the usual)"
+        for size, words in u.strains
+        if size > LEANING
+    ]:
         text = f"the fit needs large disturbances of the rig: {', '.join(leaning)}"
         found.append(Verdict("fit", True, text))
     if not evidence.measured.all():
-        missing = [name for (name, _), seen in zip(CHANNELS, evidence.measured, strict=True) if not seen]
+        missing = [
+            name
+            for (name, _), seen in zip(CHANNELS, evidence.measured, strict=True)
+            if not seen
+        ]
         text = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} 0 throughout"
         text += ", as without a sensor: the estimates use the other channels alone"
         found.append(Verdict("fit", True, text))
     if evidence.spoiled:
         text = f"{evidence.spoiled} values are off by more than {SPOILED:g} times the noise"
-        end = "they were left out" if evidence.robust else 'the loss "soft_l1" would leave them out'
+        end = (
+            "they were left out"
+            if evidence.robust
+            else 'the loss "soft_l1" would leave them out'
+        )
         found.append(Verdict("fit", True, f"{text}: {end}"))
     if "sigma_0" in evidence.names and evidence.load_ratio < TWO_LOADS:
         stiffness = evidence.value("sigma_0", 0.0) * float(np.median(evidence.loads))
@@ -283,14 +346,19 @@ def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
 
 def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     """Return the verdict on parameter i, or None if there is nothing to say."""
-    name, value, error = evidence.names[i], float(evidence.values[i]), float(evidence.errors[i])
+    name = evidence.names[i]
+    value = float(evidence.values[i])
+    error = float(evidence.errors[i])
     kind = ALL[name]
     if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
         text = f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
         return Verdict(name, False, text)
     if name == "mu_s" and "mu_c" in evidence.names:
         c = evidence.names.index("mu_c")
-        if not evidence.errors[c] < VAGUE * evidence.values[c] and not evidence.at_bound[c]:
+        if (
+            not evidence.errors[c] < VAGUE * evidence.values[c]
+            and not evidence.at_bound[c]
+        ):
             text = "mu_c is unknown, as no sample is much faster than v_s, so that this may be mu_c"
             return Verdict(name, False, text)
     rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
@@ -314,18 +382,26 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
             text = f"cannot be separated from {other} (correlation {correlation:.2f}) without the torque"
             return Verdict(name, False, f"{text}, and tau is 0 throughout")
         if error > WELL * size:
-            return Verdict(name, True, f"strongly correlated with {other} ({correlation:.2f})")
+            return Verdict(
+                name, True, f"strongly correlated with {other} ({correlation:.2f})"
+            )
     return None
 
 
 def _why(evidence: Evidence, i: int, seen: float) -> str:
     """Return the reason why a parameter is vague: a gap in the data, else another parameter, else the noise."""
     name = evidence.names[i]
-    if name in ("v_s", "gamma", "mu_s") and (gap := speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))):
+    if name in ("v_s", "gamma", "mu_s") and (
+        gap := speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
+    ):
         return gap
     if name in ("contact_radius", *SOFT_FINGER) and not evidence.spinning:
         return "no spin"
-    if name in SOFT_FINGER and name != "c" and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
+    if (
+        name in SOFT_FINGER
+        and name != "c"
+        and evidence.loads.max() < ONE_LOAD * evidence.loads.min()
+    ):
         return "one load only"
     if name in OF_TORQUE and not evidence.measured[2]:
         return "only the torque depends on it, and tau is 0 throughout"
@@ -340,11 +416,15 @@ def _no_stribeck(evidence: Evidence) -> str:
     """Return the reason why the Stribeck curve has no shape, if mu_s may be mu_c, or nothing."""
     if "mu_s" not in evidence.names or "mu_c" not in evidence.names:
         return ""
-    s, c = evidence.names.index("mu_s"), evidence.names.index("mu_c")
-    difference, error = evidence.values[s] - evidence.values[c], np.inf
+    s = evidence.names.index("mu_s")
+    c = evidence.names.index("mu_c")
+    difference = evidence.values[s] - evidence.values[c]
+    error = np.inf
     if np.isfinite(evidence.errors[[s, c]]).all():
         both = evidence.correlations[s, c] * evidence.errors[s] * evidence.errors[c]
-        error = np.sqrt(max(evidence.errors[s] ** 2 + evidence.errors[c] ** 2 - 2.0 * both, 0.0))
+        error = np.sqrt(
+            max(evidence.errors[s] ** 2 + evidence.errors[c] ** 2 - 2.0 * both, 0.0)
+        )
     if evidence.at_bound[s] or not difference > TWO_SIDED * error:
         gap = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
         return gap or "mu_s cannot be distinguished from mu_c"
@@ -353,10 +433,19 @@ def _no_stribeck(evidence: Evidence) -> str:
 
 def _on_bound(evidence: Evidence, i: int) -> Verdict:
     name = evidence.names[i]
-    if name == "mu_s" and evidence.values[i] <= SAME * evidence.value("mu_c", evidence.held_mu_c):
-        reason = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3)) or "no friction above mu_c was seen"
+    if name == "mu_s" and evidence.values[i] <= SAME * evidence.value(
+        "mu_c", evidence.held_mu_c
+    ):
+        reason = (
+            speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
+            or "no friction above mu_c was seen"
+        )
         return Verdict(name, False, f"{reason}: equal to mu_c")
-    return Verdict(name, False, f"the fit ran into the bound {evidence.values[i]:.3g} {ALL[name].unit}")
+    return Verdict(
+        name,
+        False,
+        f"the fit ran into the bound {evidence.values[i]:.3g} {ALL[name].unit}",
+    )
 
 
 def _partner(evidence: Evidence, i: int) -> tuple[str, float] | None:
@@ -374,7 +463,8 @@ def speed_gap(speeds: np.ndarray, around: float) -> str:
     slow, fast = np.quantile(moving, [0.02, 0.98])
     if fast < NARROW * slow:
         return f"no sample below {1e3 * slow:.2g} and above {1e3 * fast:.2g} mm/s"
-    below, above = moving[moving <= around], moving[moving > around]
+    below = moving[moving <= around]
+    above = moving[moving > around]
     low = float(below.max()) if len(below) else 0.0
     high = float(above.min()) if len(above) else np.inf
     if high < GAP * low:

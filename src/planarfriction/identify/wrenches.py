@@ -14,16 +14,36 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, size_of, with_findings
 from planarfriction.identify.decimation import decimated, samples_of
-from planarfriction.identify.logs import TWO_LOADS, Log, as_tuple, load_ratio, mean_load, one_coordinate
+from planarfriction.identify.logs import (
+    TWO_LOADS,
+    Log,
+    as_tuple,
+    load_ratio,
+    mean_load,
+    one_coordinate,
+)
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import fitted_law, scaled_patch
 from planarfriction.identify.problem import SPOILED, LogProblem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, wrench_noise
-from planarfriction.identify.search import guess_starts, interruptible, multistart, refine, stretches, warm_start
+from planarfriction.identify.search import (
+    guess_starts,
+    interruptible,
+    multistart,
+    refine,
+    stretches,
+    warm_start,
+)
 from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import correlations, pulls_of_held, uncertainty
-from planarfriction.identify.verdicts import Candidate, Evidence, judge, verdicts_on_samples, verdicts_on_turns
+from planarfriction.identify.verdicts import (
+    Candidate,
+    Evidence,
+    judge,
+    verdicts_on_samples,
+    verdicts_on_turns,
+)
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -95,65 +115,111 @@ def identify_lugre(
     IdentificationInterrupted
         Ctrl-C, with the best values so far.
     """
-    logs, names = as_tuple("log", log, Log), known.check_names(parameters)
+    logs = as_tuple("log", log, Log)
+    names = known.check_names(parameters)
     if names == known.USUAL and one_coordinate(logs):
         names = tuple(name for name in names if name != "contact_radius")
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "identify_lugre")
-    models = _models_to_fit(validation.choice("model", model, ("auto", *SIMULATORS)), patch, names)
+    models = _models_to_fit(
+        validation.choice("model", model, ("auto", *SIMULATORS)), patch, names
+    )
     validation.instance("options", options, FitOptions, "a FitOptions record")
     kinds, given = _start_laws(start, options.elasto_plastic, names)
     if models == (LEAD,) and kinds[0].reference_load is not None:
-        raise InvalidValueError("model", "be 'reduced' or 'distributed' for a law with a reference_load", model)
+        raise InvalidValueError(
+            "model",
+            "be 'reduced' or 'distributed' for a law with a reference_load",
+            model,
+        )
     findings = check_logs(logs, patch)
-    whole, logs = logs, decimated(logs, size_of(logs[0], patch), options.samples)
+    whole = logs
+    logs = decimated(logs, size_of(logs[0], patch), options.samples)
     noise = wrench_noise(logs) if options.noise is None else np.array(options.noise)
-    if given is not None and not patch.depends_on_load and models != (LEAD,) and load_ratio(logs) >= TWO_LOADS:
+    if (
+        given is not None
+        and not patch.depends_on_load
+        and models != (LEAD,)
+        and load_ratio(logs) >= TWO_LOADS
+    ):
         usual = float(np.median([mean_load(log) for log in logs]))
         kinds += [dataclasses.replace(law, reference_load=usual) for law in kinds]
     problems: list[LogProblem] = []
-    guesses, leads, candidates, skipped = [], [], [], []
+    guesses = []
+    leads = []
+    candidates = []
+    skipped = []
     with interruptible(problems):
         for name in dict.fromkeys((LEAD, *models)):
             lead = min(leads, key=lambda fit: fit.cost, default=None)
             if lead is not None:
                 sure = 2.0 * lead.cost < EXPLAINED * lead.problem.numbers
-                kinds = [fit.problem.law for fit in leads if fit.cost < WORSE * lead.cost or not (sure or fit.near)]
+                kinds = [
+                    fit.problem.law
+                    for fit in leads
+                    if fit.cost < WORSE * lead.cost or not (sure or fit.near)
+                ]
             for law in kinds:
-                problems.append(LogProblem(logs, patch, names, law, options, name, progress))
+                problems.append(
+                    LogProblem(logs, patch, names, law, options, name, progress)
+                )
                 late = problems[-1].work * USUAL_EVALUATIONS
                 if model == "auto" and name != LEAD and late > PATIENCE:
                     skipped += [] if name in skipped else [name]
                     continue
                 if late > SOON and model != "auto":
-                    fewer = decimated(whole, size_of(whole[0], patch), int(samples_of(logs)[0] * SOON / late))
-                    problems[-1] = LogProblem(fewer, patch, names, law, options, name, progress)
+                    fewer = decimated(
+                        whole,
+                        size_of(whole[0], patch),
+                        int(samples_of(logs)[0] * SOON / late),
+                    )
+                    problems[-1] = LogProblem(
+                        fewer, patch, names, law, options, name, progress
+                    )
                 if not leads:
                     problems[-1].report("looking for starts")
-                    guesses = guess_starts(problems[-1], given, starts=options.starts, seed=options.seed, noise=noise)
+                    guesses = guess_starts(
+                        problems[-1],
+                        given,
+                        starts=options.starts,
+                        seed=options.seed,
+                        noise=noise,
+                    )
                     fit = multistart(problems[-1], guesses, noise=noise)
-                    values = ", ".join(f"{key} {value:.3g}" for key, value in fit.problem.by_name(fit.values).items())
+                    values = ", ".join(
+                        f"{key} {value:.3g}"
+                        for key, value in fit.problem.by_name(fit.values).items()
+                    )
                     problems[-1].report(f"a first answer: {values}")
                 else:
-                    fit = warm_start(problems[-1], lead or leads[0], guesses, noise=noise)
+                    fit = warm_start(
+                        problems[-1], lead or leads[0], guesses, noise=noise
+                    )
                 leads += [fit] if name == LEAD else []
                 if name in models and (name != LEAD or law.reference_load is None):
                     fit = refine(fit)
                     candidates.append(Candidate(fit, uncertainty(fit)))
         best = min(candidates, key=lambda each: each.uncertainty.score)
         alike = [each for each in candidates if each.score.model == best.score.model]
-        best = min(alike, key=lambda each: (each.uncertainty.rejected, each.cost(best.fit.sigma)))
+        best = min(
+            alike,
+            key=lambda each: (each.uncertainty.rejected, each.cost(best.fit.sigma)),
+        )
         found = _identification(best, candidates, skipped, leads[0].starts)
     return with_findings(found, whole, findings)
 
 
-def _models_to_fit(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
+def _models_to_fit(
+    model: str, patch: ContactPatch, names: Sequence[str]
+) -> tuple[str, ...]:
     """Return the names of the models to fit; only some take a patch that changes with its load."""
     able = tuple(SIMULATORS)
     if patch.depends_on_load or any(name in known.SOFT_FINGER for name in names):
         able = (LEAD,)
         if model not in ("auto", LEAD):
-            raise InvalidValueError("model", f"be {LEAD!r} if the patch changes with the load", model)
+            raise InvalidValueError(
+                "model", f"be {LEAD!r} if the patch changes with the load", model
+            )
     return able if model == "auto" else (model,)
 
 
@@ -162,7 +228,9 @@ def guessed_law(values: Mapping[str, float]) -> LuGre:
     return _start_laws(values, USUAL_BRISTLES, ())[0][0]
 
 
-def _start_laws(start: Any, bristles: Any, names: Sequence[str]) -> tuple[list[LuGre], dict[str, float] | None]:
+def _start_laws(
+    start: Any, bristles: Any, names: Sequence[str]
+) -> tuple[list[LuGre], dict[str, float] | None]:
     """Return laws that hold the parameters that are not estimated, one for each kind of bristles, and values by name.
 
     The values are None if a whole law was given.
@@ -170,14 +238,20 @@ def _start_laws(start: Any, bristles: Any, names: Sequence[str]) -> tuple[list[L
     if type(start) is LuGre:
         return [start], None
     if not isinstance(start, Mapping | None):
-        raise InvalidValueError("start", "be a LuGre law or a table of its parameters", start)
+        raise InvalidValueError(
+            "start", "be a LuGre law or a table of its parameters", start
+        )
     given = {} if start is None else dict(start)
     for name, value in given.items():
         validation.choice("start", name, known.LAW)
         given[name] = validation.number(f"start[{name!r}]", value)
     kinds = [USUAL_BRISTLES, None] if bristles == "auto" else [bristles]
     if "breakaway_ratio" in given or "breakaway_ratio" in names:
-        kinds = [ElastoPlastic(given["breakaway_ratio"]) if "breakaway_ratio" in given else kinds[0] or USUAL_BRISTLES]
+        kinds = [
+            ElastoPlastic(given["breakaway_ratio"])
+            if "breakaway_ratio" in given
+            else kinds[0] or USUAL_BRISTLES
+        ]
     fields = {name: value for name, value in given.items() if name != "breakaway_ratio"}
     fields.setdefault("mu_s", max(START_MU_S, fields.get("mu_c", LuGre.mu_c)))
     fields.setdefault("mu_c", min(LuGre.mu_c, fields["mu_s"]))
@@ -188,12 +262,17 @@ def _start_laws(start: Any, bristles: Any, names: Sequence[str]) -> tuple[list[L
 
 
 def _identification(
-    best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str], starts: tuple[int, int]
+    best: Candidate,
+    candidates: Sequence[Candidate],
+    skipped: Sequence[str],
+    starts: tuple[int, int],
 ) -> Identification:
     """Make the result from the best of several models: errors, verdicts, histories, the fitted law and model."""
-    fit, u = best.fit, best.uncertainty
+    fit = best.fit
+    u = best.uncertainty
     problem = fit.problem
-    count, logs = len(problem.names), problem.logs
+    count = len(problem.names)
+    logs = problem.logs
     values, rig = problem.split(fit.values)
     errors = np.sqrt(np.diag(u.covariance))
     if not u.rejected:
@@ -224,18 +303,25 @@ def _identification(
     )
 
 
-def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[str, Any]]) -> Evidence:
+def _evidence(
+    best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[str, Any]]
+) -> Evidence:
     """Collect the evidence for verdicts on estimates with `errors` `[F]`."""
-    fit, u = best.fit, best.uncertainty
+    fit = best.fit
+    u = best.uncertainty
     problem = fit.problem
     count = len(problem.names)
     values, _ = problem.split(fit.values)
     still = fit.values.copy()
     still[:count] *= np.where(np.isin(problem.names, ("mu_c", "mu_s")), NO_SLIP, 1.0)
-    costs = [0.5 * float((problem.residual(each, fit.sigma) ** 2).sum()) for each in (fit.values, still)]
+    costs = [
+        0.5 * float((problem.residual(each, fit.sigma) ** 2).sum())
+        for each in (fit.values, still)
+    ]
     sliding = problem.sliding(values)
     left_out = sum(
-        int(np.isinf(sigma[:, log.channels]).sum()) for sigma, log in zip(fit.sigma, problem.logs, strict=True)
+        int(np.isinf(sigma[:, log.channels]).sum())
+        for sigma, log in zip(fit.sigma, problem.logs, strict=True)
     )
     return Evidence(
         names=problem.names,
@@ -250,10 +336,13 @@ def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[s
         loads=np.array([mean_load(log) for log in problem.logs]),
         load_ratio=load_ratio(problem.logs),
         measured=np.any([log.channels for log in problem.logs], axis=0),
-        spoiled=int((np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()) + left_out,
+        spoiled=int((np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum())
+        + left_out,
         robust=problem.options.loss != "linear",
         without_slip=costs[1] - costs[0],
-        largest_coefficient=max(float(np.nanquantile(each["coefficient"], 0.99)) for each in histories),
+        largest_coefficient=max(
+            float(np.nanquantile(each["coefficient"], 0.99)) for each in histories
+        ),
     )
 
 
@@ -262,15 +351,26 @@ def _histories(best: Candidate) -> list[dict[str, Any]]:
     fit = best.fit
     problem = fit.problem
     values, _ = problem.split(fit.values)
-    shown, sliding, coefficients = problem.shown(fit.values), problem.sliding(values), problem.coefficients(values)
+    shown = problem.shown(fit.values)
+    sliding = problem.sliding(values)
+    coefficients = problem.coefficients(values)
     unseen = problem.by_log(best.uncertainty.unseen[:, None])
     histories = []
-    for i, (log, used, sigma, rows) in enumerate(zip(problem.logs, problem.used, fit.sigma, unseen, strict=True)):
+    for i, (log, used, sigma, rows) in enumerate(
+        zip(problem.logs, problem.used, fit.sigma, unseen, strict=True)
+    ):
         held_out = np.full_like(log.wrench, np.nan)
         known_noise = np.where(log.channels & np.isfinite(sigma), sigma, np.nan)
         held_out[used] = log.wrench[used] + rows[:, :, 0] * known_noise[used]
-        measured, more = np.where(log.channels, log.wrench, np.nan), {"speed": sliding[i][0], "held_out": held_out}
-        each = {"name": log.name, "time": log.time, "measured": measured, "predicted": shown[i], "twist": log.twist}
+        measured = np.where(log.channels, log.wrench, np.nan)
+        more = {"speed": sliding[i][0], "held_out": held_out}
+        each = {
+            "name": log.name,
+            "time": log.time,
+            "measured": measured,
+            "predicted": shown[i],
+            "twist": log.twist,
+        }
         histories.append({**each, **more, "coefficient": coefficients[i]})
     return histories
 
@@ -283,23 +383,39 @@ def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:
     for log, twist in zip(problem.logs, problem.twists, strict=True):
         name = log.name if len(problem.logs) > 1 else ""
         error = twist.noise / np.sqrt(0.3 * len(log.time))
-        for k, (channel, unit) in enumerate((("vx", "m/s"), ("vy", "m/s"), ("omega", "rad/s"))):
-            result.append(Nuisance(f"noise_{channel}", unit, float(twist.noise[k]), float(error[k]), name))
+        for k, (channel, unit) in enumerate(
+            (("vx", "m/s"), ("vy", "m/s"), ("omega", "rad/s"))
+        ):
+            result.append(
+                Nuisance(
+                    f"noise_{channel}",
+                    unit,
+                    float(twist.noise[k]),
+                    float(error[k]),
+                    name,
+                )
+            )
     return result
 
 
 def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
     """Make the fitted model, with the patch scaled about its centre of pressure or fitted soft-finger constants."""
     given = problem.by_name(values)
-    patch, surface = problem.fixed_patch, problem.options.surface
+    patch = problem.fixed_patch
+    surface = problem.options.surface
     finger = {name: given[name] for name in known.SOFT_FINGER if name in given}
     if finger:
         pressure = dataclasses.replace(problem.patch.pressure, **finger)
         fitted = dataclasses.replace(problem.patch, pressure=pressure)
-        return ReducedModelPublished(fitted, law, surface=surface(fitted, normal_force=problem.reference_load))
+        return ReducedModelPublished(
+            fitted, law, surface=surface(fitted, normal_force=problem.reference_load)
+        )
     if any(name in known.SHAPE for name in given):
-        centre, vector = patch.centre_of_pressure(), problem.maps[0].base
+        centre = patch.centre_of_pressure()
+        vector = problem.maps[0].base
         radius = float(vector[PARAMETERS.index("contact_radius")])
-        new = np.array([given.get("centre_x", centre[0]), given.get("centre_y", centre[1])])
+        new = np.array(
+            [given.get("centre_x", centre[0]), given.get("centre_y", centre[1])]
+        )
         patch = scaled_patch(patch, given.get("contact_radius", radius) / radius, new)
     return SIMULATORS[problem.model].model(patch, law, surface)

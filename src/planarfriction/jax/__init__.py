@@ -15,7 +15,14 @@ with needing("jax", "jax"):
         ReducedModelPublished,
         Surface,
     )
-    from planarfriction.jax.rollouts import rate, rest, rollout, simulate_scene, step, wrench
+    from planarfriction.jax.rollouts import (
+        rate,
+        rest,
+        rollout,
+        simulate_scene,
+        step,
+        wrench,
+    )
     from planarfriction.tensors.operations import SceneMotion
 
 __all__ = [

@@ -36,21 +36,34 @@ class FrictionPytree(TensorModel):
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         self.refuse(patch, law, f"jax.{type(self).__name__}")
-        self.elasto_plastic, self.reference_load = law.numbers.elasto_plastic > 0.0, law.reference_load
+        self.elasto_plastic = law.numbers.elasto_plastic > 0.0
+        self.reference_load = law.reference_load
 
     def replace(self, **leaves: Any) -> Self:
         """Return a model with other `parameters`, or other leaves by name."""
         for name in leaves:
             if name not in self.leaves:
-                raise InvalidValueError("leaf", f"be one of {', '.join(self.leaves)}", repr(name))
-        if isinstance(leaves.get("parameters"), tuple):  # of arrays: `vmap` takes models of axes too
+                raise InvalidValueError(
+                    "leaf", f"be one of {', '.join(self.leaves)}", repr(name)
+                )
+        if isinstance(
+            leaves.get("parameters"), tuple
+        ):  # of arrays: `vmap` takes models of axes too
             own = zip(self.names, leaves["parameters"], strict=True)
-            self._in_range({name: value for name, value in own if isinstance(value, jax.Array)})
-        return self._unflatten(self._flatten()[1], [leaves.get(name, getattr(self, name)) for name in self.leaves])
+            self._in_range(
+                {name: value for name, value in own if isinstance(value, jax.Array)}
+            )
+        return self._unflatten(
+            self._flatten()[1],
+            [leaves.get(name, getattr(self, name)) for name in self.leaves],
+        )
 
     def _flatten(self):
         keys = map(jax.tree_util.GetAttrKey, self.leaves)
-        return [(key, getattr(self, key.name)) for key in keys], (self.elasto_plastic, self.reference_load)
+        return [(key, getattr(self, key.name)) for key in keys], (
+            self.elasto_plastic,
+            self.reference_load,
+        )
 
     @classmethod
     def _unflatten(cls, fixed: tuple[bool, float | None], leaves) -> Self:
@@ -66,9 +79,14 @@ class FrictionPytree(TensorModel):
 
     def rest(self, batch: int | Sequence[int] = ()) -> jax.Array:
         """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
-        return jnp.zeros(validation.batched(batch, self.state_shape), jnp.result_type(self.parameters.sigma_0))
+        return jnp.zeros(
+            validation.batched(batch, self.state_shape),
+            jnp.result_type(self.parameters.sigma_0),
+        )
 
-    def rollout(self, state, twist, normal_force, dt, *, parameters: Any = None) -> tuple[jax.Array, jax.Array]:
+    def rollout(
+        self, state, twist, normal_force, dt, *, parameters: Any = None
+    ) -> tuple[jax.Array, jax.Array]:
         """Return the last state and the wrenches `[..., T, 3]` of steps, each an operation of JAX, in `lax.scan`."""
 
         def one(z, held):
@@ -77,18 +95,27 @@ class FrictionPytree(TensorModel):
 
         # Only the states are kept for the way back; to step again costs less than to store all that a step computes.
         one = jax.checkpoint(one, prevent_cse=False)  # pyright: ignore[reportPrivateImportUsage]
-        end, wrenches = jax.lax.scan(one, state, (jnp.moveaxis(twist, -2, 0), jnp.moveaxis(normal_force, -1, 0)))
+        end, wrenches = jax.lax.scan(
+            one, state, (jnp.moveaxis(twist, -2, 0), jnp.moveaxis(normal_force, -1, 0))
+        )
         return end, jnp.moveaxis(wrenches, 0, -2)
 
     def _values(self, parameters: Any) -> dict[str, jax.Array]:
-        return {name: jnp.asarray(value) for name, value in self._record(parameters)._asdict().items()}
+        return {
+            name: jnp.asarray(value)
+            for name, value in self._record(parameters)._asdict().items()
+        }
 
     def _record(self, parameters: Any) -> Any:
         """Return parameters as a record, the model's own if they are None."""
         if parameters is None:
             return self.parameters
-        record = type(self.parameters)(*self._counted(parameters, len(parameters), (len(parameters),)))
-        self._in_range({name: xp.real(name, value) for name, value in record._asdict().items()})
+        record = type(self.parameters)(
+            *self._counted(parameters, len(parameters), (len(parameters),))
+        )
+        self._in_range(
+            {name: xp.real(name, value) for name, value in record._asdict().items()}
+        )
         return record
 
 

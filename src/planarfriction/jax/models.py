@@ -10,7 +10,12 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from planarfriction.derivatives.parameters import PARAMETERS, Packed, pack_cells, pack_surface
+from planarfriction.derivatives.parameters import (
+    PARAMETERS,
+    Packed,
+    pack_cells,
+    pack_surface,
+)
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax.base import FrictionPytree, record_of
 from planarfriction.laws import FrictionLaw
@@ -40,7 +45,9 @@ class DistributedModel(FrictionPytree, CellsModel):
     leaves = ("parameters", "positions", "remainder", "weights")
     parameters: LawParameters
 
-    def __init__(self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None) -> None:
+    def __init__(
+        self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None
+    ) -> None:
         super().__init__(patch, law)
         cells = distributed.cells_of(patch, law, normal_force, jnp.result_type(float))
         self.parameters = record_of(LawParameters, law.numbers._asdict())
@@ -60,7 +67,11 @@ class PublishedParameters(namedtuple("PublishedParameters", PARAMETERS)):
     """
 
 
-@functools.partial(jax.tree_util.register_dataclass, data_fields=["data", "root"], meta_fields=["kind", "size"])
+@functools.partial(
+    jax.tree_util.register_dataclass,
+    data_fields=["data", "root"],
+    meta_fields=["kind", "size"],
+)
 @dataclass(frozen=True, eq=False)
 class Surface(ByValue):
     """The numbers of a limit surface in scaled coordinates (see `planarfriction._engine.published.surfaces`)."""
@@ -87,14 +98,26 @@ class ReducedModelPublished(FrictionPytree, PublishedModel):
     leaves = ("parameters", "surface")
     parameters: PublishedParameters
     surface: Surface
-    root = property(lambda self: self.surface.root, doc="Symmetric root of the friction metric `[2, 2]`, or None.")
+    root = property(
+        lambda self: self.surface.root,
+        doc="Symmetric root of the friction metric `[2, 2]`, or None.",
+    )
 
-    def __init__(self, patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None = None) -> None:
+    def __init__(
+        self, patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None = None
+    ) -> None:
         super().__init__(patch, law)
         shape = published.shape_of(patch, law, surface)
         kind, size, data = shape.surface.numbers
-        self.parameters = record_of(PublishedParameters, published.values_of(law, shape))
-        self.surface = Surface(kind, size, jnp.asarray(data), None if patch.root is None else jnp.asarray(shape.root))
+        self.parameters = record_of(
+            PublishedParameters, published.values_of(law, shape)
+        )
+        self.surface = Surface(
+            kind,
+            size,
+            jnp.asarray(data),
+            None if patch.root is None else jnp.asarray(shape.root),
+        )
 
     def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""
@@ -119,4 +142,9 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ) -> None:
-        super().__init__(few_discs("jax.ReducedModel", patch, law, cells, options), law, normal_force, **options)
+        super().__init__(
+            few_discs("jax.ReducedModel", patch, law, cells, options),
+            law,
+            normal_force,
+            **options,
+        )

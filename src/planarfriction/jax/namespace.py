@@ -34,11 +34,18 @@ class _Tilt(NamedTuple):
         share = jnp.where(pressing, self.share, 0.0)
         own = share.sum()
         _, u, v = self.corners.T
-        mean_u, mean_v = (share * u).sum() / own, (share * v).sum() / own
-        u, v = u - mean_u, v - mean_v
-        uu, uv, vv = (share * u * u).sum() + soft, (share * u * v).sum(), (share * v * v).sum() + soft
-        right, up, one = self.asked[1] - mean_u, self.asked[2] - mean_v, uu * vv - uv * uv
-        a, b = (vv * right - uv * up) / one, (uu * up - uv * right) / one
+        mean_u = (share * u).sum() / own
+        mean_v = (share * v).sum() / own
+        u = u - mean_u
+        v = v - mean_v
+        uu = (share * u * u).sum() + soft
+        uv = (share * u * v).sum()
+        vv = (share * v * v).sum() + soft
+        right = self.asked[1] - mean_u
+        up = self.asked[2] - mean_v
+        one = uu * vv - uv * uv
+        a = (vv * right - uv * up) / one
+        b = (uu * up - uv * right) / one
         return jnp.stack([1.0 / own - a * mean_u - b * mean_v, a, b])
 
     def pressure(self, plane: jax.Array) -> jax.Array:
@@ -47,9 +54,14 @@ class _Tilt(NamedTuple):
 
     def slopes(self, plane: jax.Array, step: jax.Array) -> tuple[jax.Array, jax.Array]:
         """Return the slope of the dual along a step, and how it rises."""
-        here, along = self.pressure(plane), self.pressure(step)
+        here = self.pressure(plane)
+        along = self.pressure(step)
         share = jnp.where(here > 0.0, self.share * along, 0.0)
-        slope = SOFTNESS * (plane[1:] * step[1:]).sum() - (step * self.asked).sum() + (share * here).sum()
+        slope = (
+            SOFTNESS * (plane[1:] * step[1:]).sum()
+            - (step * self.asked).sum()
+            + (share * here).sum()
+        )
         return slope, SOFTNESS * (step[1:] * step[1:]).sum() + (share * along).sum()
 
     def share_of(self, plane: jax.Array, step: jax.Array) -> jax.Array:
@@ -58,18 +70,25 @@ class _Tilt(NamedTuple):
 
         def ends(far: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
             here, rise = self.slopes(plane + far * step, step)
-            return here, rise, ~(abs(here) > OVERSHOT * abs(first)) | ((far == 1.0) & (here < 0.0))
+            return (
+                here,
+                rise,
+                ~(abs(here) > OVERSHOT * abs(first)) | ((far == 1.0) & (here < 0.0)),
+            )
 
         def body(last):
             far, low, high, here, rise, _, count = last
-            low, high = jnp.where(here > 0.0, low, far), jnp.where(here > 0.0, far, high)
+            low = jnp.where(here > 0.0, low, far)
+            high = jnp.where(here > 0.0, far, high)
             ahead = far - here / rise
             far = jnp.where((low < ahead) & (ahead < high), ahead, 0.5 * (low + high))
             return far, low, high, *ends(far), count + 1
 
         whole = jnp.ones_like(first)
         start = whole, jnp.zeros_like(first), whole, *ends(whole), jnp.asarray(1)
-        return jax.lax.while_loop(lambda last: ~last[5] & (last[6] < SHORTENINGS), body, start)[0]
+        return jax.lax.while_loop(
+            lambda last: ~last[5] & (last[6] < SHORTENINGS), body, start
+        )[0]
 
     def pressing(self, narrow: jax.Array) -> jax.Array:
         """Return the cells that press in the end, bool `[N]`."""
@@ -80,51 +99,79 @@ class _Tilt(NamedTuple):
             before = self.pressure(plane) > 0.0
             whole = self.fitted(before, soft)
             done = ((self.pressure(whole) > 0.0) == before).all()
-            far = jax.lax.cond(done, lambda step: jnp.ones(()), lambda step: self.share_of(plane, step), whole - plane)
+            far = jax.lax.cond(
+                done,
+                lambda step: jnp.ones(()),
+                lambda step: self.share_of(plane, step),
+                whole - plane,
+            )
             return plane + far * (whole - plane), done, count + 1
 
         first = jnp.array([1.0, 0.0, 0.0]), jnp.asarray(False), jnp.asarray(0)
-        plane, _, _ = jax.lax.while_loop(lambda last: ~last[1] & (last[2] < STEPS), body, first)
+        plane, _, _ = jax.lax.while_loop(
+            lambda last: ~last[1] & (last[2] < STEPS), body, first
+        )
         return self.pressure(plane) > 0.0
 
 
 def pressing(u, v, share, x, y, narrow) -> jax.Array:
     """Return the cells that press, bool `[..., N]` (see `Namespace.pressing`)."""
     one = jnp.ones_like(u)
-    corners, asked = jnp.stack([one, u, v], -1), jnp.concatenate([one[..., :1], x, y], -1)
+    corners = jnp.stack([one, u, v], -1)
+    asked = jnp.concatenate([one[..., :1], x, y], -1)
 
     def found(corners, share, asked, narrow):
         return _Tilt(corners, share, asked).pressing(narrow)
 
-    cells, shares, places = (each.reshape(-1, *each.shape[asked.ndim - 1 :]) for each in (corners, share, asked))
+    cells, shares, places = (
+        each.reshape(-1, *each.shape[asked.ndim - 1 :])
+        for each in (corners, share, asked)
+    )
     return jax.vmap(found)(cells, shares, places, narrow.reshape(-1)).reshape(u.shape)
 
 
 def _real(name: str, value: Any, like: Any = None) -> jax.Array:
     if not isinstance(value, jax.Array) and type(value) is not float:
-        if isinstance(value, (list, tuple)) and any(isinstance(each, jax.Array) for each in value):
+        if isinstance(value, (list, tuple)) and any(
+            isinstance(each, jax.Array) for each in value
+        ):
             value = jnp.stack([_real(name, each) for each in value])
         else:
             checked = validation.numbers(name, value)
             if isinstance(value, (int, float)) and not isinstance(value, np.generic):
-                value = float(checked)  # a plain number takes the precision of what it meets
-            elif isinstance(value, (np.ndarray, np.generic)) and value.dtype.char in "efd" and value.dtype.isnative:
-                value = np.asarray(value)  # plain, which a masked array is not even if it masks nothing
+                value = float(
+                    checked
+                )  # a plain number takes the precision of what it meets
+            elif (
+                isinstance(value, (np.ndarray, np.generic))
+                and value.dtype.char in "efd"
+                and value.dtype.isnative
+            ):
+                value = np.asarray(
+                    value
+                )  # plain, which a masked array is not even if it masks nothing
             else:
                 value = jnp.asarray(checked, float)
     array = jnp.asarray(value)
     if jnp.issubdtype(array.dtype, jnp.floating):
         return array
     if array.dtype == bool or jnp.issubdtype(array.dtype, jnp.complexfloating):
-        raise InvalidValueError(name, "be an array of real numbers", f"one of {array.dtype}")
+        raise InvalidValueError(
+            name, "be an array of real numbers", f"one of {array.dtype}"
+        )
     return array.astype(float)
 
 
 def _extremes(name: str, value: jax.Array) -> tuple[float, float] | None:
-    if isinstance(value, Tracer) or not value.size or any(device.platform != "cpu" for device in value.devices()):
+    if (
+        isinstance(value, Tracer)
+        or not value.size
+        or any(device.platform != "cpu" for device in value.devices())
+    ):
         return None
     numbers = np.asarray(value)
-    low, high = float(numbers.min()), float(numbers.max())
+    low = float(numbers.min())
+    high = float(numbers.max())
     validation.within_range(name, low, high)
     return low, high
 

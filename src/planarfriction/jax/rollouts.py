@@ -31,7 +31,9 @@ def wrench(model: FrictionPytree, state, twist, normal_force) -> jax.Array:
     return model.wrench(state, twist, normal_force)
 
 
-def step(model: FrictionPytree, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
+def step(
+    model: FrictionPytree, state, twist, normal_force, dt
+) -> tuple[jax.Array, jax.Array]:
     """Return the state after `dt` [s] of a constant twist, and the wrench at the end. Stable at any `dt`."""
     return model.step(state, twist, normal_force, dt)
 
@@ -63,16 +65,27 @@ def rollout(
     `jit`, parameters outside their range make the adjoint end in an error of JAX whose last line names them.
     """
     front = "planarfriction.jax"
-    state, twist, load, dt = rollout_inputs(model, FrictionPytree, front, state, twist, normal_force, dt, method)
+    state, twist, load, dt = rollout_inputs(
+        model, FrictionPytree, front, state, twist, normal_force, dt, method
+    )
     if parameters is not None:
         model = model.replace(parameters=model._record(parameters))
     inner = model.state_shape
-    shape = jnp.broadcast_shapes(twist.shape[:-1], load.shape, (*state.shape[: state.ndim - len(inner)], 1))
+    shape = jnp.broadcast_shapes(
+        twist.shape[:-1], load.shape, (*state.shape[: state.ndim - len(inner)], 1)
+    )
     state = jnp.broadcast_to(state, (*shape[:-1], *inner))
-    twist, load = jnp.broadcast_to(twist, (*shape, 3)), jnp.broadcast_to(load.astype(twist.dtype), shape)
+    twist, load = (
+        jnp.broadcast_to(twist, (*shape, 3)),
+        jnp.broadcast_to(load.astype(twist.dtype), shape),
+    )
     if method == "adjoint" or (method is None and jax.default_backend() == "cpu"):
-        return Rollout(*adjoint.rollout(model, state, twist, load, dt, strict=method == "adjoint"))
+        return Rollout(
+            *adjoint.rollout(model, state, twist, load, dt, strict=method == "adjoint")
+        )
     return Rollout(*model.rollout(state, twist, load, dt))
 
 
-simulate_scene = simulator(xp, lambda function, numbers: adjoint.call(SceneOperation(function), (), numbers))
+simulate_scene = simulator(
+    xp, lambda function, numbers: adjoint.call(SceneOperation(function), (), numbers)
+)

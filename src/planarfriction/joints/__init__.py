@@ -5,7 +5,12 @@ numbers are in rad, N m, V and s.
 """
 
 from planarfriction.joints.fit import identify_joint
-from planarfriction.joints.friction import JointFriction, apply_to_spec, set_level, to_mjcf
+from planarfriction.joints.friction import (
+    JointFriction,
+    apply_to_spec,
+    set_level,
+    to_mjcf,
+)
 from planarfriction.joints.log import Drive, JointLog, Plant
 from planarfriction.joints.result import JointFit
 

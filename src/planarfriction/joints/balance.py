@@ -48,7 +48,9 @@ HUBER = 3.0
 """Error, in standard deviations, from which on it counts linearly."""
 
 
-def predict(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> list[np.ndarray]:
+def predict(
+    rows: Sequence[Rows], values: Values, terms: Sequence[str]
+) -> list[np.ndarray]:
     """Compute the smoothed torque of each log at all of its rows, `[R]` [N m]."""
     return [_predict(each, values, terms) for each in rows]
 
@@ -56,7 +58,12 @@ def predict(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> list[
 def errors(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> np.ndarray:
     """Compute modelled less measured torque at the fitted rows of all logs [N m]."""
     pairs = zip(predict(rows, values, terms), rows, strict=True)
-    return np.concatenate([torque[log.fitted] - log.measured(values.get("delay", 0.0)) for torque, log in pairs])
+    return np.concatenate(
+        [
+            torque[log.fitted] - log.measured(values.get("delay", 0.0))
+            for torque, log in pairs
+        ]
+    )
 
 
 def miss(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> float:
@@ -65,10 +72,13 @@ def miss(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> float:
 
 
 def _predict(rows: Rows, values: Values, terms: Sequence[str]) -> np.ndarray:
-    speed, direction = rows.speed, rows.direction
+    speed = rows.speed
+    direction = rows.direction
     gravity = np.zeros_like(speed)
     if "gravity" in terms:
-        gravity = values["gravity_sin"] * np.sin(rows.angle) + values["gravity_cos"] * np.cos(rows.angle)
+        gravity = values["gravity_sin"] * np.sin(rows.angle) + values[
+            "gravity_cos"
+        ] * np.cos(rows.angle)
     level = np.full_like(speed, values["mu_c"])
     if "stribeck" in terms:
         level += values["rise"] * np.exp(-((speed / values["v_s"]) ** 2))
@@ -81,22 +91,38 @@ def _predict(rows: Rows, values: Values, terms: Sequence[str]) -> np.ndarray:
     share = values["load"] if "load" in terms else 0.0
     uneven = values.get("asymmetry", 0.0)
     through = driving + direction * level + viscous
-    through = np.abs(through) / (1.0 - share * np.clip(np.sign(through) * direction, -1.0, 1.0))
+    through = np.abs(through) / (
+        1.0 - share * np.clip(np.sign(through) * direction, -1.0, 1.0)
+    )
     for _ in range(ROUNDS if share else 1):
         even = level + share * through
-        friction = _bent(rows, direction * even + uneven, even + direction * uneven, values, terms)
-        through = np.abs(driving + rows.smoothed(friction + viscous)) if share else through
+        friction = _bent(
+            rows, direction * even + uneven, even + direction * uneven, values, terms
+        )
+        through = (
+            np.abs(driving + rows.smoothed(friction + viscous)) if share else through
+        )
     found = inertial + rows.smoothed(friction + viscous + gravity)
-    return values.get("torque_offset", 0.0) + rows.low_passed(found, values.get("low_pass", 0.0))
+    return values.get("torque_offset", 0.0) + rows.low_passed(
+        found, values.get("low_pass", 0.0)
+    )
 
 
-def _bent(rows: Rows, sliding: np.ndarray, level: np.ndarray, values: Values, terms: Sequence[str]) -> np.ndarray:
+def _bent(
+    rows: Rows,
+    sliding: np.ndarray,
+    level: np.ndarray,
+    values: Values,
+    terms: Sequence[str],
+) -> np.ndarray:
     """Compute the torque of bristles that follow sliding friction over the path, plus their damping."""
     if "bristles" not in terms:
         return sliding
     stiffness = values["sigma_0"]
     lagged = np.empty((len(sliding), 1))
-    follow_path(sliding[:, None], rows.path * stiffness / np.maximum(level, 1e-9), lagged)
+    follow_path(
+        sliding[:, None], rows.path * stiffness / np.maximum(level, 1e-9), lagged
+    )
     torque = lagged[:, 0]
     return torque + values["sigma_1"] / stiffness * np.gradient(torque, rows.spacing)
 
@@ -128,7 +154,12 @@ class Refined(NamedTuple):
 def names_of(terms: Sequence[str], late: str) -> list[str]:
     """Return the names of what is estimated; `late` is "delay" or "low_pass"."""
     offset = [] if "asymmetry" in terms else ["torque_offset"]
-    return [*ALWAYS, *offset, late, *(name for term in TERMS if term in terms for name in TERMS[term])]
+    return [
+        *ALWAYS,
+        *offset,
+        late,
+        *(name for term in TERMS if term in terms for name in TERMS[term]),
+    ]
 
 
 class _Scaled:
@@ -147,16 +178,29 @@ class _Scaled:
             "sigma_2": 0.1 * level / fastest, "viscous_asymmetry": 0.1 * level / fastest,
         }  # fmt: skip
         self.names = names
-        self.scale = np.array([1.0 if each in FACTORS else max(abs(values[each]), least[each]) for each in names])
+        self.scale = np.array(
+            [
+                1.0 if each in FACTORS else max(abs(values[each]), least[each])
+                for each in names
+            ]
+        )
         self.start = (
-            np.array([np.log(values[each]) if each in FACTORS else values[each] for each in names]) / self.scale
+            np.array(
+                [
+                    np.log(values[each]) if each in FACTORS else values[each]
+                    for each in names
+                ]
+            )
+            / self.scale
         )
 
     def values(self, x: np.ndarray) -> dict[str, float]:
         """Return numbers by name, within their ranges."""
         scaled = (x * self.scale).tolist()
         found = {
-            name: float(np.exp(np.clip(value, -30.0, 30.0))) if name in FACTORS else value
+            name: float(np.exp(np.clip(value, -30.0, 30.0)))
+            if name in FACTORS
+            else value
             for name, value in zip(self.names, scaled, strict=True)
         }
         if "load" in found:
@@ -189,8 +233,16 @@ def refine(
     x = scaled.start
     for _ in range(2 if scatter is None else 1):
         sizes = _scatter(at(x), reversing) if scatter is None else scatter
-        weighted: Callable[[np.ndarray], Any] = lambda x: at(x) / sizes[reversing]  # noqa: B023, E731
-        x = least_squares(weighted, x, diff_step=1e-5, max_nfev=12, ftol=FINE, loss="huber", f_scale=HUBER).x
+        weighted: Callable[[np.ndarray], Any] = lambda x: at(x) / sizes[reversing]  # noqa: B023
+        x = least_squares(
+            weighted,
+            x,
+            diff_step=1e-5,
+            max_nfev=12,
+            ftol=FINE,
+            loss="huber",
+            f_scale=HUBER,
+        ).x
     return _judged(scaled, x, at, sizes, rows, tuple(terms))
 
 
@@ -199,7 +251,12 @@ def _scatter(error: np.ndarray, reversing: np.ndarray) -> np.ndarray:
     size = np.abs(error)
     least = max(0.3 * float(np.median(size)), 1e-12)
     groups = [size[reversing == kind] for kind in (0, 1)]
-    return np.array([max(NORMAL * np.median(each), least) if len(each) > 20 else least for each in groups])
+    return np.array(
+        [
+            max(NORMAL * np.median(each), least) if len(each) > 20 else least
+            for each in groups
+        ]
+    )
 
 
 def _judged(
@@ -217,10 +274,14 @@ def _judged(
     size = np.abs(weighted)
     pull = np.minimum(1.0, HUBER / np.maximum(size, 1e-9))
     steps = 1e-4 * np.eye(len(x))
-    jacobian = np.stack([(errors(x + h) - error) / 1e-4 / sizes[reversing] for h in steps], axis=1)
+    jacobian = np.stack(
+        [(errors(x + h) - error) / 1e-4 / sizes[reversing] for h in steps], axis=1
+    )
     inverse = np.linalg.pinv(jacobian.T @ (pull[:, None] * jacobian), rcond=1e-13)
     parts = blocks_of(rows)
-    gradients = np.array([(jacobian[part] * (pull * weighted)[part, None]).sum(axis=0) for part in parts])
+    gradients = np.array(
+        [(jacobian[part] * (pull * weighted)[part, None]).sum(axis=0) for part in parts]
+    )
     count = len(parts)
     freedom = max(count - len(x), 2)
     inflated = count / max(count - len(x), 1)

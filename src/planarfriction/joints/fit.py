@@ -8,7 +8,13 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.joints import balance, goal_fit, problem, torque_fit, torque_verdicts
+from planarfriction.joints import (
+    balance,
+    goal_fit,
+    problem,
+    torque_fit,
+    torque_verdicts,
+)
 from planarfriction.joints.balance import FACTORS, MOST_LOAD, Refined
 from planarfriction.joints.log import JointLog, Plant, as_joint_logs
 from planarfriction.joints.result import JointFit, Series
@@ -49,14 +55,18 @@ def identify_joint(
     plant = validation.instance("plant", plant, Plant, "a Plant")
     logs = as_joint_logs(logs, plant)
     progress = progress or (lambda words: None)
-    gain = None if torque_gain is None else validation.positive("torque_gain", torque_gain)
+    gain = (
+        None if torque_gain is None else validation.positive("torque_gain", torque_gain)
+    )
     by_torque = logs[0].torque is not None
     auto = isinstance(terms, str) and terms == "auto"
     chosen = () if auto else _chosen(terms, by_torque)
     if by_torque:
         return _fit_torques(logs, plant, chosen, auto, progress)
     if gain is None and not plant.mass and not plant.inertia:
-        raise InvalidValueError("plant", "have a mass or an inertia, or torque_gain be given", plant)
+        raise InvalidValueError(
+            "plant", "have a mass or an inertia, or torque_gain be given", plant
+        )
     base = problem.Problem(logs, plant, gain, (), -(-goal_fit.GROUPS // len(logs)))
     return goal_fit.fit_goals(base, chosen, auto, progress)
 
@@ -68,7 +78,9 @@ def _chosen(terms: Sequence[str] | str, by_torque: bool) -> tuple[str, ...]:
     for term in chosen:
         if term not in known:
             kind = "logs of a torque" if by_torque else "logs of a goal or voltage"
-            raise InvalidValueError("terms", f"be some of {', '.join(known)} for {kind}", term)
+            raise InvalidValueError(
+                "terms", f"be some of {', '.join(known)} for {kind}", term
+            )
     for term, other in problem.NEEDS.items():
         if term in chosen and other not in chosen:
             raise InvalidValueError("terms", f"have {other} with {term}", chosen)
@@ -76,7 +88,11 @@ def _chosen(terms: Sequence[str] | str, by_torque: bool) -> tuple[str, ...]:
 
 
 def _fit_torques(
-    logs: tuple[JointLog, ...], plant: Plant, chosen: tuple[str, ...], auto: bool, progress: Progress
+    logs: tuple[JointLog, ...],
+    plant: Plant,
+    chosen: tuple[str, ...],
+    auto: bool,
+    progress: Progress,
 ) -> JointFit:
     data = torque_fit.prepare(logs)
     ranked = torque_fit.choose(data, chosen, auto, progress)
@@ -84,14 +100,35 @@ def _fit_torques(
     values, spread, intervals = numbers_of(fit)
     rest = torque_verdicts.rest_of(data, fit)
     torque_verdicts.refuse(data, fit, rest, intervals)
-    plain = {"delay": 0.0} | {name: value for name, value in fit.values.items() if name not in FACTORS}
+    plain = {"delay": 0.0} | {
+        name: value for name, value in fit.values.items() if name not in FACTORS
+    }
     baseline = balance.refine(data.rows, plain, (), fit.scatter)
     scores = {each.terms: each.score for each in (*ranked, baseline)}
-    without = {term: tuple(each for each in fit.terms if each != term) for term in fit.terms}
-    gains = {term: scores[terms] / fit.score for term, terms in without.items() if terms in scores}
-    unclear = {} if auto else {term: why for term in fit.terms if (why := torque_fit.doubt(data, fit, term))}
-    verdicts = torque_verdicts.judge(data, fit, rest, logs, plant, values, intervals, gains)
-    doubts = [torque_verdicts.Verdict(term, False, f"not shown by these logs: {why}") for term, why in unclear.items()]
+    without = {
+        term: tuple(each for each in fit.terms if each != term) for term in fit.terms
+    }
+    gains = {
+        term: scores[terms] / fit.score
+        for term, terms in without.items()
+        if terms in scores
+    }
+    unclear = (
+        {}
+        if auto
+        else {
+            term: why
+            for term in fit.terms
+            if (why := torque_fit.doubt(data, fit, term))
+        }
+    )
+    verdicts = torque_verdicts.judge(
+        data, fit, rest, logs, plant, values, intervals, gains
+    )
+    doubts = [
+        torque_verdicts.Verdict(term, False, f"not shown by these logs: {why}")
+        for term, why in unclear.items()
+    ]
     series = _series(data, fit, baseline)
     return JointFit(
         logs, _settled(plant, values), None, fit.terms, values, spread, intervals,
@@ -102,7 +139,9 @@ def _fit_torques(
     )  # fmt: skip
 
 
-def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float], dict[str, tuple[float, float] | None]]:
+def numbers_of(
+    fit: Refined,
+) -> tuple[dict[str, float], dict[str, float], dict[str, tuple[float, float] | None]]:
     """Return the numbers of a fit to torques, their standard errors and their 95 % intervals, by name.
 
     Gravity is given by its size and the angle at which it vanishes.
@@ -131,7 +170,8 @@ def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float], dict[s
     if values.get("load", 0.0) >= MOST_LOAD:
         intervals["load"] = None
     if "gravity" in fit.terms:
-        sine, cosine = fit.values["gravity_sin"], fit.values["gravity_cos"]
+        sine = fit.values["gravity_sin"]
+        cosine = fit.values["gravity_cos"]
         size = float(np.hypot(sine, cosine))
         error = float(np.hypot(fit.spread["gravity_sin"], fit.spread["gravity_cos"]))
         add("gravity", size, error)
@@ -147,17 +187,28 @@ def _settled(plant: Plant, values: Mapping[str, float]) -> Plant:
     own = values["inertia"] - (plant.mass + arm / 3.0) * plant.length**2
     inertia = max(own, 0.0) if plant.inertia is None else plant.inertia
     offset = values.get("offset", 0.0) if plant.offset is None else plant.offset
-    return replace(plant, inertia=inertia, arm_mass=arm, offset=offset if plant.mass else plant.offset)
+    return replace(
+        plant,
+        inertia=inertia,
+        arm_mass=arm,
+        offset=offset if plant.mass else plant.offset,
+    )
 
 
 def _series(data: Data, fit: Refined, baseline: Refined) -> tuple[Series, ...]:
     """Return the smoothed torque of each log as measured and modelled."""
-    fitted, rest = (balance.predict(data.rows, each.values, each.terms) for each in (fit, baseline))
+    fitted, rest = (
+        balance.predict(data.rows, each.values, each.terms) for each in (fit, baseline)
+    )
     delay = fit.values.get("delay", 0.0)
     columns = zip(data.rows, fitted, rest, strict=True)
     return tuple(
         Series(
-            rows.even.log.name, rows.time[rows.fitted], rows.measured(delay), torque[rows.fitted], other[rows.fitted]
+            rows.even.log.name,
+            rows.time[rows.fitted],
+            rows.measured(delay),
+            torque[rows.fitted],
+            other[rows.fitted],
         )
         for rows, torque, other in columns
     )

@@ -60,7 +60,11 @@ class JointFriction(Checked):
         if self.mu_s < self.mu_c:
             raise InvalidValueError("mu_s", f"be >= mu_c = {self.mu_c:g}", self.mu_s)
         if abs(self.asymmetry) >= self.mu_c:
-            raise InvalidValueError("asymmetry", f"be within mu_c = {self.mu_c:g}, or friction drives", self.asymmetry)
+            raise InvalidValueError(
+                "asymmetry",
+                f"be within mu_c = {self.mu_c:g}, or friction drives",
+                self.asymmetry,
+            )
         if abs(self.viscous_asymmetry) > self.sigma_2:
             rule = f"be within sigma_2 = {self.sigma_2:g}, or friction drives"
             raise InvalidValueError("viscous_asymmetry", rule, self.viscous_asymmetry)
@@ -71,18 +75,30 @@ class JointFriction(Checked):
 
         Raises InvalidValueError for a rigid joint above 1e47 N m, whose stiffness no law takes.
         """
-        return LuGre(self.mu_c, self.mu_s, self.v_s, self.sigma_0 or self.mu_s / RIGID, self.sigma_1, self.sigma_2)
+        return LuGre(
+            self.mu_c,
+            self.mu_s,
+            self.v_s,
+            self.sigma_0 or self.mu_s / RIGID,
+            self.sigma_1,
+            self.sigma_2,
+        )
 
     def load(self, tau_motor: float, tau_external: float) -> float:
         """Compute the growth of the level [N m] at torques of the motor and of all else [N m].
 
         Raises InvalidValueError for torques that are not finite.
         """
-        motor, outside = validation.number("tau_motor", tau_motor), validation.number("tau_external", tau_external)
+        motor = validation.number("tau_motor", tau_motor)
+        outside = validation.number("tau_external", tau_external)
         return abs(self.load_motor * motor - self.load_external * outside)
 
     def along(
-        self, time: ArrayLike, speed: ArrayLike, tau_motor: ArrayLike = 0.0, tau_external: ArrayLike = 0.0
+        self,
+        time: ArrayLike,
+        speed: ArrayLike,
+        tau_motor: ArrayLike = 0.0,
+        tau_external: ArrayLike = 0.0,
     ) -> np.ndarray:
         """Compute the torque that friction takes along a motion, positive along the speed, `[T]` [N m].
 
@@ -93,7 +109,10 @@ class JointFriction(Checked):
         """
         time = increasing(time)
         given = {"speed": speed, "tau_motor": tau_motor, "tau_external": tau_external}
-        columns = [validation.filled(name, value, (len(time),)) for name, value in given.items()]
+        columns = [
+            validation.filled(name, value, (len(time),))
+            for name, value in given.items()
+        ]
         taken = np.empty(len(time))
         run_measured(self.numbers, time, *columns, taken)
         return taken
@@ -102,19 +121,27 @@ class JointFriction(Checked):
     def numbers(self) -> JointNumbers:
         """Numbers with bristles, as a step reads them."""
         return JointNumbers(
-            self.law.numbers, self.load_motor, self.load_external, self.asymmetry, self.viscous_asymmetry
+            self.law.numbers,
+            self.load_motor,
+            self.load_external,
+            self.asymmetry,
+            self.viscous_asymmetry,
         )
 
     @property
     def rigid_numbers(self) -> JointNumbers:
         """Numbers as a simulated run reads them: rigid friction without bristles."""
         law = self.law.numbers
-        return self.numbers._replace(law=LawNumbers(*law)._replace(sigma_0=self.sigma_0 or 0.0))
+        return self.numbers._replace(
+            law=LawNumbers(*law)._replace(sigma_0=self.sigma_0 or 0.0)
+        )
 
 
 def _representable(friction: JointFriction) -> JointFriction:
     """Return a friction that MuJoCo's joint or dcmotor can hold, or raise InvalidValueError."""
-    friction = validation.instance("friction", friction, JointFriction, "a JointFriction")
+    friction = validation.instance(
+        "friction", friction, JointFriction, "a JointFriction"
+    )
     if friction.mu_s > friction.mu_c and not friction.sigma_0:
         rule = "be mu_c for rigid friction, as frictionloss has one level: set mu_s=None, or give sigma_0 for a dcmotor"
         raise InvalidValueError("mu_s", rule, friction.mu_s)
@@ -132,7 +159,13 @@ WEAK = 1e-6
 def motor_lugre(friction: JointFriction, load: float = 0.0) -> list[float]:
     """Return the numbers `lugre` of MuJoCo's dcmotor: sigma_0, sigma_1, and mu_c, mu_s, v_s at a load [N m]."""
     law = friction.law
-    return [law.sigma_0, law.sigma_1, friction.mu_c + load, friction.mu_s + load, friction.v_s]
+    return [
+        law.sigma_0,
+        law.sigma_1,
+        friction.mu_c + load,
+        friction.mu_s + load,
+        friction.v_s,
+    ]
 
 
 def to_mjcf(
@@ -153,8 +186,11 @@ def to_mjcf(
     """
     friction = _representable(friction)
     joint = escape(validation.text("joint", joint), {'"': "&quot;"})
-    armature, back_emf = validation.non_negative("armature", armature), validation.non_negative("back_emf", back_emf)
-    torque_gain = None if torque_gain is None else validation.positive("torque_gain", torque_gain)
+    armature = validation.non_negative("armature", armature)
+    back_emf = validation.non_negative("back_emf", back_emf)
+    torque_gain = (
+        None if torque_gain is None else validation.positive("torque_gain", torque_gain)
+    )
     loss = 0.0 if friction.sigma_0 else friction.mu_c
     values = {"damping": friction.sigma_2, "frictionloss": loss, "armature": armature}
     words = " ".join(f'{name}="{value:.6g}"' for name, value in values.items())
@@ -169,7 +205,9 @@ def to_mjcf(
     return "\n".join(lines)
 
 
-def apply_to_spec(friction: JointFriction, spec: Any, joint: str, *, armature: float | None = None) -> None:
+def apply_to_spec(
+    friction: JointFriction, spec: Any, joint: str, *, armature: float | None = None
+) -> None:
     """Set the friction of a joint of a `mujoco.MjSpec`: damping and frictionloss, or the `lugre` of its dcmotor.
 
     Raises InvalidValueError for a joint that is not there, for bristles without a dcmotor on the joint, and for
@@ -179,21 +217,33 @@ def apply_to_spec(friction: JointFriction, spec: Any, joint: str, *, armature: f
     found = spec.joint(validation.text("joint", joint))
     if found is None:
         raise InvalidValueError("joint", "be the name of a joint of the model", joint)
-    found.damping = np.array([friction.sigma_2, 0.0, 0.0]) if np.ndim(found.damping) else friction.sigma_2
+    found.damping = (
+        np.array([friction.sigma_2, 0.0, 0.0])
+        if np.ndim(found.damping)
+        else friction.sigma_2
+    )
     found.frictionloss = 0.0 if friction.sigma_0 else friction.mu_c
     if armature is not None:
         found.armature = armature
     if not friction.sigma_0:
         return
-    motors = [each for each in spec.actuators if each.target == joint and each.dyntype.name == "mjDYN_DCMOTOR"]
+    motors = [
+        each
+        for each in spec.actuators
+        if each.target == joint and each.dyntype.name == "mjDYN_DCMOTOR"
+    ]
     if not motors:
         raise InvalidValueError("joint", "have a dcmotor, which holds bristles", joint)
-    motor, lugre = motors[0], motor_lugre(friction)
+    motor = motors[0]
+    lugre = motor_lugre(friction)
     motor.actdim += int(motor.dynprm[5] == 0.0)  # the state of the bristles
-    motor.dynprm[5:7], motor.biasprm[3:6] = lugre[:2], lugre[2:]
+    motor.dynprm[5:7] = lugre[:2]
+    motor.biasprm[3:6] = lugre[2:]
 
 
-def set_level(friction: JointFriction, model: Any, data: Any, dof: int, motor: int | None = None) -> None:
+def set_level(
+    friction: JointFriction, model: Any, data: Any, dof: int, motor: int | None = None
+) -> None:
     """Set the level of a MuJoCo model to the load of the step before; call it in front of each `mj_step`.
 
     `dof` is that of the joint, `motor` the number of its dcmotor, of gear 1, if the friction has bristles. Bristles
@@ -201,10 +251,14 @@ def set_level(friction: JointFriction, model: Any, data: Any, dof: int, motor: i
     """
     outside = data.qfrc_applied[dof] - data.qfrc_bias[dof]
     if motor is None:
-        model.dof_frictionloss[dof] = friction.mu_c + friction.load(data.qfrc_actuator[dof], outside)
+        model.dof_frictionloss[dof] = friction.mu_c + friction.load(
+            data.qfrc_actuator[dof], outside
+        )
     else:  # the force of a dcmotor is what its friction leaves
         resistance, kt = model.actuator_gainprm[motor, :2]
-        load = friction.load(kt * (data.ctrl[motor] - kt * data.qvel[dof]) / resistance, outside)
+        load = friction.load(
+            kt * (data.ctrl[motor] - kt * data.qvel[dof]) / resistance, outside
+        )
         level = motor_lugre(friction, load)[2:4]
         model.actuator_biasprm[motor, 3:5] = level
         bristles = model.actuator_actadr[motor] + model.actuator_actnum[motor] - 1

@@ -74,16 +74,25 @@ class Trial:
         from scipy.stats import t
 
         pairs = zip((less.short, *less.halves), (self.short, *self.halves), strict=True)
-        falls, *halves = (np.log(np.maximum(one, 1e-300) / np.maximum(other, 1e-300)) for one, other in pairs)
+        falls, *halves = (
+            np.log(np.maximum(one, 1e-300) / np.maximum(other, 1e-300))
+            for one, other in pairs
+        )
         scatter = t.ppf(0.95, len(falls) - 1) * falls.std(ddof=1) / np.sqrt(len(falls))
-        return float(falls.mean()), float(scatter), [float(each.mean()) for each in halves]
+        return (
+            float(falls.mean()),
+            float(scatter),
+            [float(each.mean()) for each in halves],
+        )
 
     @property
     def jackknife(self) -> dict[str, float]:
         """Standard error of each estimate by leaving out groups."""
         count = len(self.folds)
         table = np.array([[each[name] for name in self.values] for each in self.folds])
-        errors = np.sqrt((count - 1) / count * ((table - table.mean(axis=0)) ** 2).sum(axis=0))
+        errors = np.sqrt(
+            (count - 1) / count * ((table - table.mean(axis=0)) ** 2).sum(axis=0)
+        )
         return dict(zip(self.values, errors.tolist(), strict=True))
 
     def interval(self, name: str, shift: float) -> tuple[float, float] | None:
@@ -93,8 +102,11 @@ class Trial:
         """
         from scipy.stats import t
 
-        value, kind = self.values[name], PARAMETERS[name]
-        reach = float(t.ppf(0.975, len(self.folds) - 1) * np.hypot(self.jackknife[name], shift))
+        value = self.values[name]
+        kind = PARAMETERS[name]
+        reach = float(
+            t.ppf(0.975, len(self.folds) - 1) * np.hypot(self.jackknife[name], shift)
+        )
         if kind.logarithmic:
             if min(np.log(value / kind.low), np.log(kind.high / value)) < AT_BOUND:
                 return None
@@ -107,7 +119,10 @@ class Trial:
 
 
 def minimise(
-    problem: Problem, start: Mapping[str, float], spans: Sequence[float] = SPANS, without: Sequence[int] = ()
+    problem: Problem,
+    start: Mapping[str, float],
+    spans: Sequence[float] = SPANS,
+    without: Sequence[int] = (),
 ) -> dict[str, float]:
     """Return the values of least squared errors, then of least softened ones, which large errors sway less.
 
@@ -118,7 +133,9 @@ def minimise(
     for span in spans:
         values = _least(problem, values, span, without)
     width = float(np.median(np.abs(_rest(problem.errors(values), without))))
-    return _least(problem, values, np.inf, without, loss="soft_l1", f_scale=max(width, 1e-12))
+    return _least(
+        problem, values, np.inf, without, loss="soft_l1", f_scale=max(width, 1e-12)
+    )
 
 
 def _rest(groups: list[np.ndarray], without: Sequence[int]) -> np.ndarray:
@@ -126,7 +143,11 @@ def _rest(groups: list[np.ndarray], without: Sequence[int]) -> np.ndarray:
 
 
 def _least(
-    problem: Problem, values: Mapping[str, float], span: float, without: Sequence[int], **loss: Any
+    problem: Problem,
+    values: Mapping[str, float],
+    span: float,
+    without: Sequence[int],
+    **loss: Any,
 ) -> dict[str, float]:
     from scipy.optimize import least_squares
 
@@ -137,13 +158,17 @@ def _least(
         return np.exp(np.where(log, x, 0.0))
 
     def by_name(x: np.ndarray) -> dict[str, float]:
-        return dict(zip(problem.names, np.where(log, factor(x), x).tolist(), strict=True))
+        return dict(
+            zip(problem.names, np.where(log, factor(x), x).tolist(), strict=True)
+        )
 
     def coordinates(numbers: Sequence[float]) -> np.ndarray:
         return np.where(log, np.log(np.where(log, numbers, 1.0)), numbers)
 
-    low, high = (coordinates([getattr(each, end) for each in kinds]) for end in ("low", "high"))
-    slopes: Any = lambda x: _rest(problem.slopes(by_name(x), span), without) * factor(x)  # noqa: E731
+    low, high = (
+        coordinates([getattr(each, end) for each in kinds]) for end in ("low", "high")
+    )
+    slopes: Any = lambda x: _rest(problem.slopes(by_name(x), span), without) * factor(x)
     settings: Any = {"x_scale": "jac", "ftol": FINE, "max_nfev": MOST, **loss}
     found = least_squares(
         lambda x: _rest(problem.errors(by_name(x), span), without),
@@ -155,17 +180,32 @@ def _least(
     return by_name(found.x)
 
 
-def with_term(problem: Problem, values: Mapping[str, float], term: str) -> tuple[Problem, dict[str, float]]:
+def with_term(
+    problem: Problem, values: Mapping[str, float], term: str
+) -> tuple[Problem, dict[str, float]]:
     """Return a problem with one term more than that of `values`, and its best values from the best of its starts."""
     problem = problem.with_terms([*problem.terms, term])
     starts = [{**values, **guess} for guess in problem.guesses(term, values)]
-    ranked = [starts[0], *sorted(starts[1:], key=lambda each: problem.costs(each, SHORT).mean())[: BEST - 1]]
-    return problem, min((minimise(problem, each) for each in ranked), key=lambda each: problem.costs(each).mean())
+    ranked = [
+        starts[0],
+        *sorted(starts[1:], key=lambda each: problem.costs(each, SHORT).mean())[
+            : BEST - 1
+        ],
+    ]
+    return problem, min(
+        (minimise(problem, each) for each in ranked),
+        key=lambda each: problem.costs(each).mean(),
+    )
 
 
-def attempt(problem: Problem, values: dict[str, float], progress: Callable[[str], None]) -> Trial:
+def attempt(
+    problem: Problem, values: dict[str, float], progress: Callable[[str], None]
+) -> Trial:
     """Fit a problem with each group left out, then with each half, and measure the errors of what was left out."""
-    folds, errors, short, halves = [], [], [], []
+    folds = []
+    errors = []
+    short = []
+    halves = []
     words = " and ".join(problem.terms) or "Coulomb and viscous friction"
     for i, name in enumerate(problem.groups):
         progress(f"{words}; left out: {name}")
@@ -176,7 +216,15 @@ def attempt(problem: Problem, values: dict[str, float], progress: Callable[[str]
         progress(f"{words}; left out: {len(half)} of {len(folds)}")
         halves.append(problem.costs(minimise(problem, values, (), half), SHORT)[half])
     again = _least(problem, values, SHORT, ())
-    return Trial(problem, values, tuple(folds), again, np.array(errors), np.array(short), tuple(halves))
+    return Trial(
+        problem,
+        values,
+        tuple(folds),
+        again,
+        np.array(errors),
+        np.array(short),
+        tuple(halves),
+    )
 
 
 def improves(more: Trial, less: Trial) -> bool:
@@ -196,25 +244,35 @@ def _check_related(problem: Problem, runs: Sequence[np.ndarray]) -> Iterator[Ver
     """
     missed = {}
     for run, log in zip(runs, problem.logs, strict=True):
-        error, swing = np.abs(run[:, 0] - log.q).mean(), np.abs(log.q - log.q.mean()).mean()
+        error = np.abs(run[:, 0] - log.q).mean()
+        swing = np.abs(log.q - log.q.mean()).mean()
         if error > UNRELATED * swing:
-            missed[log.name] = f"{error:.2g} rad left of a mean swing of {swing:.2g} rad about its mean"
+            missed[log.name] = (
+                f"{error:.2g} rad left of a mean swing of {swing:.2g} rad about its mean"
+            )
     if len(missed) > 1 or len(missed) == len(problem.logs):
         rule = "follow from goal or voltage: check units, signs, gains, and that all belong to one joint"
-        raise InvalidValueError(f"q of {', '.join(missed)}", rule, next(iter(missed.values())))
+        raise InvalidValueError(
+            f"q of {', '.join(missed)}", rule, next(iter(missed.values()))
+        )
     for name, found in missed.items():
         text = f"{name}: {found}: this log contradicts the others; check its gains and units, or leave it out"
         yield Verdict("fit", False, text)
 
 
 def _is_vague(
-    name: str, values: Mapping[str, float], spread: Mapping[str, float], intervals: Mapping[str, Any]
+    name: str,
+    values: Mapping[str, float],
+    spread: Mapping[str, float],
+    intervals: Mapping[str, Any],
 ) -> bool:
     """Return True if the number of a term has no interval, or one of its own size."""
     return intervals[name] is None or not spread[name] < VAGUE * values[name]
 
 
-def fit_goals(base: Problem, chosen: Sequence[str], auto: bool, progress: Callable[[str], None]) -> JointFit:
+def fit_goals(
+    base: Problem, chosen: Sequence[str], auto: bool, progress: Callable[[str], None]
+) -> JointFit:
     """Fit the positions that runs from goal or voltage give, with the `chosen` terms, or with those that they ask for.
 
     Raises InvalidValueError for logs that no run from their goals resembles.
@@ -222,35 +280,63 @@ def fit_goals(base: Problem, chosen: Sequence[str], auto: bool, progress: Callab
     kept = first = attempt(base, minimise(base, base.start()), progress)
     pairs: dict[str, tuple[Trial, Trial]] = {}
     if chosen:
-        problem, values = base, first.values
+        problem = base
+        values = first.values
         for term in chosen:
             problem, values = with_term(problem, values, term)
         kept = attempt(problem, values, progress)
-    for term in (*TERMS, "stribeck") if auto else ():  # again, since bristles may hide a fall of friction
+    for term in (
+        (*TERMS, "stribeck") if auto else ()
+    ):  # again, since bristles may hide a fall of friction
         has = kept.problem.terms
-        if term in has or NEEDS.get(term, term) not in (*has, term) or (term in pairs and "bristles" not in has):
+        if (
+            term in has
+            or NEEDS.get(term, term) not in (*has, term)
+            or (term in pairs and "bristles" not in has)
+        ):
             continue
         more = attempt(*with_term(kept.problem, kept.values, term), progress)
         pairs[term] = more, kept
-        if term == "load" and not improves(more, kept):  # motor and load may have different shares
-            both = attempt(*with_term(more.problem, more.values, "directional"), progress)
+        if term == "load" and not improves(
+            more, kept
+        ):  # motor and load may have different shares
+            both = attempt(
+                *with_term(more.problem, more.values, "directional"), progress
+            )
             pairs[term] = (both, kept) if improves(both, kept) else pairs[term]
         kept = more if improves(*pairs[term]) else kept
-    for term in kept.problem.terms[:-1] if auto else ():  # what came later may explain what came before
-        rest = base.with_terms([each for each in kept.problem.terms if each != term and NEEDS.get(each) != term])
-        less = attempt(rest, minimise(rest, {name: kept.values[name] for name in rest.names}), progress)
+    for term in (
+        kept.problem.terms[:-1] if auto else ()
+    ):  # what came later may explain what came before
+        rest = base.with_terms(
+            [
+                each
+                for each in kept.problem.terms
+                if each != term and NEEDS.get(each) != term
+            ]
+        )
+        less = attempt(
+            rest,
+            minimise(rest, {name: kept.values[name] for name in rest.names}),
+            progress,
+        )
         pairs[term] = kept, less
         kept = kept if improves(kept, less) else less
     return result_of(kept, first, pairs)
 
 
-def result_of(kept: Trial, first: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> JointFit:
+def result_of(
+    kept: Trial, first: Trial, pairs: Mapping[str, tuple[Trial, Trial]]
+) -> JointFit:
     """Return the result of the trial that was kept: its intervals, and verdicts.
 
     Estimates also move if runs begin again at the measured motion: intervals count that shift.
     """
-    problem, values = kept.problem, kept.values
-    runs = [trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first)]
+    problem = kept.problem
+    values = kept.values
+    runs = [
+        trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first)
+    ]
     doubts = [*_check_related(problem, runs[0])]
     shifts = {name: abs(kept.again[name] - value) for name, value in values.items()}
     jackknife = kept.jackknife
@@ -262,11 +348,20 @@ def result_of(kept: Trial, first: Trial, pairs: Mapping[str, tuple[Trial, Trial]
     intervals = {name: kept.interval(name, shifts[name]) for name in values}
     unclear = {}
     for term in kept.terms:
-        vague = [name for name in TERMS[term] if name != "sigma_1" and _is_vague(name, values, spread, intervals)]
+        vague = [
+            name
+            for name in TERMS[term]
+            if name != "sigma_1" and _is_vague(name, values, spread, intervals)
+        ]
         if vague:
-            unclear[term] = f"{vague[0]} = {values[vague[0]]:.2g}, spread {spread[vague[0]]:.2g} between fits"
+            unclear[term] = (
+                f"{vague[0]} = {values[vague[0]]:.2g}, spread {spread[vague[0]]:.2g} between fits"
+            )
     verdicts = judge(kept, pairs)
-    doubts += [Verdict(term, False, f"not shown by these logs ({words})") for term, words in unclear.items()]
+    doubts += [
+        Verdict(term, False, f"not shown by these logs ({words})")
+        for term, words in unclear.items()
+    ]
     return JointFit(
         problem.logs, problem.settled(values), values.get("torque_gain", problem.torque_gain), kept.terms, values,
         spread, intervals, tuple(problem.groups), kept.errors, first.errors, series, unclear, (*verdicts, *doubts),

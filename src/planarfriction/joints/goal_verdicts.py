@@ -30,9 +30,18 @@ LONG = 0.1
 """Time [s] for which a joint stands."""
 
 WORDS = {
-    "load": ("the level grows with the torque through the gears", "not load-dependent as far as these logs tell"),
-    "stribeck": ("friction falls with speed from rest on", "no fall of friction with speed was seen"),
-    "bristles": ("the joint bends before it slips", "give rigid friction, or measure slow reversals"),
+    "load": (
+        "the level grows with the torque through the gears",
+        "not load-dependent as far as these logs tell",
+    ),
+    "stribeck": (
+        "friction falls with speed from rest on",
+        "no fall of friction with speed was seen",
+    ),
+    "bristles": (
+        "the joint bends before it slips",
+        "give rigid friction, or measure slow reversals",
+    ),
     "directional": (
         "torque of the motor and of the load raise the level by different shares",
         "no difference between motor and load driving was seen",
@@ -43,13 +52,22 @@ WORDS = {
 
 def judge(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> tuple[Verdict, ...]:
     """Return the verdicts on a trial that was kept, and on the `pairs` of trials with and without a term."""
-    return (*_on_terms(kept, pairs), *_on_drive(kept), *lags(kept.problem.logs), *_on_logs(kept))
+    return (
+        *_on_terms(kept, pairs),
+        *_on_drive(kept),
+        *lags(kept.problem.logs),
+        *_on_logs(kept),
+    )
 
 
-def _on_terms(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Verdict]:
+def _on_terms(
+    kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]
+) -> Iterator[Verdict]:
     for term, (trial, without) in pairs.items():
         gain, scatter, halves = trial.gains(without)
-        ratio, low, high, *both = np.exp([-gain, -gain - scatter, -gain + scatter, *np.negative(halves)])
+        ratio, low, high, *both = np.exp(
+            [-gain, -gain - scatter, -gain + scatter, *np.negative(halves)]
+        )
         numbers = f"errors of left-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
         numbers += f", {both[0]:.2f} and {both[1]:.2f} if half of the logs are fitted"
         good = term in kept.terms
@@ -59,18 +77,30 @@ def _on_terms(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> Iterator
 
 
 def _on_drive(kept: Trial) -> Iterator[Verdict]:
-    problem, values = kept.problem, kept.values
+    problem = kept.problem
+    values = kept.values
     gain = values.get("torque_gain", problem.torque_gain or 0.0)
     if "back_emf" in values:
         emf = values["back_emf"]
-        kt, resistance = emf / gain, emf / gain**2
+        kt = emf / gain
+        resistance = emf / gain**2
         text = f"kt/R = {gain:.3g} N m/V; with the drive off: kt = {kt:.3g} N m/A, R = {resistance:.3g} Ohm"
         yield Verdict("torque_gain", True, text)
     else:
-        yield Verdict("torque_gain", True, f"only kt/R = {gain:.3g} N m/V is known, neither kt nor R")
+        yield Verdict(
+            "torque_gain",
+            True,
+            f"only kt/R = {gain:.3g} N m/V is known, neither kt nor R",
+        )
         text = "no log with the drive off: viscous friction and back-EMF cannot be told apart"
-        yield Verdict("sigma_2", False, f"{text}, {values['sigma_2']:.3g} N m s/rad is both")
-    if problem.plant.mass and problem.plant.arm_mass is None and problem.torque_gain is None:
+        yield Verdict(
+            "sigma_2", False, f"{text}, {values['sigma_2']:.3g} N m s/rad is both"
+        )
+    if (
+        problem.plant.mass
+        and problem.plant.arm_mass is None
+        and problem.torque_gain is None
+    ):
         share = 0.5 / problem.plant.mass  # half the mass of an arm counts, in %
         text = f"an arm without mass is assumed: all torques grow by {share:.2g} % for each 10 g of an arm"
         yield Verdict("arm_mass", False, text)
@@ -78,8 +108,17 @@ def _on_drive(kept: Trial) -> Iterator[Verdict]:
 
 def speed_lag(log: JointLog) -> float:
     """Estimate by how much the reported speed lags the slope of q [s]."""
-    inner = slice(len(LAGS), -len(LAGS)) if len(log.time) > 4 * len(LAGS) else slice(None)
-    misses = [float(np.abs(np.interp(log.time - lag, log.time, log.speed) - log.dq)[inner].mean()) for lag in LAGS]
+    inner = (
+        slice(len(LAGS), -len(LAGS)) if len(log.time) > 4 * len(LAGS) else slice(None)
+    )
+    misses = [
+        float(
+            np.abs(np.interp(log.time - lag, log.time, log.speed) - log.dq)[
+                inner
+            ].mean()
+        )
+        for lag in LAGS
+    ]
     return float(LAGS[int(np.argmin(misses))])
 
 
@@ -113,11 +152,15 @@ def _on_logs(kept: Trial) -> Iterator[Verdict]:
 
 def _on_standing(kept: Trial, i: int, mask: np.ndarray) -> Iterator[Verdict]:
     """Compare a log that stands at full duty with what the others say: it must lie within the level of friction."""
-    log, values = kept.problem.logs[i], kept.folds[i * kept.problem.parts]
-    plant, joint = kept.problem.plant_numbers(values, log), friction_of(values)
+    log = kept.problem.logs[i]
+    values = kept.folds[i * kept.problem.parts]
+    plant = kept.problem.plant_numbers(values, log)
+    joint = friction_of(values)
     driven = plant.torque_gain * log.volts[mask]
     outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
-    most = joint.mu_s + np.abs(joint.load_motor * driven - joint.load_external * outside)
+    most = joint.mu_s + np.abs(
+        joint.load_motor * driven - joint.load_external * outside
+    )
     over = float(np.median(np.abs(driven + outside) - most))
     if over > 0.0:
         seconds = float(mask.sum() * np.median(np.diff(log.time)))

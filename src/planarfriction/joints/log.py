@@ -15,21 +15,43 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import FileError, InvalidValueError, shown
-from planarfriction.identify.logs import LEAST_SAMPLES, as_tuple, increasing, slopes, unwrapped
+from planarfriction.identify.logs import (
+    LEAST_SAMPLES,
+    as_tuple,
+    increasing,
+    slopes,
+    unwrapped,
+)
 from planarfriction.reading import Table
 
 GRAVITY = 9.81
 """Standard acceleration of gravity of the fits [m/s^2]."""
 
 ALIASES = {
-    **{"time": "t", "position": "q", "angle": "q", "theta": "q", "tau": "torque", "speed": "dq", "velocity": "dq"},
+    **{
+        "time": "t",
+        "position": "q",
+        "angle": "q",
+        "theta": "q",
+        "tau": "torque",
+        "speed": "dq",
+        "velocity": "dq",
+    },
     **{"omega": "dq", "tau_external": "external", "effort": "torque"},
     **{"__time": "t", "time_s": "t", "t_s": "t", "timestamp": "t"},
 }
 """Other names of columns, in small letters."""
 
 COLUMNS = {
-    **{"torque": "Nm", "dq": "rad/s", "enabled": "", "goal": "rad", "duty": "", "voltage": "V", "supply": "V"},
+    **{
+        "torque": "Nm",
+        "dq": "rad/s",
+        "enabled": "",
+        "goal": "rad",
+        "duty": "",
+        "voltage": "V",
+        "supply": "V",
+    },
     "external": "Nm",
 }
 """Columns beside t and q, with their units."""
@@ -93,7 +115,9 @@ class Drive(Checked):
 
         Raises InvalidValueError for numbers that are not finite.
         """
-        return np.clip(self.kp * self.gain * validation.finite_numbers("error", error), -1.0, 1.0)
+        return np.clip(
+            self.kp * self.gain * validation.finite_numbers("error", error), -1.0, 1.0
+        )
 
 
 @dataclass(frozen=True)
@@ -119,7 +143,9 @@ class Plant(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.mass > 0.0) != (self.length > 0.0):
-            raise InvalidValueError("length", "be positive with a mass, and only then", self.length)
+            raise InvalidValueError(
+                "length", "be positive with a mass, and only then", self.length
+            )
         if not self.mass:
             self._set(arm_mass=self.arm_mass or 0.0, offset=self.offset or 0.0)
 
@@ -163,16 +189,34 @@ class JointLog(ByValue):
         columns = {each: value for each, value in given.items() if value is not None}
         if np.asarray(self.enabled).dtype == bool:
             columns["enabled"] = np.asarray(self.enabled, dtype=float)
-        self._set(time=time, **{each: validation.array(each, columns[each], (len(time),)) for each in columns})
+        self._set(
+            time=time,
+            **{
+                each: validation.array(each, columns[each], (len(time),))
+                for each in columns
+            },
+        )
         q, turns = unwrapped(time, self.q, f"q of {self.name}")
         if turns and self.goal is not None:
-            rule = "be unwrapped beside a goal: add whole turns so that it does not jump"
-            raise InvalidValueError(f"q of {self.name}", rule, f"{turns} jumps by a whole turn")
+            rule = (
+                "be unwrapped beside a goal: add whole turns so that it does not jump"
+            )
+            raise InvalidValueError(
+                f"q of {self.name}", rule, f"{turns} jumps by a whole turn"
+            )
         self._set(q=q, turns=self.turns + turns)
         if self.drive is not None:
             validation.instance("drive", self.drive, Drive, "a Drive")
-        if self.torque is None and self.voltage is None and (self.goal is None or self.drive is None):
-            raise InvalidValueError(self.name, "hold a torque, a voltage, or a goal with a drive", "none of them")
+        if (
+            self.torque is None
+            and self.voltage is None
+            and (self.goal is None or self.drive is None)
+        ):
+            raise InvalidValueError(
+                self.name,
+                "hold a torque, a voltage, or a goal with a drive",
+                "none of them",
+            )
 
     @cached_property
     def speed(self) -> np.ndarray:
@@ -187,7 +231,11 @@ class JointLog(ByValue):
     @cached_property
     def on(self) -> np.ndarray:
         """Share of the drive that is on, 1 or 0, `[T]`."""
-        return np.ones(len(self.time)) if self.enabled is None else (self.enabled > 0.5).astype(float)
+        return (
+            np.ones(len(self.time))
+            if self.enabled is None
+            else (self.enabled > 0.5).astype(float)
+        )
 
     @cached_property
     def outside(self) -> np.ndarray:
@@ -208,7 +256,9 @@ class JointLog(ByValue):
         if self.voltage is not None:
             return self.on * self.voltage
         if self.goal is None or self.drive is None:
-            raise InvalidValueError(self.name, "hold a voltage, or a goal with a drive", "neither")
+            raise InvalidValueError(
+                self.name, "hold a voltage, or a goal with a drive", "neither"
+            )
         return self.on * self.drive.voltage(self.drive.duty(self.goal - self.q))
 
     @classmethod
@@ -228,40 +278,59 @@ class JointLog(ByValue):
             word, *unit = re.split(r"[\[(]", heading.lower())
             name = ALIASES.get(word.strip(), word.strip())
             if name in UNITS and name in headings:
-                raise FileError(f"{path}: columns {headings[name]!r} and {heading!r} are both {name}: keep one of them")
+                raise FileError(
+                    f"{path}: columns {headings[name]!r} and {heading!r} are both {name}: keep one of them"
+                )
             headings[name] = heading
             wanted = UNITS.get(name, "")
             if unit and wanted and re.sub(r"[^a-z/]", "", unit[0]) != wanted.lower():
-                raise FileError(f"{path}: {name} must be in {wanted}, got the column {heading!r}")
+                raise FileError(
+                    f"{path}: {name} must be in {wanted}, got the column {heading!r}"
+                )
         if missing := [each for each in ("t", "q") if each not in headings]:
-            spaced = " (cells must be separated by commas)" if len(table.names) == 1 else ""
+            spaced = (
+                " (cells must be separated by commas)" if len(table.names) == 1 else ""
+            )
             found = f"found {shown(', '.join(table.names))}{spaced}"
-            raise FileError(f"{path}: no column {missing[0]}; {found}; needed t, q, and torque, voltage or goal")
+            raise FileError(
+                f"{path}: no column {missing[0]}; {found}; needed t, q, and torque, voltage or goal"
+            )
         names = ["t", "q", *(each for each in COLUMNS if each in headings)]
         flags = [headings["enabled"]] if "enabled" in headings else []
         columns = table.numbers([headings[each] for each in names], flags=flags).T
         read: dict[str, Any] = dict(zip(names, columns, strict=True))
-        duty, supply = read.pop("duty", None), read.pop("supply", None)
+        duty = read.pop("duty", None)
+        supply = read.pop("supply", None)
         if duty is not None and supply is not None and "voltage" not in read:
             read["voltage"] = duty * supply
         if drive is not None and "goal" in read:
             read.pop("voltage", None)
         try:
-            return cls(read.pop("t"), read.pop("q"), **read, drive=drive, name=path.stem)
+            return cls(
+                read.pop("t"), read.pop("q"), **read, drive=drive, name=path.stem
+            )
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
 
 
-def as_joint_logs(logs: JointLog | Sequence[JointLog], plant: Plant) -> tuple[JointLog, ...]:
+def as_joint_logs(
+    logs: JointLog | Sequence[JointLog], plant: Plant
+) -> tuple[JointLog, ...]:
     """Return one log or several as a tuple, or raise InvalidValueError, for other units and dead sensors too."""
     result = as_tuple("logs", logs, JointLog)
     if len({each.torque is None for each in result}) > 1:
         raise InvalidValueError("logs", "all hold a torque, or none", "some do")
     for log in result:
         if (step := float(np.median(np.diff(log.time)))) > SLOW:
-            raise InvalidValueError(f"time of {log.name}", "be in s", f"steps of {step:.3g}: is it in ms?")
+            raise InvalidValueError(
+                f"time of {log.name}", "be in s", f"steps of {step:.3g}: is it in ms?"
+            )
         if plant.mass and (swing := float(np.ptp(log.q))) > TURNS * 2.0 * np.pi:
-            raise InvalidValueError(f"q of {log.name}", "be in rad", f"a swing of {swing:.3g}: is it in degrees?")
+            raise InvalidValueError(
+                f"q of {log.name}",
+                "be in rad",
+                f"a swing of {swing:.3g}: is it in degrees?",
+            )
         if log.torque is not None:
             _check_sensors(log)
         elif log.voltage is None:
@@ -273,12 +342,18 @@ def _check_sensors(log: JointLog) -> None:
     """Raise InvalidValueError for a torque or an angle that does not change while the joint moves."""
     assert log.torque is not None
     if not np.ptp(log.torque) > 0.0:
-        raise InvalidValueError(f"torque of {log.name}", "vary", f"{log.torque[0]:.3g} N m throughout")
+        raise InvalidValueError(
+            f"torque of {log.name}", "vary", f"{log.torque[0]:.3g} N m throughout"
+        )
     first, last = _longest_run(log.torque)
     seconds = log.time[last] - log.time[first]
     if seconds > FROZEN and np.ptp(log.q[first : last + 1]) > MOVED * np.ptp(log.q):
         found = f"{log.torque[first]:.3g} N m for {seconds:.2g} s from t = {log.time[first]:g} s on"
-        raise InvalidValueError(f"torque of {log.name}", "change while the joint moves (a dead sensor?)", found)
+        raise InvalidValueError(
+            f"torque of {log.name}",
+            "change while the joint moves (a dead sensor?)",
+            found,
+        )
     first, last = _longest_run(log.q)
     seconds = log.time[last] - log.time[first]
     speed = np.abs(log.speed)
@@ -286,7 +361,9 @@ def _check_sensors(log: JointLog) -> None:
     if first > 5 and seconds > FROZEN and before > SUDDEN * speed.max():
         found = f"still for {seconds:.2g} s from t = {log.time[first]:g} s on, right after {before:.2g} rad/s"
         raise InvalidValueError(
-            f"q of {log.name}", "come to rest gradually (a dead sensor, or a stop: cut it out)", found
+            f"q of {log.name}",
+            "come to rest gradually (a dead sensor, or a stop: cut it out)",
+            found,
         )
 
 
@@ -303,8 +380,10 @@ def _check_goal(log: JointLog) -> None:
     driven = log.on > 0.0
     if driven.sum() < LEAST_SAMPLES:
         return
-    goal, q = log.goal[driven], log.q[driven]
-    wide, narrow = np.ptp(goal), np.ptp(q)
+    goal = log.goal[driven]
+    q = log.q[driven]
+    wide = np.ptp(goal)
+    narrow = np.ptp(q)
     if not (wide > 0.0 and narrow > 0.0):
         return
     if max(wide / narrow, narrow / wide) > DEGREES:
@@ -313,4 +392,6 @@ def _check_goal(log: JointLog) -> None:
     correlation = float(np.corrcoef(goal, q)[0, 1])
     if correlation < OPPOSED:
         found = f"a correlation of {correlation:.2f}: flip the sign of one of them"
-        raise InvalidValueError(f"goal of {log.name}", "lead q in its own direction", found)
+        raise InvalidValueError(
+            f"goal of {log.name}", "lead q in its own direction", found
+        )

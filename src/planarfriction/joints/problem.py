@@ -89,9 +89,17 @@ class Problem:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters that are estimated, `[P]`; the mass of an arm would only scale all torques."""
-        names = [each for each in UNKNOWN if getattr(self.plant, each) is None and each != "arm_mass"]
+        names = [
+            each
+            for each in UNKNOWN
+            if getattr(self.plant, each) is None and each != "arm_mass"
+        ]
         names += ["torque_gain"] if self.torque_gain is None else []
-        names += ["back_emf"] if any((moving(log) & (log.on == 0.0)).any() for log in self.logs) else []
+        names += (
+            ["back_emf"]
+            if any((moving(log) & (log.on == 0.0)).any() for log in self.logs)
+            else []
+        )
         return (*names, "mu_c", "sigma_2", *self._more)
 
     @property
@@ -104,35 +112,71 @@ class Problem:
 
     def settled(self, values: Mapping[str, float]) -> Plant:
         """Make the plant of parameters by name."""
-        return replace(self.plant, **{each: values.get(each, getattr(self.plant, each) or 0.0) for each in UNKNOWN})
+        return replace(
+            self.plant,
+            **{
+                each: values.get(each, getattr(self.plant, each) or 0.0)
+                for each in UNKNOWN
+            },
+        )
 
     def plant_numbers(self, values: Mapping[str, float], log: JointLog) -> PlantNumbers:
         """Return what the loops read of plant and drive."""
-        plant, drive = self.plant, log.drive if log.voltage is None else None
-        inertia, arm, offset = (values.get(each, getattr(plant, each) or 0.0) for each in UNKNOWN)
+        plant = self.plant
+        drive = log.drive if log.voltage is None else None
+        inertia, arm, offset = (
+            values.get(each, getattr(plant, each) or 0.0) for each in UNKNOWN
+        )
         inertia += (plant.mass + arm / 3.0) * plant.length**2
         moment = (plant.mass + 0.5 * arm) * GRAVITY * plant.length
-        gain, back_emf = values.get("torque_gain", self.torque_gain or 0.0), values.get("back_emf", 0.0)
-        servo = (0.0, 0.0, 0.0) if drive is None else (drive.kp * drive.gain, drive.supply, drive.sag)
-        return PlantNumbers(max(inertia, LEAST_INERTIA), moment, offset, gain, back_emf, *servo)
+        gain = values.get("torque_gain", self.torque_gain or 0.0)
+        back_emf = values.get("back_emf", 0.0)
+        servo = (
+            (0.0, 0.0, 0.0)
+            if drive is None
+            else (drive.kp * drive.gain, drive.supply, drive.sag)
+        )
+        return PlantNumbers(
+            max(inertia, LEAST_INERTIA), moment, offset, gain, back_emf, *servo
+        )
 
     # ------------------------------------------------------------------ errors
 
     def simulated(
-        self, values: Mapping[str, float], logs: Sequence[JointLog], span: float = np.inf
+        self,
+        values: Mapping[str, float],
+        logs: Sequence[JointLog],
+        span: float = np.inf,
     ) -> list[np.ndarray]:
         """Simulate q and dq `[T, 2]` of logs from goal or voltage.
 
         Runs begin again at the measured motion every `span` [s].
         """
-        motions, joint = [np.empty((len(log.time), 2)) for log in logs], friction_of(values).rigid_numbers
+        motions = [np.empty((len(log.time), 2)) for log in logs]
+        joint = friction_of(values).rigid_numbers
         for log, motion in zip(logs, motions, strict=True):
-            plant, given = self.plant_numbers(values, log), log.goal if log.voltage is None else log.voltage
-            again = int(min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9))
-            run_plant(joint, plant, log.time, given, log.on, log.outside, log.motion, again, STEP, motion)
+            plant = self.plant_numbers(values, log)
+            given = log.goal if log.voltage is None else log.voltage
+            again = int(
+                min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9)
+            )
+            run_plant(
+                joint,
+                plant,
+                log.time,
+                given,
+                log.on,
+                log.outside,
+                log.motion,
+                again,
+                STEP,
+                motion,
+            )
         return motions
 
-    def errors(self, values: Mapping[str, float], span: float = np.inf) -> list[np.ndarray]:
+    def errors(
+        self, values: Mapping[str, float], span: float = np.inf
+    ) -> list[np.ndarray]:
         """Compute the errors of each group of samples [rad]."""
         runs = zip(self.simulated(values, self.logs, span), self.logs, strict=True)
         return self._groups([motion[:, 0] - log.q for motion, log in runs])
@@ -141,13 +185,18 @@ class Problem:
         """Compute the mean absolute error of each group [rad]."""
         return np.array([np.abs(each).mean() for each in self.errors(values, span)])
 
-    def slopes(self, values: Mapping[str, float], span: float = np.inf) -> list[np.ndarray]:
+    def slopes(
+        self, values: Mapping[str, float], span: float = np.inf
+    ) -> list[np.ndarray]:
         """Compute the slopes of each group's errors by the parameters by differences, `[T, P]`."""
-        here, columns = self.errors(values, span), []
+        here = self.errors(values, span)
+        columns = []
         for name in self.names:
             step = DIFFERENCE * max(abs(values[name]), PARAMETERS[name].scale)
             more = self.errors({**values, name: values[name] + step}, span)
-            columns.append([(far - near) / step for far, near in zip(more, here, strict=True)])
+            columns.append(
+                [(far - near) / step for far, near in zip(more, here, strict=True)]
+            )
         return [np.column_stack(each) for each in zip(*columns, strict=True)]
 
     def _groups(self, rows: list[np.ndarray]) -> list[np.ndarray]:
@@ -157,7 +206,9 @@ class Problem:
     @property
     def groups(self) -> list[str]:
         """Names of the groups that are left out in turn."""
-        parts = [f", part {k + 1}" for k in range(self.parts)] if self.parts > 1 else [""]
+        parts = (
+            [f", part {k + 1}" for k in range(self.parts)] if self.parts > 1 else [""]
+        )
         return [log.name + part for log in self.logs for part in parts]
 
     # ------------------------------------------------------------------ start
@@ -169,7 +220,9 @@ class Problem:
         linear: it is searched from several.
         """
         angles = OFFSETS if "offset" in self.names else OFFSETS[:1]
-        return min((self._start(float(each)) for each in angles), key=lambda found: found[1])[0]
+        return min(
+            (self._start(float(each)) for each in angles), key=lambda found: found[1]
+        )[0]
 
     def _start(self, offset: float) -> tuple[dict[str, float], float]:
         """Return the least squares near an offset [rad], and their squared error."""
@@ -177,9 +230,11 @@ class Problem:
         zero = dict.fromkeys(names, 0.0)
         if "offset" in zero:
             zero["offset"] = offset
-        rows, right = [], []
+        rows = []
+        right = []
         for log in self.logs:
-            here, moves = self._balance(zero, log), moving(log)
+            here = self._balance(zero, log)
+            moves = moving(log)
             scales = [PARAMETERS[name].scale for name in names]
             columns = [
                 self._balance({**zero, name: zero[name] + scale}, log) - here
@@ -194,24 +249,44 @@ class Problem:
         found = dict(zip(names, (steps + list(zero.values())).tolist(), strict=True))
         fast = max(np.abs(log.speed).max() for log in self.logs)
         strong = np.abs(forces)
-        least = {"mu_c": 0.05 * np.median(strong) + 1e-6, "sigma_2": 0.01 * strong.max() / max(fast, 1e-9)}
+        least = {
+            "mu_c": 0.05 * np.median(strong) + 1e-6,
+            "sigma_2": 0.01 * strong.max() / max(fast, 1e-9),
+        }
         for name in names:
-            found[name] = float(np.clip(found[name], least.get(name, PARAMETERS[name].low), PARAMETERS[name].high))
+            found[name] = float(
+                np.clip(
+                    found[name],
+                    least.get(name, PARAMETERS[name].low),
+                    PARAMETERS[name].high,
+                )
+            )
         rest = [self._balance(found, log)[moving(log)] for log in self.logs]
         return found, float(np.square(np.concatenate(rest)).sum())
 
     def _balance(self, values: Mapping[str, float], log: JointLog) -> np.ndarray:
         """Compute the torque that is missing in the balance of rigid friction [N m], `[T]`."""
-        plant, v = self.plant_numbers(values, log), log.speed
+        plant = self.plant_numbers(values, log)
+        v = log.speed
         driven = plant.torque_gain * log.volts - plant.back_emf * log.on * v
         outside = log.outside - plant.moment * np.sin(log.q - plant.offset)
-        return plant.inertia * log.acceleration - outside + values["mu_c"] * np.sign(v) + values["sigma_2"] * v - driven
+        return (
+            plant.inertia * log.acceleration
+            - outside
+            + values["mu_c"] * np.sign(v)
+            + values["sigma_2"] * v
+            - driven
+        )
 
     def guesses(self, term: str, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Return starts of a term beside the values of a fit without it; the first changes little."""
         mu_c = values["mu_c"]
         if term == "load":
-            return [{"load": 0.02}, {"load": 0.1, "mu_c": 0.5 * mu_c}, {"load": 0.3, "mu_c": 0.2 * mu_c}]
+            return [
+                {"load": 0.02},
+                {"load": 0.1, "mu_c": 0.5 * mu_c},
+                {"load": 0.3, "mu_c": 0.2 * mu_c},
+            ]
         if term == "directional":
             load = values["load"]
             return [
@@ -222,11 +297,20 @@ class Problem:
         if term == "stribeck":
             fast = max(float(np.quantile(np.abs(log.speed), 0.9)) for log in self.logs)
             return [
-                {"rise": share * mu_c, "v_s": part * fast} for share in (0.1, 0.4) for part in (0.01, 0.03, 0.1, 0.3)
+                {"rise": share * mu_c, "v_s": part * fast}
+                for share in (0.1, 0.4)
+                for part in (0.01, 0.03, 0.1, 0.3)
             ]
         most = mu_c + values.get("rise", 0.0)
-        bent = ((most / angle, time) for angle in (1e-4, 1e-3, 3e-3, 1e-2, 0.1) for time in (1e-3, 1e-2))
-        return [{"sigma_0": stiffness, "sigma_1": time * stiffness} for stiffness, time in bent]
+        bent = (
+            (most / angle, time)
+            for angle in (1e-4, 1e-3, 3e-3, 1e-2, 0.1)
+            for time in (1e-3, 1e-2)
+        )
+        return [
+            {"sigma_0": stiffness, "sigma_1": time * stiffness}
+            for stiffness, time in bent
+        ]
 
 
 def friction_of(values: Mapping[str, float]) -> JointFriction:

@@ -91,7 +91,11 @@ class JointFit:
     @property
     def error(self) -> float:
         """Mean absolute error over all logs, which were all fitted, [rad] or [N m]."""
-        return float(np.mean([np.abs(each.fitted - each.measured).mean() for each in self.series]))
+        return float(
+            np.mean(
+                [np.abs(each.fitted - each.measured).mean() for each in self.series]
+            )
+        )
 
     def interval(self, name: str) -> tuple[float, float] | None:
         """Return the 95 % interval of an estimate; None for one that ended at a bound of its search."""
@@ -99,14 +103,21 @@ class JointFit:
 
     def simulate(self, log: JointLog) -> np.ndarray:
         """Simulate q and dq `[T, 2]` of a log from its goal or voltage."""
-        return Problem((log,), self.plant, self.torque_gain, self.terms).simulated(self.values, [log])[0]
+        return Problem((log,), self.plant, self.torque_gain, self.terms).simulated(
+            self.values, [log]
+        )[0]
 
     def table(self) -> str:
         """Return estimates, errors of the logs and verdicts as text."""
-        lines = [f"{'parameter':17} {'value':>11} {'std. error':>10}  95 % interval, unit"]
+        lines = [
+            f"{'parameter':17} {'value':>11} {'std. error':>10}  95 % interval, unit"
+        ]
         lines += [self._row(name) for name in self.values]
         heading = "left-out log" if self.unit == "rad" else "log"
-        lines += ["", f"{heading:34} {'error':>9} {'Coulomb + viscous':>18}  {self.unit}"]
+        lines += [
+            "",
+            f"{heading:34} {'error':>9} {'Coulomb + viscous':>18}  {self.unit}",
+        ]
         names = [*self.groups, "mean"]
         both = (self.errors, self.baseline_errors)
         rows = zip(names, *([*each, each.mean()] for each in both), strict=True)
@@ -114,7 +125,8 @@ class JointFit:
         return "\n".join([*lines, "", *map(str, self.verdicts)])
 
     def _row(self, name: str) -> str:
-        value, interval = self.values[name], self.intervals[name]
+        value = self.values[name]
+        interval = self.intervals[name]
         if interval is None:
             return f"{name:17} {value:11.4g} {'-':>10}  at the bound of its search, {UNITS[name]}"
         low, high = interval

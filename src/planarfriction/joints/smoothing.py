@@ -75,7 +75,9 @@ def evenly(log: JointLog) -> EvenLog:
     assert log.torque is not None
     dt = float(np.median(np.diff(log.time)))
     time = np.arange(log.time[0], log.time[-1] + 0.5 * dt, dt)
-    angle, torque, external = (np.interp(time, log.time, each) for each in (log.q, log.torque, log.outside))
+    angle, torque, external = (
+        np.interp(time, log.time, each) for each in (log.q, log.torque, log.outside)
+    )
     resolution = encoder_step(angle)
     noise = max(resolution / np.sqrt(12.0), white_noise(angle), 1e-12)
     return EvenLog(log, dt, time, angle, torque + external, external, resolution, noise)
@@ -101,10 +103,14 @@ def encoder_step(angle: np.ndarray) -> float:
 def white_noise(signal: np.ndarray) -> float:
     """Estimate the standard deviation of the white noise of a signal from its third differences."""
     third = np.diff(signal, 3)
-    return float(np.median(np.abs(third)) * NORMAL / np.sqrt(20.0)) if len(third) else 0.0
+    return (
+        float(np.median(np.abs(third)) * NORMAL / np.sqrt(20.0)) if len(third) else 0.0
+    )
 
 
-def derivatives(log: EvenLog, width: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def derivatives(
+    log: EvenLog, width: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the smoothed angle, speed and acceleration.
 
     Kernels have exact moments: a tail cut at 5 widths would leak 3e-7 q/dt^2 into the acceleration, which looks like
@@ -121,21 +127,34 @@ def derivatives(log: EvenLog, width: float) -> tuple[np.ndarray, np.ndarray, np.
     bend = (x**2 - mean @ x**2) * mean
     bend *= 2.0 / (bend @ x**2) / log.dt**2
     first = log.angle[0]
-    angle, speed, acceleration = (correlate1d(log.angle - first, each, mode="nearest") for each in (mean, slope, bend))
+    angle, speed, acceleration = (
+        correlate1d(log.angle - first, each, mode="nearest")
+        for each in (mean, slope, bend)
+    )
     return angle + first, speed, acceleration
 
 
 def kernel_width(logs: Sequence[EvenLog]) -> float:
     """Choose the shortest kernel whose noise is small beside the motion's speed and acceleration [s]."""
     coarse = [derivatives(log, max(0.03, 2.0 * log.dt)) for log in logs]
-    speed, acceleration = (np.concatenate([each[k] for each in coarse]).std() for k in (1, 2))
+    speed, acceleration = (
+        np.concatenate([each[k] for each in coarse]).std() for k in (1, 2)
+    )
     slowest = max(log.dt for log in logs)
-    width = max(1.5 * slowest, 3e-3, min(0.02 * speed / max(acceleration, 1e-300), WIDEST))
+    width = max(
+        1.5 * slowest, 3e-3, min(0.02 * speed / max(acceleration, 1e-300), WIDEST)
+    )
     power = float(np.mean([log.noise**2 * log.dt for log in logs]))
     while width < WIDEST:
         found = [derivatives(log, width) for log in logs]
-        moved, bent = (np.mean([2.0 * np.median(np.abs(each[k])) ** 2 for each in found]) for k in (1, 2))
-        if speed_noise(power, width) < NOISY_SPEED * moved and acceleration_noise(power, width) < ATTENUATED * bent:
+        moved, bent = (
+            np.mean([2.0 * np.median(np.abs(each[k])) ** 2 for each in found])
+            for k in (1, 2)
+        )
+        if (
+            speed_noise(power, width) < NOISY_SPEED * moved
+            and acceleration_noise(power, width) < ATTENUATED * bent
+        ):
             break
         width *= 1.2
     return float(width)
@@ -179,9 +198,16 @@ def scales(logs: Sequence[EvenLog], width: float) -> Scales:
     resolution = max(log.resolution for log in logs)
 
     def sure(width: float) -> float:
-        return max(3.0 * float(np.sqrt(speed_noise(power, width))), 0.2 * resolution / width, 1e-9)
+        return max(
+            3.0 * float(np.sqrt(speed_noise(power, width))),
+            0.2 * resolution / width,
+            1e-9,
+        )
 
-    speed, acceleration = (np.concatenate([derivatives(log, width)[k] for log in logs]).var() for k in (1, 2))
+    speed, acceleration = (
+        np.concatenate([derivatives(log, width)[k] for log in logs]).var()
+        for k in (1, 2)
+    )
     moved = max(acceleration - acceleration_noise(power, width), 1e-300)
     longest = SLOW_SHARE * float(np.sqrt(speed / moved))
     slow_width = float(np.clip(SLOW_FACTOR * width, width, max(longest, width)))
@@ -258,7 +284,9 @@ def rows_of(log: EvenLog, limits: Scales) -> Rows:
 
     width = limits.width
     smooth = {"sigma": width / log.dt, "mode": "nearest", "truncate": REACH}
-    torque, external = (gaussian_filter1d(each, **smooth) for each in (log.torque, log.external))
+    torque, external = (
+        gaussian_filter1d(each, **smooth) for each in (log.torque, log.external)
+    )
     spacing = max(width / PER_WIDTH, log.dt)
     time = np.arange(log.time[0], log.time[-1], spacing)
     angle, speed, acceleration = derivatives(log, width)
@@ -266,7 +294,9 @@ def rows_of(log: EvenLog, limits: Scales) -> Rows:
     sharp = np.clip(np.abs(speed) / limits.noisy - 1.0, 0.0, 1.0)
     speed = slow_speed + sharp * (speed - slow_speed)
     columns = (angle, speed, acceleration, external)
-    angle, speed, acceleration, external = (np.interp(time, log.time, each) for each in columns)
+    angle, speed, acceleration, external = (
+        np.interp(time, log.time, each) for each in columns
+    )
     margin = max(REACH * width, 3.0 * limits.slow_width) + np.abs(DELAYS).max()
     usable = (time > time[0] + margin) & (time < time[-1] - margin)
     for first, last in runs(np.abs(speed) < limits.slow):

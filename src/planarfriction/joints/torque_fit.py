@@ -10,9 +10,25 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints import subsets
-from planarfriction.joints.balance import FACTORS, MOST_LOAD, TERMS, Refined, miss, predict, refine
+from planarfriction.joints.balance import (
+    FACTORS,
+    MOST_LOAD,
+    TERMS,
+    Refined,
+    miss,
+    predict,
+    refine,
+)
 from planarfriction.joints.log import JointLog
-from planarfriction.joints.smoothing import EvenLog, Rows, Scales, evenly, kernel_width, rows_of, scales
+from planarfriction.joints.smoothing import (
+    EvenLog,
+    Rows,
+    Scales,
+    evenly,
+    kernel_width,
+    rows_of,
+    scales,
+)
 
 LEAST_ROWS = 10
 """Number of rows that a log must have to be fitted."""
@@ -89,19 +105,29 @@ class Data:
     @cached_property
     def turning(self) -> np.ndarray:
         """Acceleration at each reversal [rad/s^2]."""
-        return np.concatenate([np.abs(each.acceleration[each.reversals]) for each in self.rows])
+        return np.concatenate(
+            [np.abs(each.acceleration[each.reversals]) for each in self.rows]
+        )
 
     @cached_property
     def slowest_fall(self) -> float:
         """Stribeck speed below which the logs show none [rad/s]."""
         slow = np.sort(np.abs(self.speed))
-        crossed = 0.5 * self.limits.width * np.percentile(self.turning, 20) if len(self.turning) else 0.0
+        crossed = (
+            0.5 * self.limits.width * np.percentile(self.turning, 20)
+            if len(self.turning)
+            else 0.0
+        )
         return float(max(1.5 * self.limits.slow, slow[min(40, len(slow) - 1)], crossed))
 
     @cached_property
     def least_bend(self) -> float:
         """Deflection of bristles below which the logs show none [rad]."""
-        turned = 0.5 * self.limits.width**2 * np.percentile(self.turning, 20) if len(self.turning) else 1.0
+        turned = (
+            0.5 * self.limits.width**2 * np.percentile(self.turning, 20)
+            if len(self.turning)
+            else 1.0
+        )
         return float(max(max(each.resolution for each in self.evens), turned, 1e-6))
 
     @property
@@ -109,8 +135,17 @@ class Data:
         """Stribeck speeds and bends that the logs can show."""
         swing = np.ptp(np.concatenate([each.angle for each in self.rows]))
         highest = 0.5 * self.fastest
-        speeds = np.geomspace(self.slowest_fall, highest, GRID) if self.shows_fall else np.array([highest])
-        return subsets.Grid(speeds, np.geomspace(self.least_bend, max(0.1 * swing, 4.0 * self.least_bend), GRID))
+        speeds = (
+            np.geomspace(self.slowest_fall, highest, GRID)
+            if self.shows_fall
+            else np.array([highest])
+        )
+        return subsets.Grid(
+            speeds,
+            np.geomspace(
+                self.least_bend, max(0.1 * swing, 4.0 * self.least_bend), GRID
+            ),
+        )
 
     @property
     def shows_fall(self) -> bool:
@@ -120,7 +155,10 @@ class Data:
     @property
     def allowed(self) -> list[str]:
         """Terms that the logs can show."""
-        blind = {"stribeck": not self.shows_fall, "bristles": len(self.turning) < REVERSALS}
+        blind = {
+            "stribeck": not self.shows_fall,
+            "bristles": len(self.turning) < REVERSALS,
+        }
         return [term for term in TERMS if not blind.get(term)]
 
     def wider(self) -> tuple[Rows, ...]:
@@ -135,31 +173,58 @@ def prepare(logs: Sequence[JointLog]) -> Data:
     Raises InvalidValueError for logs that all stand, or move in one direction only.
     """
     evens = [evenly(log) for log in logs]
-    moving = [each for each in evens if np.ptp(each.angle) >= max(30.0 * each.resolution, 20.0 * each.noise)]
+    moving = [
+        each
+        for each in evens
+        if np.ptp(each.angle) >= max(30.0 * each.resolution, 20.0 * each.noise)
+    ]
     if not moving:
         rule = "move: friction of a joint that stands is only known to be at least its torque"
-        raise InvalidValueError(f"q of {logs[0].name}", rule, f"a swing of {np.ptp(logs[0].q):.2g} rad")
+        raise InvalidValueError(
+            f"q of {logs[0].name}", rule, f"a swing of {np.ptp(logs[0].q):.2g} rad"
+        )
     limits = scales(moving, kernel_width(moving))
-    kept = [(each, rows) for each in moving if len((rows := rows_of(each, limits)).fitted) >= LEAST_ROWS]
+    kept = [
+        (each, rows)
+        for each in moving
+        if len((rows := rows_of(each, limits)).fitted) >= LEAST_ROWS
+    ]
     if not kept:
-        raise InvalidValueError("logs", "move for longer than a second", "too few samples in motion")
-    data = Data(tuple(even for even, _ in kept), limits, tuple(rows for _, rows in kept))
-    forth, back = np.mean(data.speed > 2.0 * limits.slow), np.mean(data.speed < -2.0 * limits.slow)
+        raise InvalidValueError(
+            "logs", "move for longer than a second", "too few samples in motion"
+        )
+    data = Data(
+        tuple(even for even, _ in kept), limits, tuple(rows for _, rows in kept)
+    )
+    forth = np.mean(data.speed > 2.0 * limits.slow)
+    back = np.mean(data.speed < -2.0 * limits.slow)
     if min(forth, back) < MATTERS:
         rule = "move in both directions: Coulomb friction and an offset of the torque look alike in one"
-        raise InvalidValueError("logs", rule, f"{forth:.0%} of the samples forwards, {back:.0%} backwards")
+        raise InvalidValueError(
+            "logs", rule, f"{forth:.0%} of the samples forwards, {back:.0%} backwards"
+        )
     return data
 
 
-def choose(data: Data, told: Sequence[str], auto: bool, progress: Callable[[str], None]) -> list[Refined]:
+def choose(
+    data: Data, told: Sequence[str], auto: bool, progress: Callable[[str], None]
+) -> list[Refined]:
     """Refine sets of terms; return the smallest of the best first, then the others.
 
     A set is kept if its score, over blocks, lies within one standard error or `FLAT` of the best. Terms that a set does
     not show are left out of it. Without `auto`, only the set that was told is refined.
     """
     progress("Coulomb and viscous friction")
-    start = {"inertia": 0.0, "mu_c": float(data.torque.std()), "sigma_2": 0.0, "torque_offset": 0.0, "delay": 0.0}
-    progress(f"first estimate, Coulomb and viscous friction: {_level(refine(data.rows, start, ()).values)}; all sets")
+    start = {
+        "inertia": 0.0,
+        "mu_c": float(data.torque.std()),
+        "sigma_2": 0.0,
+        "torque_offset": 0.0,
+        "delay": 0.0,
+    }
+    progress(
+        f"first estimate, Coulomb and viscous friction: {_level(refine(data.rows, start, ()).values)}; all sets"
+    )
     grid = data.grid
     largest = float(np.abs(data.torque).max())
     allowed = data.allowed if auto else told
@@ -168,8 +233,14 @@ def choose(data: Data, told: Sequence[str], auto: bool, progress: Callable[[str]
     progress(f"best set by sums, {_words(first.terms)}: {_level(first.values)}")
     rough: dict[str, float] = {}
     if "bristles" in first.terms and "stribeck" in allowed:
-        terms = first.terms if "stribeck" in told else tuple(each for each in first.terms if each != "stribeck")
-        rough = refine(data.rows, subsets.started(_named(candidates, terms), largest), terms).values
+        terms = (
+            first.terms
+            if "stribeck" in told
+            else tuple(each for each in first.terms if each != "stribeck")
+        )
+        rough = refine(
+            data.rows, subsets.started(_named(candidates, terms), largest), terms
+        ).values
     best = refine(data.rows, _start(data, first, rough, largest), first.terms)
     progress(f"second estimate, {_words(best.terms)}: {_level(best.values)}")
     fits = {best.terms: best}
@@ -178,14 +249,20 @@ def choose(data: Data, told: Sequence[str], auto: bool, progress: Callable[[str]
         if terms not in fits:
             progress(_words(terms))
             start = _start(data, _named(candidates, terms), rough, largest)
-            known = {name: value for name, value in best.values.items() if name in start}
+            known = {
+                name: value for name, value in best.values.items() if name in start
+            }
             fits[terms] = refine(data.rows, start | known, terms, best.scatter)
         return fits[terms]
 
-    near = [each.terms for each in candidates if len({*each.terms} ^ {*first.terms}) == 1]
+    near = [
+        each.terms for each in candidates if len({*each.terms} ^ {*first.terms}) == 1
+    ]
     near = [each for each in near if _named(candidates, each).score < FAR * first.score]
     good: dict[tuple[str, ...], Refined] = {}
-    for terms in dict.fromkeys([*(each.terms for each in candidates[:REFINED]), *near, tuple(told)]):
+    for terms in dict.fromkeys(
+        [*(each.terms for each in candidates[:REFINED]), *near, tuple(told)]
+    ):
         fit = refined(terms)
         while auto and (shown := seen(data, fit, told)) != fit.terms:
             fit = refined(shown)
@@ -196,7 +273,9 @@ def choose(data: Data, told: Sequence[str], auto: bool, progress: Callable[[str]
     return [smallest, *(each for each in ranked if each is not smallest)]
 
 
-def _start(data: Data, candidate: subsets.Candidate, rough: Mapping[str, float], largest: float) -> dict[str, float]:
+def _start(
+    data: Data, candidate: subsets.Candidate, rough: Mapping[str, float], largest: float
+) -> dict[str, float]:
     """Return the numbers from which a set of terms is refined.
 
     Bristles lag by the level itself, which the sums do not know: with them, a fall of friction is searched once more
@@ -206,12 +285,24 @@ def _start(data: Data, candidate: subsets.Candidate, rough: Mapping[str, float],
     if not ("stribeck" in candidate.terms and rough):
         return start
     # a delay that ended at its bound without a fall of friction would stay there
-    known = start | {name: value for name, value in rough.items() if name in start and name != "delay"}
-    falls = [known | {"rise": rise * known["mu_c"], "v_s": speed} for rise in RISES for speed in data.grid.v_s.tolist()]
-    return min([start, *falls], key=lambda values: miss(data.rows, values, candidate.terms))
+    known = start | {
+        name: value
+        for name, value in rough.items()
+        if name in start and name != "delay"
+    }
+    falls = [
+        known | {"rise": rise * known["mu_c"], "v_s": speed}
+        for rise in RISES
+        for speed in data.grid.v_s.tolist()
+    ]
+    return min(
+        [start, *falls], key=lambda values: miss(data.rows, values, candidate.terms)
+    )
 
 
-def _named(candidates: Sequence[subsets.Candidate], terms: tuple[str, ...]) -> subsets.Candidate:
+def _named(
+    candidates: Sequence[subsets.Candidate], terms: tuple[str, ...]
+) -> subsets.Candidate:
     """Return the candidate with some terms."""
     return next(each for each in candidates if each.terms == terms)
 
@@ -233,12 +324,15 @@ def _as_good(fit: Refined, best: Refined) -> bool:
 
 def seen(data: Data, fit: Refined, told: Sequence[str]) -> tuple[str, ...]:
     """Return the terms that a fit shows: of their sign, within the range of the logs, clear of zero, and not small."""
-    return tuple(term for term in fit.terms if term in told or not doubt(data, fit, term))
+    return tuple(
+        term for term in fit.terms if term in told or not doubt(data, fit, term)
+    )
 
 
 def doubt(data: Data, fit: Refined, term: str) -> str:
     """Return the reason for which the logs do not show a term, or an empty text."""
-    values, spread = fit.values, fit.spread
+    values = fit.values
+    spread = fit.spread
     level = values["mu_c"] + max(values.get("rise", 0.0), 0.0)
     if term == "stribeck":
         return _doubt_of_fall(data, values, spread, level)
@@ -252,33 +346,60 @@ def doubt(data: Data, fit: Refined, term: str) -> str:
             if vague
             else ""
         )
-    least = {"gravity": MATTERS * level, "load": MATTERS, "asymmetry": MATTERS * level / data.fastest}[term]
+    least = {
+        "gravity": MATTERS * level,
+        "load": MATTERS,
+        "asymmetry": MATTERS * level / data.fastest,
+    }[term]
     names = TERMS[term]
-    size = float(np.hypot(*(values[name] for name in names))) if term == "gravity" else values[names[0]]
-    tested = names[:1] if term == "asymmetry" else names  # its level may as well be an offset of the torque
+    size = (
+        float(np.hypot(*(values[name] for name in names)))
+        if term == "gravity"
+        else values[names[0]]
+    )
+    tested = (
+        names[:1] if term == "asymmetry" else names
+    )  # its level may as well be an offset of the torque
     clear = max(abs(values[name]) / max(spread[name], 1e-300) for name in tested)
     if term == "load" and size >= MOST_LOAD - 0.01:
         return "the level would grow with all of the torque"
     size = size if term == "load" else abs(size)
-    return "" if clear > SURE and size > least else f"{names[0]} = {size:.2g} is not clear of zero, or does not matter"
+    return (
+        ""
+        if clear > SURE and size > least
+        else f"{names[0]} = {size:.2g} is not clear of zero, or does not matter"
+    )
 
 
-def _doubt_of_fall(data: Data, values: dict[str, float], spread: dict[str, float], level: float) -> str:
-    speed, rise = values["v_s"], values["rise"]
+def _doubt_of_fall(
+    data: Data, values: dict[str, float], spread: dict[str, float], level: float
+) -> str:
+    speed = values["v_s"]
+    rise = values["rise"]
     if not 0.5 * data.slowest_fall < speed < 1.5 * data.fastest:
         reach = f"{data.slowest_fall:.2g} to {data.fastest:.2g} rad/s"
         return f"its speed of {speed:.2g} rad/s lies outside of those that these logs show, {reach}"
     if spread["v_s"] >= SURE_FACTOR:
         return f"v_s is only known within a factor of {np.exp(min(2.0 * spread['v_s'], 700.0)):.2g}"
-    bands = np.histogram(np.abs(data.speed), np.linspace(min(data.limits.slow, speed), speed, BANDS + 1))[0]
+    bands = np.histogram(
+        np.abs(data.speed), np.linspace(min(data.limits.slow, speed), speed, BANDS + 1)
+    )[0]
     if rise > MOST_RISE * values["mu_c"] and bands.min() < LEAST_ROWS:
         return f"mu_s would be {1.0 + rise / values['mu_c']:.2g} mu_c, and too few samples are slow enough to show it"
     clear = rise > max(SURE * spread["rise"], MATTERS * level)
-    return "" if clear else f"mu_s exceeds mu_c by {rise:.2g} N m, which is not clear of zero, or does not matter"
+    return (
+        ""
+        if clear
+        else f"mu_s exceeds mu_c by {rise:.2g} N m, which is not clear of zero, or does not matter"
+    )
 
 
 def finish(
-    data: Data, ranked: list[Refined], told: Sequence[str], auto: bool, progress: Callable[[str], None]
+    data: Data,
+    ranked: list[Refined],
+    told: Sequence[str],
+    auto: bool,
+    progress: Callable[[str], None],
 ) -> Refined:
     """Return the final fit: a low pass of the torque if it explains more than a delay, and spreads of all causes.
 
@@ -293,8 +414,15 @@ def finish(
         if terms == fit.terms:
             return fit
         if terms not in fits:
-            start = {name: value for name, value in fit.values.items() if name not in FACTORS}
-            fits[terms] = refine(data.rows, {"delay": 0.0} | start | _factors(fit), terms, ranked[0].scatter)
+            start = {
+                name: value for name, value in fit.values.items() if name not in FACTORS
+            }
+            fits[terms] = refine(
+                data.rows,
+                {"delay": 0.0} | start | _factors(fit),
+                terms,
+                ranked[0].scatter,
+            )
         if fits[terms].score > 1.2 * fits.get(fit.terms, fit).score:
             return fit
         fit = fits[terms]
@@ -310,8 +438,19 @@ def _lagging(data: Data, fit: Refined) -> Refined:
     delay = fit.values["delay"]
     if delay <= max(LATEST, SURE * fit.spread["delay"]):
         return fit
-    low = refine(data.rows, fit.values | {"low_pass": delay, "delay": 0.0}, fit.terms, None, "low_pass")
-    return low if np.square(low.error).sum() < np.square(_low_passed_error(data, fit, delay)).sum() else fit
+    low = refine(
+        data.rows,
+        fit.values | {"low_pass": delay, "delay": 0.0},
+        fit.terms,
+        None,
+        "low_pass",
+    )
+    return (
+        low
+        if np.square(low.error).sum()
+        < np.square(_low_passed_error(data, fit, delay)).sum()
+        else fit
+    )
 
 
 def _low_passed_error(data: Data, fit: Refined, time_constant: float) -> np.ndarray:
@@ -320,7 +459,11 @@ def _low_passed_error(data: Data, fit: Refined, time_constant: float) -> np.ndar
     return np.concatenate(
         [
             rows.low_passed(
-                torque - np.interp(rows.time + fit.values["delay"], rows.even.time, rows.torque), time_constant
+                torque
+                - np.interp(
+                    rows.time + fit.values["delay"], rows.even.time, rows.torque
+                ),
+                time_constant,
             )[rows.fitted]
             for torque, rows in zip(found, data.rows, strict=True)
         ]

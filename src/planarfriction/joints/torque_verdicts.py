@@ -58,7 +58,9 @@ class Rest(NamedTuple):
     @property
     def share(self) -> float:
         """Error that noise does not explain over friction."""
-        return float(np.sqrt(max(self.error**2 - self.noise**2, 0.0)) / max(self.friction, 1e-12))
+        return float(
+            np.sqrt(max(self.error**2 - self.noise**2, 0.0)) / max(self.friction, 1e-12)
+        )
 
 
 def rest_of(data: Data, fit: Refined) -> Rest:
@@ -66,40 +68,66 @@ def rest_of(data: Data, fit: Refined) -> Rest:
     width = data.limits.width
     inertia = fit.values["inertia"]
     variances = [
-        torque_noise(each, width) + inertia**2 * acceleration_noise(each.noise**2 * each.dt, width)
+        torque_noise(each, width)
+        + inertia**2 * acceleration_noise(each.noise**2 * each.dt, width)
         for each in data.evens
     ]
     friction = np.concatenate(
         [
-            rows.smoothed(rows.direction * fit.values["mu_c"] + fit.values["sigma_2"] * rows.speed)[rows.fitted]
+            rows.smoothed(
+                rows.direction * fit.values["mu_c"] + fit.values["sigma_2"] * rows.speed
+            )[rows.fitted]
             for rows in data.rows
         ]
     )
-    error, noise, level = (float(np.sqrt(np.mean(each))) for each in (fit.error**2, variances, friction**2))
+    error, noise, level = (
+        float(np.sqrt(np.mean(each))) for each in (fit.error**2, variances, friction**2)
+    )
     return Rest(error, noise, level, float(fit.scatter[0]) / max(noise, 1e-12))
 
 
-def refuse(data: Data, fit: Refined, rest: Rest, intervals: Mapping[str, Interval]) -> None:
+def refuse(
+    data: Data, fit: Refined, rest: Rest, intervals: Mapping[str, Interval]
+) -> None:
     """Raise InvalidValueError for logs that the model cannot make sense of, with the remedy."""
     name = "torque of the logs"
     values = fit.values
-    explained = 1.0 - np.square(fit.error).sum() / np.square(data.torque - data.torque.mean()).sum()
+    explained = (
+        1.0
+        - np.square(fit.error).sum() / np.square(data.torque - data.torque.mean()).sum()
+    )
     if explained < FOLLOWS:
         rule = "follow from the motion: check that columns, times and joint belong together"
-        raise InvalidValueError(name, rule, f"{max(explained, 0.0):.0%} of its variance explained")
+        raise InvalidValueError(
+            name, rule, f"{max(explained, 0.0):.0%} of its variance explained"
+        )
     speed = np.abs(data.speed)
     power = values["mu_c"] * speed.mean() + values["sigma_2"] * np.square(speed).mean()
-    highest = {each: (intervals[each] or (0.0, np.inf))[1] for each in ("inertia", "mu_c")}
-    found = f"inertia {values['inertia']:.3g} kg m^2, mean power of friction {power:.3g} W"
+    highest = {
+        each: (intervals[each] or (0.0, np.inf))[1] for each in ("inertia", "mu_c")
+    }
+    found = (
+        f"inertia {values['inertia']:.3g} kg m^2, mean power of friction {power:.3g} W"
+    )
     if highest["inertia"] < 0.0 and (power < 0.0 or values["mu_c"] < 0.0):
-        raise InvalidValueError(name, "point along the acceleration: flip the sign of torque or angle", found)
+        raise InvalidValueError(
+            name,
+            "point along the acceleration: flip the sign of torque or angle",
+            found,
+        )
     if in_degrees(data):
-        raise InvalidValueError("q of the logs", "be in rad", "steps of 360 over a power of two: it is in degrees")
+        raise InvalidValueError(
+            "q of the logs",
+            "be in rad",
+            "steps of 360 over a power of two: it is in degrees",
+        )
     if power < 0.0 or highest["mu_c"] < 0.0:
         rule = "overcome friction: check the signs of torque and angle, and that the torque is that of the motor"
         raise InvalidValueError(name, rule, found)
     if highest["inertia"] < 0.0:
-        raise InvalidValueError(name, "accelerate the joint: check its sign, and its times", found)
+        raise InvalidValueError(
+            name, "accelerate the joint: check its sign, and its times", found
+        )
     late = values.get("delay", values.get("low_pass", 0.0))
     if not DELAYS[0] < late < DELAYS[-1]:
         rule = f"be less than {1e3 * DELAYS[-1]:.0f} ms late: shift its times"
@@ -140,9 +168,15 @@ def judge(
     )
 
 
-def _on_terms(data: Data, fit: Refined, gains: Mapping[str, float]) -> Iterator[Verdict]:
+def _on_terms(
+    data: Data, fit: Refined, gains: Mapping[str, float]
+) -> Iterator[Verdict]:
     for term in fit.terms:
-        gain = f" (squared errors without it are {gains[term]:.3g} times as large)" if term in gains else ""
+        gain = (
+            f" (squared errors without it are {gains[term]:.3g} times as large)"
+            if term in gains
+            else ""
+        )
         yield Verdict(term, True, f"{WORDS[term]}{gain}")
     if "stribeck" not in fit.terms:
         text = f"no fall of friction with speed is seen from {data.slowest_fall:.2g} rad/s on; slower ones cannot be"
@@ -154,14 +188,20 @@ def _on_terms(data: Data, fit: Refined, gains: Mapping[str, float]) -> Iterator[
 
 def _on_rest(rest: Rest) -> Iterator[Verdict]:
     if rest.share > INCOMPLETE or rest.steady > ABOVE_NOISE:
-        text = (
-            f"{rest.share:.0%} of friction is not explained, {rest.error / max(rest.noise, 1e-12):.0f} times the noise"
+        times = rest.error / max(rest.noise, 1e-12)
+        text = f"{rest.share:.0%} of friction is not explained, {times:.0f} times the noise"
+        yield Verdict(
+            "fit",
+            False,
+            f"{text}: backlash, heat, place or another load; intervals need not hold the truth",
         )
-        yield Verdict("fit", False, f"{text}: backlash, heat, place or another load; intervals need not hold the truth")
 
 
 def _on_scale(
-    fit: Refined, plant: Plant, values: Mapping[str, float], intervals: Mapping[str, Interval]
+    fit: Refined,
+    plant: Plant,
+    values: Mapping[str, float],
+    intervals: Mapping[str, Interval],
 ) -> Iterator[Verdict]:
     """Compare gravity and inertia as they show in the torque with those that are known."""
     arm = plant.arm_mass
@@ -172,7 +212,9 @@ def _on_scale(
         known["inertia"] = plant.inertia + (plant.mass + arm / 3.0) * plant.length**2
     if "gravity" in known and "gravity" not in fit.terms:
         yield Verdict(
-            "gravity", False, f"{known['gravity']:.3g} N m of gravity were told, and do not show in the torque"
+            "gravity",
+            False,
+            f"{known['gravity']:.3g} N m of gravity were told, and do not show in the torque",
         )
     if "gravity" in fit.terms and not plant.mass:
         text = f"{values['gravity']:.3g} N m of gravity show, hanging at {values['offset']:.3g} rad; none was told"
@@ -186,22 +228,40 @@ def _on_scale(
         if low <= 1.0 <= high:
             yield Verdict("torque", True, text)
         else:
-            yield Verdict("torque", False, f"{text}: a wrong torque constant or unit scales all results")
+            yield Verdict(
+                "torque",
+                False,
+                f"{text}: a wrong torque constant or unit scales all results",
+            )
     if not known:
         text = "neither gravity nor inertia is known: a wrong torque constant would scale all results"
         yield Verdict("torque", False, text)
 
 
-def _on_torque(fit: Refined, values: Mapping[str, float], intervals: Mapping[str, Interval]) -> Iterator[Verdict]:
+def _on_torque(
+    fit: Refined, values: Mapping[str, float], intervals: Mapping[str, Interval]
+) -> Iterator[Verdict]:
     late = "low_pass" if "low_pass" in values else "delay"
     low, high = intervals[late] or (0.0, 0.0)
     if low > LATE or high < -LATE:
-        what = "filtered by a low pass of" if late == "low_pass" else "late by" if low > 0.0 else "early by"
-        yield Verdict("torque", False, f"it is {what} {1e3 * abs(values[late]):.1f} ms, which was corrected")
+        what = (
+            "filtered by a low pass of"
+            if late == "low_pass"
+            else "late by"
+            if low > 0.0
+            else "early by"
+        )
+        yield Verdict(
+            "torque",
+            False,
+            f"it is {what} {1e3 * abs(values[late]):.1f} ms, which was corrected",
+        )
     offset = intervals.get("torque_offset")
     if offset is not None and not offset[0] <= 0.0 <= offset[1]:
         text = f"an offset of {values['torque_offset']:.3g} N m: of the sensor, or friction of different level in both"
-        yield Verdict("torque_offset", False, f"{text} directions, which no log tells apart")
+        yield Verdict(
+            "torque_offset", False, f"{text} directions, which no log tells apart"
+        )
 
 
 def _on_logs(data: Data, logs: Sequence[JointLog]) -> Iterator[Verdict]:
@@ -210,4 +270,6 @@ def _on_logs(data: Data, logs: Sequence[JointLog]) -> Iterator[Verdict]:
         yield Verdict("fit", False, f"{', '.join(still)}: hardly moves, left out")
     for log in logs:
         if log.turns:
-            yield Verdict("q", True, f"{log.name}: {log.turns} jumps by a whole turn were removed")
+            yield Verdict(
+                "q", True, f"{log.name}: {log.turns} jumps by a whole turn were removed"
+            )

@@ -36,7 +36,9 @@ class FrictionLaw(Checked):
         if self.mu_s is None:
             self._set(mu_s=self.mu_c)
         if self.mu_s < self.mu_c:
-            raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={self.mu_s}, mu_c={self.mu_c}")
+            raise InvalidValueError(
+                "mu_s", "be >= mu_c", f"mu_s={self.mu_s}, mu_c={self.mu_c}"
+            )
 
     @property
     def numbers(self) -> LawNumbers:
@@ -58,7 +60,8 @@ class FrictionLaw(Checked):
 
         Raises InvalidValueError for a speed that is not finite.
         """
-        law, speed = self.numbers, np.abs(validation.finite_numbers("speed", speed))
+        law = self.numbers
+        speed = np.abs(validation.finite_numbers("speed", speed))
         share = speed / (speed + law.creep_speed) if law.creep_speed > 0.0 else 1.0
         return formulas.stribeck(np, speed, law) * share + law.sigma_2 * speed
 
@@ -75,10 +78,17 @@ class FrictionLaw(Checked):
         load = validation.non_negative_numbers("normal_force", normal_force)
         if self.reference_load is None:
             return np.ones(load.shape)
-        return self.reference_load / np.maximum(load, formulas.LIGHTEST * self.reference_load)
+        return self.reference_load / np.maximum(
+            load, formulas.LIGHTEST * self.reference_load
+        )
 
     def rate(
-        self, state: ArrayLike, velocity: ArrayLike, normal_force: ArrayLike | None = None, *, axis: int | None = None
+        self,
+        state: ArrayLike,
+        velocity: ArrayLike,
+        normal_force: ArrayLike | None = None,
+        *,
+        axis: int | None = None,
     ) -> np.ndarray:
         """Return the rate `zdot` [m/s] of bristles with deflection `state` [m] driven at `velocity` [m/s].
 
@@ -92,12 +102,21 @@ class FrictionLaw(Checked):
             validation.non_negative_numbers("normal_force", normal_force)
         if self.reference_load is not None:
             if normal_force is None:
-                raise InvalidValueError("normal_force", "be given for a law with a reference_load", normal_force)
+                raise InvalidValueError(
+                    "normal_force",
+                    "be given for a law with a reference_load",
+                    normal_force,
+                )
             z = z * _expanded(self.stiffness_factor(normal_force), axis)
         return self._bristle(z, v, axis)[0]
 
     def force(
-        self, state: ArrayLike, velocity: ArrayLike, normal_force: ArrayLike, *, axis: int | None = None
+        self,
+        state: ArrayLike,
+        velocity: ArrayLike,
+        normal_force: ArrayLike,
+        *,
+        axis: int | None = None,
     ) -> np.ndarray:
         """Return the friction force [N] on the moving body; `normal_force` [N] broadcasts with bristles, not with
         components.
@@ -106,17 +125,24 @@ class FrictionLaw(Checked):
         """
         z, v = _bristles(state, velocity, axis)
         load = validation.non_negative_numbers("normal_force", normal_force)
-        factor, load = _expanded(self.stiffness_factor(load), axis), _expanded(load, axis)
+        factor = _expanded(self.stiffness_factor(load), axis)
+        load = _expanded(load, axis)
         validation.broadcast(state=z, velocity=v, normal_force=load)
         return load * self._bristle(factor * z, v, axis)[1]
 
-    def _bristle(self, z: np.ndarray, v: np.ndarray, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
+    def _bristle(
+        self, z: np.ndarray, v: np.ndarray, axis: int | None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the rates of bristles and their tractions per unit load; checked arrays that broadcast."""
-        law, length, speed = self.numbers, _norm(z, axis), _norm(v, axis)
+        law = self.numbers
+        length = _norm(z, axis)
+        speed = _norm(v, axis)
         product = z * v if axis is None else (z * v).sum(axis=axis, keepdims=True)
         along = product / np.where(length > 0.0, length, 1.0)
         grip = law.sigma_0 / formulas.stribeck(np, speed, law)
-        rate = v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
+        rate = (
+            v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
+        )
         return rate, formulas.traction(z, rate, v, law)
 
 
@@ -124,22 +150,31 @@ def _expanded(load: np.ndarray, axis: int | None) -> np.ndarray:
     return load if axis is None else np.expand_dims(load, axis)
 
 
-def _bristles(state: Any, velocity: Any, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
+def _bristles(
+    state: Any, velocity: Any, axis: int | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return both inputs as arrays that broadcast and have such an axis."""
-    z, v = validation.finite_numbers("state", state), validation.finite_numbers("velocity", velocity)
+    z = validation.finite_numbers("state", state)
+    v = validation.finite_numbers("velocity", velocity)
     least = min(z.ndim, v.ndim)
     validation.broadcast(state=z, velocity=v)
     if axis is not None and not (type(axis) is int and -least <= axis < least):
-        raise InvalidValueError("axis", f"be None or the axis of the components (of {least} axes)", axis)
+        raise InvalidValueError(
+            "axis", f"be None or the axis of the components (of {least} axes)", axis
+        )
     return z, v
 
 
 def refuse_creep(law: Any, by: str) -> None:
     """Raise unless `law` is a law of bristles that keeps what sticks where it is."""
     if not isinstance(law, FrictionLaw):
-        raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", law)
+        raise InvalidValueError(
+            "law", "be a friction law of bristles, such as LuGre", law
+        )
     if not law.holds_at_rest:
-        raise InvalidValueError("law", f"have no creep_speed for {by}: take LuGre or Dahl", law)
+        raise InvalidValueError(
+            "law", f"have no creep_speed for {by}: take LuGre or Dahl", law
+        )
 
 
 def is_rate_law(law: Any) -> bool:
@@ -157,8 +192,16 @@ def refuse_rate_law(law: Any, by: str) -> None:
 def refuse_fixed_stiffness(law: Any, by: str) -> None:
     """Raise for a law whose stiffness does not grow with the load, where it must."""
     if getattr(law, "reference_load", None) is not None:
-        raise InvalidValueError("law", f"have no reference_load for {by}, which does not know it", law.reference_load)
+        raise InvalidValueError(
+            "law",
+            f"have no reference_load for {by}, which does not know it",
+            law.reference_load,
+        )
 
 
 def _norm(vector: np.ndarray, axis: int | None) -> np.ndarray:
-    return np.abs(vector) if axis is None else np.linalg.norm(vector, axis=axis, keepdims=True)
+    return (
+        np.abs(vector)
+        if axis is None
+        else np.linalg.norm(vector, axis=axis, keepdims=True)
+    )

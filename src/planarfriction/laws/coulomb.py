@@ -23,7 +23,9 @@ class Coulomb(Checked):
     mu: float = checked(validation.positive)
     """Friction coefficient [-]."""
 
-    def wrench(self, surface: Any, twist: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
+    def wrench(
+        self, surface: Any, twist: ArrayLike, normal_force: ArrayLike
+    ) -> np.ndarray:
         """Return the friction wrench `mu f_N W(V)` on the sliding body about the contact frame's origin [N, N, N m].
 
         `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N]. At
@@ -40,4 +42,6 @@ class Coulomb(Checked):
             return self.mu * load[..., None] * direction
         except ValueError:
             shapes = f"shapes {list(load.shape)} and {list(direction.shape[:-1])}"
-            raise InvalidValueError("normal_force", "broadcast with the twist", shapes) from None
+            raise InvalidValueError(
+                "normal_force", "broadcast with the twist", shapes
+            ) from None

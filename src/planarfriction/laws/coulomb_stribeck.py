@@ -52,6 +52,7 @@ class CoulombStribeck(FrictionLaw):
     @property
     def numbers(self) -> LawNumbers:
         """The numbers for the formulas: those of plain bristles with `sigma_0 = mu_s/(v_c tau)` that relax."""
-        sigma_0, creep_speed = self.mu_s / (self.creep_speed * self.relaxation_time), self.creep_speed
+        sigma_0 = self.mu_s / (self.creep_speed * self.relaxation_time)
+        creep_speed = self.creep_speed
         curve = self.mu_c, self.mu_s, self.v_s, self.gamma
         return LawNumbers(sigma_0, 0.0, self.sigma_2, *curve, creep_speed=creep_speed)

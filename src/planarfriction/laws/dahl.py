@@ -35,4 +35,12 @@ class Dahl(FrictionLaw):
 
     @property
     def numbers(self) -> LawNumbers:
-        return LawNumbers(self.sigma_0, 0.0, 0.0, mu_c=self.mu_c, mu_s=self.mu_c, v_s=_SPEED, gamma=2.0)
+        return LawNumbers(
+            self.sigma_0,
+            0.0,
+            0.0,
+            mu_c=self.mu_c,
+            mu_s=self.mu_c,
+            v_s=_SPEED,
+            gamma=2.0,
+        )

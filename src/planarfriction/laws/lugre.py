@@ -42,7 +42,9 @@ def _elasto_plastic(name: str, value: Any) -> ElastoPlastic:
         validation.keys(name, value, ["breakaway_ratio"])
         return ElastoPlastic(value["breakaway_ratio"])
     if validation.why_not_numeric(value) is not None:
-        raise InvalidValueError(name, "be a breakaway ratio, an ElastoPlastic, or None", value)
+        raise InvalidValueError(
+            name, "be a breakaway ratio, an ElastoPlastic, or None", value
+        )
     return ElastoPlastic(_below_one(name, value))
 
 
@@ -72,7 +74,9 @@ class LuGre(FrictionLaw):
     """Viscous friction per unit normal load [s/m]."""
     gamma: float = checked(validation.positive, default=2.0)
     """Stribeck exponent [-]."""
-    elasto_plastic: ElastoPlastic | float | None = checked(_elasto_plastic, default=None)
+    elasto_plastic: ElastoPlastic | float | None = checked(
+        _elasto_plastic, default=None
+    )
     """Elasto-plastic extension, None for plain LuGre; a number is the breakaway ratio [-] of `ElastoPlastic`: bristles
     deflected less than this share of their maximum do not slip."""
     reference_load: float | None = checked(validation.positive, default=None)
@@ -85,7 +89,17 @@ class LuGre(FrictionLaw):
 
     @property
     def numbers(self) -> LawNumbers:
-        plain = LawNumbers(self.sigma_0, self.sigma_1, self.sigma_2, self.mu_c, self.mu_s, self.v_s, self.gamma)
+        plain = LawNumbers(
+            self.sigma_0,
+            self.sigma_1,
+            self.sigma_2,
+            self.mu_c,
+            self.mu_s,
+            self.v_s,
+            self.gamma,
+        )
         if not isinstance(self.elasto_plastic, ElastoPlastic):
             return plain
-        return plain._replace(elasto_plastic=1.0, breakaway_ratio=self.elasto_plastic.breakaway_ratio)
+        return plain._replace(
+            elasto_plastic=1.0, breakaway_ratio=self.elasto_plastic.breakaway_ratio
+        )

@@ -72,13 +72,17 @@ class RateLaw(FrictionLaw):
     def __post_init__(self) -> None:
         super().__post_init__()
         for each in dataclasses.fields(self):  # pyright: ignore[reportArgumentType]
-            self._set(**{each.name: validation.number(each.name, getattr(self, each.name))})
+            self._set(
+                **{each.name: validation.number(each.name, getattr(self, each.name))}
+            )
         validation.positive("sigma_0", self.sigma_0)
         validation.positive("largest_deflection", self.largest_deflection)
         try:
             self.functions(cells.POSITIONS)
         except TypeError as error:
-            raise InvalidValueError("law", f"be a straight line ({error})", type(self).__name__) from None
+            raise InvalidValueError(
+                "law", f"be a straight line ({error})", type(self).__name__
+            ) from None
 
     @property
     def largest_deflection(self) -> float:
@@ -96,7 +100,9 @@ class RateLaw(FrictionLaw):
         """True if a bristle that is not driven keeps its deflection, and pulls by its stiffness alone."""
         z = np.array([[0.5 * self.largest_deflection, 0.0]])
         rate, pull = self._evaluated(z, np.zeros((1, 2)))
-        return not rate.any() and np.allclose(pull, -self.sigma_0 * z, rtol=1e-12, atol=0.0)
+        return not rate.any() and np.allclose(
+            pull, -self.sigma_0 * z, rtol=1e-12, atol=0.0
+        )
 
     def steady_friction(self, speed: ArrayLike) -> np.ndarray:
         """Return the friction force over normal force [-] in steady sliding at `speed` >= 0 `[...]` [m/s].
@@ -108,32 +114,63 @@ class RateLaw(FrictionLaw):
         speed = np.abs(validation.finite_numbers("speed", speed))
         twist = np.zeros((speed.size, 3))
         twist[:, 0] = speed.reshape(-1)
-        dt = 0.25 * self.largest_deflection / np.where(twist[:, 0] > 0.0, twist[:, 0], 1.0)
-        step, single = self.functions(cells.POSITIONS).steps.step, self._single()
-        table = row_of(steps.Stepped(address_of(step), 2, 4, 1, place_of(single), single.size))
-        z, new, pull = np.zeros((speed.size, 2)), np.empty((speed.size, 2)), np.empty((speed.size, 3))
+        dt = (
+            0.25
+            * self.largest_deflection
+            / np.where(twist[:, 0] > 0.0, twist[:, 0], 1.0)
+        )
+        step = self.functions(cells.POSITIONS).steps.step
+        single = self._single()
+        table = row_of(
+            steps.Stepped(address_of(step), 2, 4, 1, place_of(single), single.size)
+        )
+        z = np.zeros((speed.size, 2))
+        new = np.empty((speed.size, 2))
+        pull = np.empty((speed.size, 3))
         for _ in range(400):
-            steps.ready(steps.step_many)(table, z, twist, _ALONE, dt, new, pull, np.empty(3))
+            steps.ready(steps.step_many)(
+                table, z, twist, _ALONE, dt, new, pull, np.empty(3)
+            )
             z, new = new, z
-        return np.where(speed > 0.0, -pull[:, 0].reshape(speed.shape), self.numbers.mu_c)
+        return np.where(
+            speed > 0.0, -pull[:, 0].reshape(speed.shape), self.numbers.mu_c
+        )
 
-    def _bristle(self, z: np.ndarray, v: np.ndarray, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
-        z, v = (np.atleast_1d(each)[..., None] if axis is None else np.moveaxis(each, axis, -1) for each in (z, v))
+    def _bristle(
+        self, z: np.ndarray, v: np.ndarray, axis: int | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        z, v = (
+            np.atleast_1d(each)[..., None]
+            if axis is None
+            else np.moveaxis(each, axis, -1)
+            for each in (z, v)
+        )
         z, v = np.broadcast_arrays(z, v)
-        shape, size = z.shape, z.shape[-1]
+        shape = z.shape
+        size = z.shape[-1]
         if size > 2:
-            raise InvalidValueError("axis", f"be that of one or two components for {type(self).__name__}", size)
+            raise InvalidValueError(
+                "axis",
+                f"be that of one or two components for {type(self).__name__}",
+                size,
+            )
         count = z.size // size
         found = self._evaluated(z.reshape(count, size), v.reshape(count, size))
         parts = (each[:, :size].reshape(shape) for each in found)
-        rate, pull = (each[..., 0] if axis is None else np.moveaxis(each, -1, axis) for each in parts)
+        rate, pull = (
+            each[..., 0] if axis is None else np.moveaxis(each, -1, axis)
+            for each in parts
+        )
         return rate, pull
 
     def _evaluated(self, z: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rates and tractions `[B, 2]` of bristles of one or two components `[B, 1 or 2]`."""
-        state, twist = np.zeros((len(z), 2)), np.zeros((len(z), 3))
-        state[:, : z.shape[1]], twist[:, : v.shape[1]] = z, v
-        rate, pull = np.empty_like(state), np.empty_like(twist)
+        state = np.zeros((len(z), 2))
+        twist = np.zeros((len(z), 3))
+        state[:, : z.shape[1]] = z
+        twist[:, : v.shape[1]] = v
+        rate = np.empty_like(state)
+        pull = np.empty_like(twist)
         function = address_of(self.functions(cells.POSITIONS).rates.evaluate)
         steps.rates_many(function, self._single(), state, twist, rate, pull)
         return rate, pull[:, :2]
@@ -152,14 +189,25 @@ class RateLaw(FrictionLaw):
         record = NamedTuple(f"{cls.__name__}Numbers", [(name, float) for name in names])  # pyright: ignore
         mark = rate_law.fingerprint(names, cls.bristle_rate, cls.bristle_traction)
         name = f"{cls.__name__}_{mark}{'' if lever is cells.POSITIONS else '_turned'}"
-        return rate_law.cell_functions(rate_law.element_of(name, cls.bristle_rate, cls.bristle_traction), record, lever)
+        return rate_law.cell_functions(
+            rate_law.element_of(name, cls.bristle_rate, cls.bristle_traction),
+            record,
+            lever,
+        )
 
-    def contact(self, lever: cells.Lever, numbers: np.ndarray, weights: np.ndarray) -> Any:
+    def contact(
+        self, lever: cells.Lever, numbers: np.ndarray, weights: np.ndarray
+    ) -> Any:
         """Return the record of a contact of n cells with these `numbers` and `weights` `[n]`, which compiled code
         reads; the caller keeps both alive."""
         record = self.functions(lever).record
         law = record.__annotations__["law"]
-        return record(law(*(float(getattr(self, name)) for name in law._fields)), numbers.shape[1], numbers, weights)
+        return record(
+            law(*(float(getattr(self, name)) for name in law._fields)),
+            numbers.shape[1],
+            numbers,
+            weights,
+        )
 
     def _single(self) -> np.ndarray:
         """Return the words of a contact of one cell; they hold addresses of this process, so no law keeps them."""

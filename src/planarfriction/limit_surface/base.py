@@ -19,7 +19,11 @@ from planarfriction.geometry import transformed
 from planarfriction.limit_surface.loops.twists import StoredPotential, table_twists
 from planarfriction.limit_surface.stored import across, descend, table_of
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
+from planarfriction.patch.metric import (
+    refuse_anisotropy,
+    refuse_cell_metrics,
+    symmetric_root,
+)
 from planarfriction.pictures import picture
 
 if TYPE_CHECKING:
@@ -84,18 +88,29 @@ class LimitSurface(ByValue):
     """Segments per quadrant of the table in which models store it [-]."""
 
     def __post_init__(self) -> None:
-        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
+        self._set(
+            segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS)
+        )
         validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if self.anisotropy != "any":
-            refuse = refuse_anisotropy if self.anisotropy == "none" else refuse_cell_metrics
+            refuse = (
+                refuse_anisotropy if self.anisotropy == "none" else refuse_cell_metrics
+            )
             refuse(self.patch, f"{type(self).__name__} (LimitSurfaceTable takes any)")
         if self.normal_force is not None:
-            self._set(normal_force=validation.positive_load("normal_force", self.normal_force))
+            self._set(
+                normal_force=validation.positive_load("normal_force", self.normal_force)
+            )
         if self.normal_force is not None or not self.patch.depends_on_load:
-            _ = self.contact_radius  # refuses a patch of one point now rather than later
+            _ = (
+                self.contact_radius
+            )  # refuses a patch of one point now rather than later
 
     def __repr__(self) -> str:
-        parts = [f"{self.patch.name!r} of {self.patch.cells} cells", *unusual(self, but=("patch",))]
+        parts = [
+            f"{self.patch.name!r} of {self.patch.cells} cells",
+            *unusual(self, but=("patch",)),
+        ]
         return f"{type(self).__name__}({', '.join(parts)})"
 
     def _repr_html_(self) -> str:
@@ -124,7 +139,11 @@ class LimitSurface(ByValue):
         """
         radius = self._radius()
         if not radius > 0.0:
-            raise InvalidValueError("patch", "have a contact radius > 0 (more than one point)", f"r={radius}")
+            raise InvalidValueError(
+                "patch",
+                "have a contact radius > 0 (more than one point)",
+                f"r={radius}",
+            )
         return radius
 
     def _radius(self) -> float:
@@ -140,9 +159,16 @@ class LimitSurface(ByValue):
         loaded = weights > 0.0
         offset = self.patch.positions - self.centre_of_pressure
         # the centre of pressure is a sum with rounding; a cell that stands on it stands on it exactly
-        offset[np.abs(offset).max(axis=1) < _ROUNDING * np.abs(self.patch.positions[loaded]).max()] = 0.0
+        offset[
+            np.abs(offset).max(axis=1)
+            < _ROUNDING * np.abs(self.patch.positions[loaded]).max()
+        ] = 0.0
         x, y = self.patch.lever_coordinates(*offset.T)
-        return np.ascontiguousarray(x[loaded]), np.ascontiguousarray(y[loaded]), weights[loaded]
+        return (
+            np.ascontiguousarray(x[loaded]),
+            np.ascontiguousarray(y[loaded]),
+            weights[loaded],
+        )
 
     @property
     def _one_metric(self) -> bool:
@@ -157,11 +183,17 @@ class LimitSurface(ByValue):
         """
         x, y, weights = self._loaded_cells()
         loaded = self.patch.weights(self.normal_force) > 0.0
-        radius, levers = self.contact_radius, np.zeros((2, 3, len(x)))
-        levers[0, 0], levers[1, 1], levers[0, 2], levers[1, 2] = 1.0, 1.0, -y / radius, x / radius
+        radius = self.contact_radius
+        levers = np.zeros((2, 3, len(x)))
+        levers[0, 0] = 1.0
+        levers[1, 1] = 1.0
+        levers[0, 2] = -y / radius
+        levers[1, 2] = x / radius
         if not self._one_metric:
             root = self.patch.root[loaded]  # pyright: ignore[reportOptionalSubscript]
-            levers[:, :2] = np.moveaxis(root @ np.linalg.inv(self._frame()[:2, :2]), 0, -1)
+            levers[:, :2] = np.moveaxis(
+                root @ np.linalg.inv(self._frame()[:2, :2]), 0, -1
+            )
         return levers, math.sqrt(0.5) * self.patch.lever_radii[loaded] / radius, weights
 
     @functools.cached_property
@@ -170,7 +202,9 @@ class LimitSurface(ByValue):
         if not self.patch.asymmetric:
             return None
         weights = self._weights()
-        wrench = np.einsum("n,nij,ni->j", weights, self.patch.levers()[:, :2], self.patch.asymmetries())
+        wrench = np.einsum(
+            "n,nij,ni->j", weights, self.patch.levers()[:, :2], self.patch.asymmetries()
+        )
         return np.linalg.solve(self._frame().T, wrench)
 
     # ------------------------------------------------------------------ what a surface says of itself
@@ -182,14 +216,21 @@ class LimitSurface(ByValue):
         = -(fx, fy, tau/r)` is the gradient of the dissipation with respect to them. It depends only on the direction of
         V_S, and changes sign with it; a pure translation has `h = (vx, vy, .)`.
         """
-        raise NotImplementedError(f"{type(self).__name__} has to implement direction(units)")
+        raise NotImplementedError(
+            f"{type(self).__name__} has to implement direction(units)"
+        )
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
         """Return `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`: by central differences unless overridden."""
         slope = np.zeros((len(units), 3, 3))
         for axis in np.moveaxis(across(units), -2, 0):
-            ends = [self.direction(_unit(units + sign * _DIFFERENCE * axis)) for sign in (1.0, -1.0)]
-            slope += np.einsum("mi,mj->mij", (ends[0] - ends[1]) / (2.0 * _DIFFERENCE), axis)
+            ends = [
+                self.direction(_unit(units + sign * _DIFFERENCE * axis))
+                for sign in (1.0, -1.0)
+            ]
+            slope += np.einsum(
+                "mi,mj->mij", (ends[0] - ends[1]) / (2.0 * _DIFFERENCE), axis
+            )
         return slope
 
     @functools.cached_property
@@ -197,7 +238,9 @@ class LimitSurface(ByValue):
         """The surface for compiled code: a table of its potential, computed on first use."""
         from planarfriction.limit_surface.stored import stored_potential
 
-        data = stored_potential(lambda units: (self.direction(units), None), self.segments)
+        data = stored_potential(
+            lambda units: (self.direction(units), None), self.segments
+        )
         return SurfaceNumbers(kernels.POTENTIAL, self.segments, data)
 
     # ------------------------------------------------------------------ the protocol
@@ -225,7 +268,9 @@ class LimitSurface(ByValue):
         """
         scaled, frame = self._scaled(twist)
         flat = scaled.reshape(-1, 3)
-        return -(frame.T @ self._direction_slope(flat) @ frame).reshape(*scaled.shape[:-1], 3, 3)
+        return -(frame.T @ self._direction_slope(flat) @ frame).reshape(
+            *scaled.shape[:-1], 3, 3
+        )
 
     def twist(self, wrench: ArrayLike) -> np.ndarray:
         """Return the twist `[..., 3]` of unit dissipation normal to the surface where the ray of `wrench` meets it.
@@ -239,15 +284,21 @@ class LimitSurface(ByValue):
         """
         wrench = validation.vectors("wrench", wrench, 3)
         if wrench.ndim > 1:
-            validation.finite_numbers("wrench", wrench, largest=math.inf)  # before it is copied, whatever its size
-        rows = np.array(wrench, order="C").reshape(-1, 3)  # writable, for which loops are compiled
+            validation.finite_numbers(
+                "wrench", wrench, largest=math.inf
+            )  # before it is copied, whatever its size
+        rows = np.array(wrench, order="C").reshape(
+            -1, 3
+        )  # writable, for which loops are compiled
         found = np.empty_like(rows)
         angle = self._find_twists(rows, found)
         if not 0.0 <= angle <= CERTIFIED:
             raise _no_twist(wrench, angle)
         return found.reshape(wrench.shape)
 
-    def compare(self, reference: LimitSurface, *, samples: int = 200) -> SurfaceComparison:
+    def compare(
+        self, reference: LimitSurface, *, samples: int = 200
+    ) -> SurfaceComparison:
         """Compare with another surface: wrenches of the same twists, and twists of the same wrenches.
 
         Both at `samples` directions, spread evenly over the sphere of the reference's scaled coordinates.
@@ -267,10 +318,17 @@ class LimitSurface(ByValue):
 
         With a friction metric the velocity there is `L v`; metrics per cell share the root of their mean.
         """
-        frame, root = scaling(self.centre_of_pressure, self.contact_radius), self.patch.root
+        frame = scaling(self.centre_of_pressure, self.contact_radius)
+        root = self.patch.root
         if root is not None:
             if root.ndim == 3:
-                root = symmetric_root(np.einsum("n,nij->ij", self.patch.weights(self.normal_force), self.patch.metric))
+                root = symmetric_root(
+                    np.einsum(
+                        "n,nij->ij",
+                        self.patch.weights(self.normal_force),
+                        self.patch.metric,
+                    )
+                )
             frame[:2] = root @ frame[:2]
         return frame
 
@@ -279,7 +337,13 @@ class LimitSurface(ByValue):
         """Numbers `[21]` between scaled and plain coordinates: the `frame` of `limit_surface.loops.twists`."""
         back = np.linalg.inv(self._frame())
         # conjugate coordinates: force and torque / r about the centre of pressure; -h balances the wrench
-        return np.concatenate([-back.T.ravel(), back.ravel(), np.zeros(3) if self._lean is None else self._lean])
+        return np.concatenate(
+            [
+                -back.T.ravel(),
+                back.ravel(),
+                np.zeros(3) if self._lean is None else self._lean,
+            ]
+        )
 
     @functools.cached_property
     def _table(self) -> StoredPotential:
@@ -293,7 +357,8 @@ class LimitSurface(ByValue):
     def _direction(self, scaled: np.ndarray) -> np.ndarray:
         """Return `h` of scaled twists `[..., 3]`, with what the asymmetry adds; zero at rest."""
         flat = scaled.reshape(-1, 3)
-        speed, h = _norm(flat), np.zeros_like(flat)
+        speed = _norm(flat)
+        h = np.zeros_like(flat)
         moving = speed > 0.0
         h[moving] = self.direction(flat[moving] / speed[moving, None])
         if self._lean is not None:
@@ -302,10 +367,13 @@ class LimitSurface(ByValue):
 
     def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
         """Return `dh/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; zero at rest."""
-        speed, slope = _norm(scaled), np.zeros((len(scaled), 3, 3))
+        speed = _norm(scaled)
+        slope = np.zeros((len(scaled), 3, 3))
         moving = speed > 0.0
         per_speed = 1.0 / speed[moving, None]
-        slope[moving] = self.direction_slope(scaled[moving] * per_speed) * per_speed[:, None]
+        slope[moving] = (
+            self.direction_slope(scaled[moving] * per_speed) * per_speed[:, None]
+        )
         return slope
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
@@ -321,14 +389,18 @@ class CompiledLimitSurface(LimitSurface):
     """A limit surface of one of the kinds of `published.surfaces`: it gives its `numbers`, the loops do the rest."""
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        h, (kind, size, data) = np.empty_like(units), self.numbers
+        h = np.empty_like(units)
+        (kind, size, data) = self.numbers
         kernels.sliding_batch(kind, data, 0, size, units, h)
         return h
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        slopes, (kind, size, data) = np.empty((len(units), 9)), self.numbers
+        slopes = np.empty((len(units), 9))
+        (kind, size, data) = self.numbers
         kernels.sliding_jacobian_batch(kind, data, 0, size, units, slopes)  # of h |V_S|
-        return slopes.reshape(-1, 3, 3) - np.einsum("mi,mj->mij", self.direction(units), units)
+        return slopes.reshape(-1, 3, 3) - np.einsum(
+            "mi,mj->mij", self.direction(units), units
+        )
 
 
 def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray:
@@ -348,7 +420,9 @@ def _unit(scaled: np.ndarray) -> np.ndarray:
 
 
 def _rows(name: str, value) -> np.ndarray:
-    return validation.finite_numbers(name, validation.vectors(name, value, 3), largest=_LARGEST)
+    return validation.finite_numbers(
+        name, validation.vectors(name, value, 3), largest=_LARGEST
+    )
 
 
 def _no_twist(wrench: np.ndarray, angle: float) -> FrictionError:
@@ -356,4 +430,6 @@ def _no_twist(wrench: np.ndarray, angle: float) -> FrictionError:
     validation.finite_numbers("wrench", wrench, largest=math.inf)
     if not (np.abs(wrench).max(axis=-1) > 0.0).all():
         return InvalidValueError("wrench", "not be zero", wrench.tolist())
-    return SolverError(f"no twist found: the wrench of the nearest one is {angle:.1e} rad off (see LimitSurfaceExact)")
+    return SolverError(
+        f"no twist found: the wrench of the nearest one is {angle:.1e} rad off (see LimitSurfaceExact)"
+    )

@@ -28,17 +28,31 @@ class LimitSurfaceCells(CompiledLimitSurface):
     def numbers(self) -> SurfaceNumbers:
         """Scaled positions and weights of the loaded cells; of discs a table."""
         if self.patch.has_discs:
-            data = stored_potential(lambda units: cell_sums(self._cell_rows, units), self.segments)
+            data = stored_potential(
+                lambda units: cell_sums(self._cell_rows, units), self.segments
+            )
             return SurfaceNumbers(kernels.POTENTIAL, self.segments, data)
         x, y, weights = self._loaded_cells()
         radius = self.contact_radius
-        return SurfaceNumbers(kernels.CELLS, len(weights), np.concatenate([x / radius, y / radius, weights]))
+        return SurfaceNumbers(
+            kernels.CELLS,
+            len(weights),
+            np.concatenate([x / radius, y / radius, weights]),
+        )
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        return super().direction(units) if self._compiled else cell_sums(self._cell_rows, units)[0]
+        return (
+            super().direction(units)
+            if self._compiled
+            else cell_sums(self._cell_rows, units)[0]
+        )
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        return super().direction_slope(units) if self._compiled else cell_sums(self._cell_rows, units)[1]
+        return (
+            super().direction_slope(units)
+            if self._compiled
+            else cell_sums(self._cell_rows, units)[1]
+        )
 
     @property
     def _compiled(self) -> bool:

@@ -30,7 +30,9 @@ class Spread:
     def of(cls, values: np.ndarray) -> Spread:
         """Return the statistics of values `[M]`."""
         size = np.abs(values)
-        return cls(float(size.max()), float(size.mean()), float(np.sqrt(np.mean(size**2))))
+        return cls(
+            float(size.max()), float(size.mean()), float(np.sqrt(np.mean(size**2)))
+        )
 
 
 @described
@@ -50,12 +52,20 @@ class SurfaceComparison:
     """Number of twists, and of wrenches."""
 
     def __str__(self) -> str:
-        units = {"force": "-", "torque": "torque / r [-]", "radius": "-", "angle": "deg"}
+        units = {
+            "force": "-",
+            "torque": "torque / r [-]",
+            "radius": "-",
+            "angle": "deg",
+        }
         rows = [f"{'difference':<16}{'largest':>10}{'mean':>10}{'rms':>10}"]
         for name, unit in units.items():
             words = unit if "[" in unit else f"{name} [{unit}]"
             spread = getattr(self, name)
-            rows.append(f"{words:<16}" + "".join(f"{value:>10.4g}" for value in dataclasses.astuple(spread)))
+            rows.append(
+                f"{words:<16}"
+                + "".join(f"{value:>10.4g}" for value in dataclasses.astuple(spread))
+            )
         return "\n".join(rows)
 
 
@@ -67,17 +77,28 @@ def directions(count: int) -> np.ndarray:
     height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     azimuth = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
     across = np.sqrt(1.0 - height**2)
-    return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), height], axis=1)
+    return np.stack(
+        [across * np.cos(azimuth), across * np.sin(azimuth), height], axis=1
+    )
 
 
-def compare(surface: LimitSurface, reference: LimitSurface, samples: int) -> SurfaceComparison:
+def compare(
+    surface: LimitSurface, reference: LimitSurface, samples: int
+) -> SurfaceComparison:
     """Implement `LimitSurface.compare`."""
     units = directions(validation.count("samples", samples, 2, MOST_SAMPLES))
     frame = reference._frame()  # V_S = frame V, and so W = frame' W_S
-    twists, wrenches = np.linalg.solve(frame, units.T).T, units @ frame
-    apart = np.linalg.solve(frame.T, (surface.wrench(twists) - reference.wrench(twists)).T).T
-    found, wanted = surface.twist(wrenches), reference.twist(wrenches)  # of dissipation 1: -W . V = 1/radius
-    further = np.einsum("mi,mi->m", wanted, wrenches) / np.einsum("mi,mi->m", found, wrenches) - 1.0
+    twists = np.linalg.solve(frame, units.T).T
+    wrenches = units @ frame
+    apart = np.linalg.solve(
+        frame.T, (surface.wrench(twists) - reference.wrench(twists)).T
+    ).T
+    found = surface.twist(wrenches)
+    wanted = reference.twist(wrenches)  # of dissipation 1: -W . V = 1/radius
+    further = (
+        np.einsum("mi,mi->m", wanted, wrenches) / np.einsum("mi,mi->m", found, wrenches)
+        - 1.0
+    )
     return SurfaceComparison(
         force=Spread.of(np.hypot(apart[:, 0], apart[:, 1])),
         torque=Spread.of(apart[:, 2]),

@@ -62,15 +62,26 @@ def _rows(domain: Any, unit: float, rules: Rules = EXACT_RULES) -> Any:
     if isinstance(domain, kernels.Discs):
         return kernels.Discs(domain.radii / unit, domain.places / unit, domain.loads)
     if isinstance(domain, kernels.Rings):
-        return domain._replace(inner=domain.inner / unit, outer=domain.outer / unit, radius=domain.radius / unit)
+        return domain._replace(
+            inner=domain.inner / unit,
+            outer=domain.outer / unit,
+            radius=domain.radius / unit,
+        )
     corners = domain.corners / unit
-    return kernels.Elements(corners, _shape(corners, domain.weights), *_gauss_rules(corners.shape[1], rules))
+    return kernels.Elements(
+        corners, _shape(corners, domain.weights), *_gauss_rules(corners.shape[1], rules)
+    )
 
 
 def _sums(domain: Any, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
     """Return the sums `[M, 9]` over a domain at unit twists `[M, 3]`, lengths in `unit` [m]."""
-    rows, sums = _rows(domain, unit, rules), np.empty((len(twists), 9))
-    loops = {kernels.Discs: kernels.disc_sums, kernels.Rings: kernels.ring_sums, kernels.Elements: kernels.element_sums}
+    rows = _rows(domain, unit, rules)
+    sums = np.empty((len(twists), 9))
+    loops = {
+        kernels.Discs: kernels.disc_sums,
+        kernels.Rings: kernels.ring_sums,
+        kernels.Elements: kernels.element_sums,
+    }
     loops[type(rows)](rows, twists, sums)
     return sums
 
@@ -93,7 +104,9 @@ class LimitSurfaceExact(LimitSurface):
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """Numbers at the nodes: the potential and its derivatives along both angles and mixed; the force of a spin."""
-        data = stored_potential(lambda units: self.sums(units, STORED_RULES), self.segments)
+        data = stored_potential(
+            lambda units: self.sums(units, STORED_RULES), self.segments
+        )
         return SurfaceNumbers(surfaces.POTENTIAL, self.segments, data)
 
     @functools.cached_property
@@ -103,11 +116,19 @@ class LimitSurfaceExact(LimitSurface):
             triangles = self._outline.triangles()
             areas = _area(triangles)
             # from the first vertex, so that a polygon far from the origin keeps its digits
-            offset = np.einsum("n,nkx->x", areas / areas.sum(), triangles - triangles[0, 0]) / 3.0
+            offset = (
+                np.einsum("n,nkx->x", areas / areas.sum(), triangles - triangles[0, 0])
+                / 3.0
+            )
             return triangles[0, 0] + offset
         if isinstance(self._outline, RoundOutline):
             return np.zeros(2)
-        return np.array([(self._weights() * coordinate).sum() for coordinate in self.patch.positions.T])
+        return np.array(
+            [
+                (self._weights() * coordinate).sum()
+                for coordinate in self.patch.positions.T
+            ]
+        )
 
     def _weights(self) -> np.ndarray:
         return self.patch.tile_weights(self.normal_force)
@@ -120,9 +141,16 @@ class LimitSurfaceExact(LimitSurface):
     @functools.cached_property
     def _outline(self) -> PolygonOutline | RoundOutline | None:
         """The patch's outline, if the pressure can be integrated over it."""
-        outline, pressure = self.patch.outline, self.patch.pressure
-        laws = (Uniform, SoftFinger) if isinstance(outline, RoundOutline) else (Uniform,)
-        if isinstance(outline, RoundOutline) and self.patch.root is not None and (self.patch.root != np.eye(2)).any():
+        outline = self.patch.outline
+        pressure = self.patch.pressure
+        laws = (
+            (Uniform, SoftFinger) if isinstance(outline, RoundOutline) else (Uniform,)
+        )
+        if (
+            isinstance(outline, RoundOutline)
+            and self.patch.root is not None
+            and (self.patch.root != np.eye(2)).any()
+        ):
             return None  # a metric makes the rings ellipses
         if isinstance(outline, RoundOutline) and self._soft[0] <= outline.inner:
             return None  # the cells nearest to the hole share the load
@@ -131,7 +159,8 @@ class LimitSurfaceExact(LimitSurface):
     @property
     def _soft(self) -> tuple[float, float]:
         """Radius at which the pressure on a disc or ring ends [m], and the exponent of its profile."""
-        pressure, load = self.patch.pressure, self.normal_force or 1.0
+        pressure = self.patch.pressure
+        load = self.normal_force or 1.0
         if isinstance(pressure, SoftFinger):
             return float(pressure.radius(load)), float(pressure.exponent(load))
         return self.patch.outline.outer, _EVEN  # pyright: ignore[reportOptionalMemberAccess, reportAttributeAccessIssue]
@@ -139,15 +168,31 @@ class LimitSurfaceExact(LimitSurface):
     @functools.cached_property
     def _parts(self) -> _Elements | kernels.Discs | kernels.Rings:
         """Domain that the surface is integrated over, lengths in m."""
-        outline, pressure = self._outline, self.patch.pressure
+        outline = self._outline
+        pressure = self.patch.pressure
         self.patch.weights(self.normal_force)  # refuses a missing normal force
         if isinstance(outline, RoundOutline):
-            if isinstance(pressure, Uniform) and outline.inner <= _THICK * outline.outer:
-                radii = np.array([outline.outer, outline.inner] if outline.inner > 0.0 else [outline.outer])
+            if (
+                isinstance(pressure, Uniform)
+                and outline.inner <= _THICK * outline.outer
+            ):
+                radii = np.array(
+                    [outline.outer, outline.inner]
+                    if outline.inner > 0.0
+                    else [outline.outer]
+                )
                 squares = radii**2 * [1.0, -1.0][: len(radii)]
-                return kernels.Discs(radii, np.zeros((2, len(radii))), squares / squares.sum())
+                return kernels.Discs(
+                    radii, np.zeros((2, len(radii))), squares / squares.sum()
+                )
             reach, exponent = self._soft
-            return kernels.Rings(*_double_exponential(), outline.inner, min(outline.outer, reach), reach, exponent)
+            return kernels.Rings(
+                *_double_exponential(),
+                outline.inner,
+                min(outline.outer, reach),
+                reach,
+                exponent,
+            )
         if isinstance(outline, PolygonOutline):
             triangles = outline.triangles()
             areas = _area(triangles)
@@ -155,20 +200,30 @@ class LimitSurfaceExact(LimitSurface):
             return _Elements(self._lever_corners(corners), areas / areas.sum())
         x, y, weights = self._loaded_cells()
         if self.patch.has_discs and not self.patch.cell_extents().any():
-            return kernels.Discs(self.patch.lever_radii[self._weights() > 0.0], np.array([x, y]), weights)
+            return kernels.Discs(
+                self.patch.lever_radii[self._weights() > 0.0], np.array([x, y]), weights
+            )
         extents = self.patch.cell_extents()[self.patch.weights(self.normal_force) > 0.0]
         sides = int((extents > 0.0).any(axis=0).sum())
-        corners = np.stack([x, y], -1)[:, None] + self._lever_corners(extents[:, None] * _CORNERS[sides])
+        corners = np.stack([x, y], -1)[:, None] + self._lever_corners(
+            extents[:, None] * _CORNERS[sides]
+        )
         return _Elements(corners, weights)
 
     def _lever_corners(self, corners: np.ndarray) -> np.ndarray:
         """Return the corners `[..., 2]` in the lever coordinates of a friction metric, which maps quads to quads."""
-        return np.stack(self.patch.lever_coordinates(corners[..., 0], corners[..., 1]), -1)
+        return np.stack(
+            self.patch.lever_coordinates(corners[..., 0], corners[..., 1]), -1
+        )
 
     def _radius(self) -> float:
-        return float(_sums(self._parts, np.array([[0.0, 0.0, 1.0]]), 1.0, EXACT_RULES)[0, 2])
+        return float(
+            _sums(self._parts, np.array([[0.0, 0.0, 1.0]]), 1.0, EXACT_RULES)[0, 2]
+        )
 
-    def sums(self, units: np.ndarray, rules: Rules = EXACT_RULES) -> tuple[np.ndarray, np.ndarray]:
+    def sums(
+        self, units: np.ndarray, rules: Rules = EXACT_RULES
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return gradient `[M, 3]` and Hessian `[M, 3, 3]` of the dissipation at unit scaled twists `[M, 3]`."""
         sums = _sums(self._parts, units, self.contact_radius, rules)
         return sums[:, :3], sums[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]].reshape(-1, 3, 3)
@@ -182,14 +237,24 @@ class LimitSurfaceExact(LimitSurface):
     @functools.cached_property
     def _points(self) -> LimitSurfaceCells | None:
         """The sum over the cells, if they are points."""
-        points = isinstance(self._parts, _Elements) and self._parts.corners.shape[1] == kernels.POINTS
-        return LimitSurfaceCells(self.patch, normal_force=self.normal_force) if points else None
+        points = (
+            isinstance(self._parts, _Elements)
+            and self._parts.corners.shape[1] == kernels.POINTS
+        )
+        return (
+            LimitSurfaceCells(self.patch, normal_force=self.normal_force)
+            if points
+            else None
+        )
 
     @functools.cached_property
     def _loops(self) -> tuple[kernels.Elements, kernels.Discs, kernels.Rings]:
         """Domains for compiled loops: elements, discs and rings, of which only one is not empty."""
         none = np.zeros(0)
-        empty = _rows(_Elements(np.zeros((0, 2, 2)), none), 1.0), kernels.Discs(none, np.zeros((2, 0)), none)
+        empty = (
+            _rows(_Elements(np.zeros((0, 2, 2)), none), 1.0),
+            kernels.Discs(none, np.zeros((2, 0)), none),
+        )
         rows = _rows(self._parts, self.contact_radius)
         loops = (*empty, kernels.Rings(none, none, 0.0, 1.0, 1.0, 1.0))
         return tuple(rows if type(each) is type(rows) else each for each in loops)  # pyright: ignore[reportReturnType]
@@ -202,7 +267,8 @@ class LimitSurfaceExact(LimitSurface):
 
 def _area(triangles: np.ndarray) -> np.ndarray:
     """Return the signed areas `[N]` [m^2] of triangles `[N, 3, 2]` [m]."""
-    first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    first = triangles[:, 1] - triangles[:, 0]
+    second = triangles[:, 2] - triangles[:, 0]
     return 0.5 * _cross(first, second)
 
 
@@ -242,13 +308,19 @@ def _gauss_rules(count: int, rules: Rules) -> tuple[np.ndarray, np.ndarray, np.n
     if count == kernels.POINTS:
         return np.array([[[0.0], [0.0], [1.0]]]), np.array([1]), np.zeros(1)
     nodes = np.zeros((len(rules), 3, max(side for _, side in rules) ** 2))
-    points = np.array([side if count == kernels.SEGMENTS else side**2 for _, side in rules])
+    points = np.array(
+        [side if count == kernels.SEGMENTS else side**2 for _, side in rules]
+    )
     for rule, (_, side) in zip(nodes, rules, strict=True):
         x, w = np.polynomial.legendre.leggauss(side)
         if count == kernels.SEGMENTS:
             rule[[0, 2], :side] = x, w
         else:
-            rule[:, : side**2] = np.repeat(x, side), np.tile(x, side), np.outer(w, w).ravel()
+            rule[:, : side**2] = (
+                np.repeat(x, side),
+                np.tile(x, side),
+                np.outer(w, w).ravel(),
+            )
     return nodes, points, np.array([reach for reach, _ in rules])
 
 

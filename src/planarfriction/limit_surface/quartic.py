@@ -20,7 +20,13 @@ from planarfriction.limit_surface.comparison import directions
 from planarfriction.limit_surface.loops.twists import BAD_WRENCH
 from planarfriction.patch import ContactPatch
 
-POWERS = np.array([powers for powers in itertools.product(range(4, -1, -1), repeat=3) if sum(powers) == 4])
+POWERS = np.array(
+    [
+        powers
+        for powers in itertools.product(range(4, -1, -1), repeat=3)
+        if sum(powers) == 4
+    ]
+)
 """Powers of `fx, fy, tau/r` in the 15 monomials, `[15, 3]`: x^4, x^3 y, x^3 z, x^2 y^2, ..."""
 
 MARGIN = 1e-4
@@ -56,7 +62,8 @@ def _certificate_equations() -> tuple[np.ndarray, np.ndarray]:
     """
     pairs = list(itertools.combinations_with_replacement(range(3), 2))
     row = {pair: number for number, pair in enumerate(itertools.product(pairs, pairs))}
-    of_coefficients, of_matrix = np.zeros((36, 15)), np.zeros((36, 9, 9))
+    of_coefficients = np.zeros((36, 15))
+    of_matrix = np.zeros((36, 9, 9))
     for i, j, k, n in itertools.product(range(3), repeat=4):  # (x_i z_k) (x_j z_n)
         here = row[(min(i, j), max(i, j)), (min(k, n), max(k, n))]
         of_coefficients[here] += 12.0 * _TENSORS[:, i, j, k, n]
@@ -70,16 +77,22 @@ def certificate(coefficients: np.ndarray) -> np.ndarray:
     Positive semidefinite: the quartic is convex, as `z' H(x) z = y' Q y >= 0` for all x, z.
     """
     cp = _cvxpy()
-    matrix, least = cp.Variable((9, 9), symmetric=True), cp.Variable()
+    matrix = cp.Variable((9, 9), symmetric=True)
+    least = cp.Variable()
     of_coefficients, of_matrix = _certificate_equations()
     scale = np.abs(coefficients).max()
     wanted = of_coefficients @ (coefficients / scale)
-    rules = [of_matrix @ cp.vec(matrix, order="C") == wanted, matrix - least * np.eye(9) >> 0]
+    rules = [
+        of_matrix @ cp.vec(matrix, order="C") == wanted,
+        matrix - least * np.eye(9) >> 0,
+    ]
     problem = cp.Problem(cp.Maximize(least), rules)
     _solve(problem)
     found = 0.5 * (matrix.value + matrix.value.T)  # pyright: ignore[reportOptionalMemberAccess, reportOptionalOperand]
     missing = wanted - of_matrix @ found.reshape(81)
-    return scale * (found + np.linalg.lstsq(of_matrix, missing, rcond=None)[0].reshape(9, 9))
+    return scale * (
+        found + np.linalg.lstsq(of_matrix, missing, rcond=None)[0].reshape(9, 9)
+    )
 
 
 def least_squares(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -88,17 +101,26 @@ def least_squares(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
     Without the constraint where that is convex anyway: then to rounding, otherwise to the solver's tolerance.
     """
     free = np.linalg.lstsq(rows, values, rcond=None)[0]
-    if np.linalg.matrix_rank(rows) == 15 and np.linalg.eigvalsh(certificate(free))[0] >= MARGIN:
+    if (
+        np.linalg.matrix_rank(rows) == 15
+        and np.linalg.eigvalsh(certificate(free))[0] >= MARGIN
+    ):
         return free
     cp = _cvxpy()
-    coefficients, matrix = cp.Variable(15), cp.Variable((9, 9), symmetric=True)
+    coefficients = cp.Variable(15)
+    matrix = cp.Variable((9, 9), symmetric=True)
     of_coefficients, of_matrix = _certificate_equations()
     # the same least squares in 15 rows, whatever the number of samples
     triangle = np.asarray(np.linalg.qr(np.column_stack([rows, values]), mode="r"))
     scale = np.abs(triangle).max()
     problem = cp.Problem(
-        cp.Minimize(cp.sum_squares((triangle[:, :15] @ coefficients - triangle[:, 15]) / scale)),
-        [of_coefficients @ coefficients == of_matrix @ cp.vec(matrix, order="C"), matrix >> MARGIN * np.eye(9)],
+        cp.Minimize(
+            cp.sum_squares((triangle[:, :15] @ coefficients - triangle[:, 15]) / scale)
+        ),
+        [
+            of_coefficients @ coefficients == of_matrix @ cp.vec(matrix, order="C"),
+            matrix >> MARGIN * np.eye(9),
+        ],
     )
     _solve(problem)
     return coefficients.value
@@ -159,7 +181,9 @@ class LimitSurfaceQuartic(LimitSurface):
         if self.coefficients is not None:
             given = validation.array("coefficients", self.coefficients, (15,))
             if not np.linalg.eigvalsh(certificate(given))[0] > 0.0:
-                raise InvalidValueError("coefficients", "be those of a convex quartic", given.tolist())
+                raise InvalidValueError(
+                    "coefficients", "be those of a convex quartic", given.tolist()
+                )
             given.setflags(write=False)
             self._set(coefficients=given)
 
@@ -182,17 +206,23 @@ class LimitSurfaceQuartic(LimitSurface):
 
         Raises `InvalidValueError` for pairs of the wrong shape, fewer than 5, not finite or zero.
         """
-        wrench, twist = _rows("wrench", wrench), _rows("twist", twist)
+        wrench = _rows("wrench", wrench)
+        twist = _rows("twist", twist)
         if wrench.ndim != 2 or wrench.shape != twist.shape or len(wrench) < 5:
             shapes = f"{list(wrench.shape)}, {list(twist.shape)}"
-            raise InvalidValueError("twist", "have as many rows as wrench, five or more", shapes)
+            raise InvalidValueError(
+                "twist", "have as many rows as wrench, five or more", shapes
+            )
         for name, rows in (("wrench", wrench), ("twist", twist)):
             if not (np.abs(rows).max(axis=1) > 0.0).all():
                 raise InvalidValueError(name, "not be zero in any row", rows.tolist())
         validation.instance("patch", patch, ContactPatch, "a ContactPatch")
         if normal_force is not None:
             normal_force = validation.positive_load("normal_force", normal_force)
-        frame = scaling(patch.centre_of_pressure(normal_force), float(patch.contact_radius(normal_force)))
+        frame = scaling(
+            patch.centre_of_pressure(normal_force),
+            float(patch.contact_radius(normal_force)),
+        )
         points = -np.linalg.solve(frame.T, wrench.T).T
         weight = validation.non_negative("velocity_weight", velocity_weight)
         coefficients = _fitted(points, twist @ frame.T, weight)
@@ -206,12 +236,16 @@ class LimitSurfaceQuartic(LimitSurface):
         """
         if self.coefficients is not None:
             return self.coefficients
-        surface = self.surface or LimitSurfaceCells(self.patch, normal_force=self.normal_force)
+        surface = self.surface or LimitSurfaceCells(
+            self.patch, normal_force=self.normal_force
+        )
         if self.normal_force is not None:
             surface = surface.at(self.normal_force)
         scaled = directions(_SAMPLES)
         frame = self._frame()
-        points = -np.linalg.solve(frame.T, surface.wrench(np.linalg.solve(frame, scaled.T).T).T).T
+        points = -np.linalg.solve(
+            frame.T, surface.wrench(np.linalg.solve(frame, scaled.T).T).T
+        ).T
         return _fitted(points, scaled, 1.0)
 
     @functools.cached_property
@@ -234,7 +268,8 @@ class LimitSurfaceQuartic(LimitSurface):
         return np.einsum("mcij,c->mij", hessians(points), self.quartic)
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
-        scaling, size = self._scaling, np.abs(wrenches).max(axis=1)
+        scaling = self._scaling
+        size = np.abs(wrenches).max(axis=1)
         if not (np.isfinite(size).all() and (size > 0.0).all()):
             return BAD_WRENCH
         targets = (wrenches / size[:, None]) @ scaling[:9].reshape(3, 3).T
@@ -254,22 +289,37 @@ class LimitSurfaceQuartic(LimitSurface):
         for _ in range(100):
             slope = 0.25 * self._gradient(x[active]) - units[active]
             left = np.linalg.norm(slope, axis=1) > _SLOPE_LEFT
-            active, slope = active[left], slope[left]
+            active = active[left]
+            slope = slope[left]
             if not active.size:
                 break
-            move = -np.linalg.solve(0.25 * self._hessian(x[active]), slope[..., None])[..., 0]
-            value = 0.25 * self._value(x[active]) - np.einsum("mi,mi->m", units[active], x[active])
+            move = -np.linalg.solve(0.25 * self._hessian(x[active]), slope[..., None])[
+                ..., 0
+            ]
+            value = 0.25 * self._value(x[active]) - np.einsum(
+                "mi,mi->m", units[active], x[active]
+            )
             downhill = np.einsum("mi,mi->m", slope, move)
-            trying, length = np.arange(len(active)), 1.0
+            trying = np.arange(len(active))
+            length = 1.0
             while trying.size and length > 1e-6:
                 who = active[trying]
                 trial = x[who] + length * move[trying]
-                reached = 0.25 * self._value(trial) - np.einsum("mi,mi->m", units[who], trial)
-                good = reached <= value[trying] + 0.1 * length * downhill[trying] + 1e-15
+                reached = 0.25 * self._value(trial) - np.einsum(
+                    "mi,mi->m", units[who], trial
+                )
+                good = (
+                    reached <= value[trying] + 0.1 * length * downhill[trying] + 1e-15
+                )
                 x[who[good]] = trial[good]
-                trying, length = trying[~good], 0.5 * length
-            size = np.linalg.norm(0.25 * self._gradient(x[active]) - units[active], axis=1)
-            moved = size < 0.5 * np.linalg.norm(slope, axis=1)  # else at rounding, or far and still damped
+                trying = trying[~good]
+                length = 0.5 * length
+            size = np.linalg.norm(
+                0.25 * self._gradient(x[active]) - units[active], axis=1
+            )
+            moved = size < 0.5 * np.linalg.norm(
+                slope, axis=1
+            )  # else at rounding, or far and still damped
             active = active[moved | (size > 1e-10)]
         return x
 
@@ -287,10 +337,18 @@ class LimitSurfaceQuartic(LimitSurface):
         return slope - np.einsum("mi,mj->mij", h, h) / (3.0 * root**3)[:, None, None]
 
 
-def _fitted(points: np.ndarray, twists: np.ndarray, velocity_weight: float) -> np.ndarray:
+def _fitted(
+    points: np.ndarray, twists: np.ndarray, velocity_weight: float
+) -> np.ndarray:
     """Return the coefficients with `H = 1` at `points` `[M, 3]` and gradients of length 4 along `twists` `[M, 3]`."""
     units = twists / np.linalg.norm(twists, axis=1)[:, None]
     across = np.eye(3) - np.einsum("mi,mj->mij", units, units)
-    parts = 0.25 * np.sqrt(velocity_weight) * np.einsum("mij,mcj->mic", across, gradients(points))
+    parts = (
+        0.25
+        * np.sqrt(velocity_weight)
+        * np.einsum("mij,mcj->mic", across, gradients(points))
+    )
     rows = np.concatenate([monomials(points), parts.reshape(-1, 15)])
-    return least_squares(rows, np.append(np.ones(len(points)), np.zeros(3 * len(points))))
+    return least_squares(
+        rows, np.append(np.ones(len(points)), np.zeros(3 * len(points)))
+    )

@@ -19,14 +19,19 @@ ROUNDING = 1e-15
 """Relative length of a step of the search for a twist that counts as none [-]."""
 
 
-def cell_sums(rows: tuple[np.ndarray, np.ndarray, np.ndarray], units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cell_sums(
+    rows: tuple[np.ndarray, np.ndarray, np.ndarray], units: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return `h` `[M, 3]` and `dh/dV_S` `[M, 3, 3]` of cells (`LimitSurface._cell_rows`) at unit scaled twists."""
-    h, slopes = np.empty((len(units), 3)), np.empty((len(units), 3, 3))
+    h = np.empty((len(units), 3))
+    slopes = np.empty((len(units), 3, 3))
     loops.cell_sums(*rows, units, h, slopes)
     return h, slopes
 
 
-def stored_potential(sums: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray | None]], segments: int) -> np.ndarray:
+def stored_potential(
+    sums: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray | None]], segments: int
+) -> np.ndarray:
     """Return the numbers of `published.surfaces.POTENTIAL`: at the nodes `phi` less the tilt and its derivatives along
     both angles and mixed, then the tilt.
 
@@ -36,8 +41,12 @@ def stored_potential(sums: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray |
     `d2phi/dp da = sin p (t . dh/dn e) + cos p (h . t)`.
     """
     segment = 0.5 * np.pi / segments
-    polar, azimuth = segment * np.arange(segments + 1)[:, None], segment * np.arange(4 * segments)[None, :]
-    sin_p, cos_p, sin_a, cos_a = np.sin(polar), np.cos(polar), np.sin(azimuth), np.cos(azimuth)
+    polar = segment * np.arange(segments + 1)[:, None]
+    azimuth = segment * np.arange(4 * segments)[None, :]
+    sin_p = np.sin(polar)
+    cos_p = np.cos(polar)
+    sin_a = np.sin(azimuth)
+    cos_a = np.cos(azimuth)
     cos_p[-1] = 0.0  # the equator is a translation, not nearly one
     flat = np.zeros_like(polar * azimuth)
     direction = np.stack([sin_p * cos_a, sin_p * sin_a, cos_p + flat], -1)
@@ -47,19 +56,29 @@ def stored_potential(sums: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray |
     h = h.reshape(direction.shape)
     h_across = np.einsum("pai,pai->pa", h, across)
     ax, ay, _ = h[0, 0]
-    lean, lean_slope = ax * cos_a + ay * sin_a, ay * cos_a - ax * sin_a
-    tilt, tilt_slope = sin_p * cos_p**2, cos_p * (cos_p**2 - 2.0 * sin_p**2)
+    lean = ax * cos_a + ay * sin_a
+    lean_slope = ay * cos_a - ax * sin_a
+    tilt = sin_p * cos_p**2
+    tilt_slope = cos_p * (cos_p**2 - 2.0 * sin_p**2)
     nodes = np.zeros((segments + 1, 4 * segments + 1, 4))
     inner = nodes[:, :-1]
     inner[..., 0] = np.einsum("pai,pai->pa", h, direction) - tilt * lean
     inner[..., 1] = np.einsum("pai,pai->pa", h, along) - tilt_slope * lean
     inner[..., 2] = sin_p * h_across - tilt * lean_slope
-    if slope is None:  # beyond the equator the surface is mirrored, and the tilt has the other sign
+    if (
+        slope is None
+    ):  # beyond the equator the surface is mirrored, and the tilt has the other sign
         beyond = np.roll(inner[-2, :, 2], -2 * segments) - 2.0 * tilt[-2] * lean_slope
-        inner[1:, :, 3] = (np.concatenate([inner[2:, :, 2], beyond]) - inner[:-1, :, 2]) / (2.0 * segment)
+        inner[1:, :, 3] = (
+            np.concatenate([inner[2:, :, 2], beyond]) - inner[:-1, :, 2]
+        ) / (2.0 * segment)
     else:
-        mixed = np.einsum("pai,paij,paj->pa", across, slope.reshape(*direction.shape, 3), along)
-        inner[1:, :, 3] = (sin_p * mixed + cos_p * h_across - tilt_slope * lean_slope)[1:]  # 0 at the axis
+        mixed = np.einsum(
+            "pai,paij,paj->pa", across, slope.reshape(*direction.shape, 3), along
+        )
+        inner[1:, :, 3] = (sin_p * mixed + cos_p * h_across - tilt_slope * lean_slope)[
+            1:
+        ]  # 0 at the axis
     nodes[:, -1] = nodes[:, 0]
     return np.append(nodes, (ax, ay))
 
@@ -68,15 +87,24 @@ def table_of(surface: LimitSurface) -> StoredPotential:
     """Return the stored potential of a surface, and its directions over their dissipation."""
     _, size, data = surface.numbers
     angle = 0.5 * np.pi / size * np.arange(4 * size)
-    polar, azimuth = angle[: size + 1, None], angle[None, :]
-    units = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0.0 * azimuth])
+    polar = angle[: size + 1, None]
+    azimuth = angle[None, :]
+    units = np.stack(
+        [
+            np.sin(polar) * np.cos(azimuth),
+            np.sin(polar) * np.sin(azimuth),
+            np.cos(polar) + 0.0 * azimuth,
+        ]
+    )
     lean = surface._lean
     if lean is not None:  # else the lower half mirrors the upper
         units = np.concatenate([units, -units], axis=1)
     flat = np.ascontiguousarray(units.reshape(3, -1).T)
     h = np.empty_like(flat)
     surfaces.sliding_batch(surfaces.POTENTIAL, data, 0, size, flat, h)
-    power = np.einsum("ni,ni->n", h if lean is None else h + lean, flat).reshape(units.shape[1:])
+    power = np.einsum("ni,ni->n", h if lean is None else h + lean, flat).reshape(
+        units.shape[1:]
+    )
     duals = np.divide(units, power, out=np.zeros_like(units), where=power > 0.0)
     return StoredPotential(data, size, duals, -1.0 if lean is None else 1.0)
 
@@ -88,21 +116,34 @@ def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> 
     """
     from scipy.optimize import root
 
-    scaling, worst = surface._scaling, 0.0
+    scaling = surface._scaling
+    worst = 0.0
     back = scaling[9:18].reshape(3, 3)
     for wrench, twist in zip(wrenches, twists, strict=True):
         target = scaling[:9].reshape(3, 3) @ (wrench / np.abs(wrench).max())
         target /= np.linalg.norm(target)
-        basis, guess = across(target), np.linalg.solve(back, twist)
+        basis = across(target)
+        guess = np.linalg.solve(back, twist)
 
-        def slope(place: np.ndarray, plane: np.ndarray, target: np.ndarray) -> np.ndarray:
+        def slope(
+            place: np.ndarray, plane: np.ndarray, target: np.ndarray
+        ) -> np.ndarray:
             return plane @ surface._direction((target + place @ plane)[None])[0]
 
-        def bend(place: np.ndarray, plane: np.ndarray, target: np.ndarray) -> np.ndarray:
-            return plane @ surface._direction_slope((target + place @ plane)[None])[0] @ plane.T
+        def bend(
+            place: np.ndarray, plane: np.ndarray, target: np.ndarray
+        ) -> np.ndarray:
+            return (
+                plane
+                @ surface._direction_slope((target + place @ plane)[None])[0]
+                @ plane.T
+            )
 
-        with np.errstate(over="ignore", invalid="ignore"):  # a search that runs away: the angle says so
-            start, options = basis @ guess / (target @ guess), {"xtol": ROUNDING}
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # a search that runs away: the angle says so
+            start = basis @ guess / (target @ guess)
+            options = {"xtol": ROUNDING}
             place = root(slope, start, (basis, target), jac=bend, options=options).x
             found = target + place @ basis
             h = surface._direction(found[None])[0]

@@ -37,7 +37,11 @@ class LimitSurfaceTable(CompiledLimitSurface):
     @functools.cached_property
     def centre_of_pressure(self) -> np.ndarray:
         """Centre of pressure `[2]` of the exact surface [m]."""
-        return self._exact.centre_of_pressure if self._one_metric else super().centre_of_pressure
+        return (
+            self._exact.centre_of_pressure
+            if self._one_metric
+            else super().centre_of_pressure
+        )
 
     def _radius(self) -> float:
         return self._exact.contact_radius if self._one_metric else super()._radius()
@@ -46,9 +50,14 @@ class LimitSurfaceTable(CompiledLimitSurface):
     def numbers(self) -> SurfaceNumbers:
         """Numbers at the nodes: the potential and its derivatives along both angles and mixed; the force of a spin."""
         if self._one_metric:
-            data = stored_potential(lambda units: self._exact.sums(units, STORED_RULES), self.segments)
+            data = stored_potential(
+                lambda units: self._exact.sums(units, STORED_RULES), self.segments
+            )
         else:
-            data = stored_potential(lambda units: (cell_sums(self._cell_rows, units)[0], None), self.segments)
+            data = stored_potential(
+                lambda units: (cell_sums(self._cell_rows, units)[0], None),
+                self.segments,
+            )
         return SurfaceNumbers(kernels.POTENTIAL, self.segments, data)
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:

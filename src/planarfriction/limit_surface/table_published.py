@@ -39,7 +39,12 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         if grid is None:
             return (0.0, 0.0, 1.0, 1.0), np.full((0, 0, 3), np.nan)
         x, y = self.centre_of_pressure
-        place = (float(grid.x_min - x), float(grid.y_min - y), float(grid.cell_width), float(grid.cell_height))
+        place = (
+            float(grid.x_min - x),
+            float(grid.y_min - y),
+            float(grid.cell_width),
+            float(grid.cell_height),
+        )
         return place, np.full((grid.columns + 1, grid.rows + 1, 3), np.nan)
 
     @property
@@ -51,7 +56,11 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         if self._few_discs:
             return super()._radius()
         place, corners = self._grid()
-        return float(spin_sums.smoothed_spin_sum(corners, place, *self._loaded_cells(), 0.0, 0.0)[2])
+        return float(
+            spin_sums.smoothed_spin_sum(
+                corners, place, *self._loaded_cells(), 0.0, 0.0
+            )[2]
+        )
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
@@ -59,15 +68,31 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         nodes = np.zeros((self.segments + 1, 4 * self.segments + 1, 4))
         if self._few_discs:
             angles = 0.5 * np.pi / self.segments * np.arange(4 * self.segments + 1)
-            polar, azimuth = angles[: self.segments + 1, None], angles
-            sides = np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar) + 0.0 * azimuth
+            polar = angles[: self.segments + 1, None]
+            azimuth = angles
+            sides = (
+                np.sin(polar) * np.cos(azimuth),
+                np.sin(polar) * np.sin(azimuth),
+                np.cos(polar) + 0.0 * azimuth,
+            )
             units = np.stack(sides, -1).reshape(-1, 3)
-            nodes[..., :3] = cell_sums(self._cell_rows, units)[0].reshape(*nodes.shape[:2], 3)
+            nodes[..., :3] = cell_sums(self._cell_rows, units)[0].reshape(
+                *nodes.shape[:2], 3
+            )
         else:
             place, corners = self._grid()
-            spin_sums.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
+            spin_sums.smoothed_nodes(
+                corners,
+                place,
+                *self._loaded_cells(),
+                self.contact_radius,
+                self.segments,
+                nodes,
+            )
         return SurfaceNumbers(kernels.BILINEAR, self.segments, nodes.reshape(-1))
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
         """Find twists; of several directions that answer because the map folds, take that of least dissipation."""
-        return published_twists(self.numbers.data, self.segments, self._scaling, wrenches, found)
+        return published_twists(
+            self.numbers.data, self.segments, self._scaling, wrenches, found
+        )

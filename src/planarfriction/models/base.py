@@ -63,7 +63,9 @@ class FrictionModel(ByValue):
     def __post_init__(self) -> None:
         validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if not isinstance(self.law, FrictionLaw):
-            raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", self.law)
+            raise InvalidValueError(
+                "law", "be a friction law of bristles, such as LuGre", self.law
+            )
 
     def __repr__(self) -> str:
         parts = [f"{self.patch.name!r} of {self.patch.cells} cells", _named(self.law)]
@@ -103,29 +105,43 @@ class FrictionModel(ByValue):
         Raises InvalidValueError for deflections of another shape, a load that is not > 0, and a model that cannot start
         with a load.
         """
-        deflections = validation.array("deflections", deflections, (self.patch.bristles, self.patch.cells))
-        return self._state_of(deflections, validation.positive_load("normal_force", normal_force))
+        deflections = validation.array(
+            "deflections", deflections, (self.patch.bristles, self.patch.cells)
+        )
+        return self._state_of(
+            deflections, validation.positive_load("normal_force", normal_force)
+        )
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
-        raise InvalidValueError("model", "support a start under load (it has no _state_of)", type(self).__name__)
+        raise InvalidValueError(
+            "model",
+            "support a start under load (it has no _state_of)",
+            type(self).__name__,
+        )
 
     # ------------------------------------------------------------------ equations
 
-    def rate(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None) -> np.ndarray:
+    def rate(
+        self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None
+    ) -> np.ndarray:
         """Return the rates of the state, shape `[..., *state_shape]`, in its units per second.
 
         `moments` as in `step`. Raises InvalidValueError as `step` does.
         """
         return self._evaluated(state, twist, normal_force, moments)[0]
 
-    def wrench(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None) -> np.ndarray:
+    def wrench(
+        self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None
+    ) -> np.ndarray:
         """Return the friction wrench on the moving body, shape `[..., 3]` [N, N, N m].
 
         `moments` as in `step`. Raises InvalidValueError as `step` does.
         """
         return self._evaluated(state, twist, normal_force, moments)[1]
 
-    def _evaluated(self, state: Any, twist: Any, normal_force: Any, moments: Any) -> tuple[np.ndarray, np.ndarray]:
+    def _evaluated(
+        self, state: Any, twist: Any, normal_force: Any, moments: Any
+    ) -> tuple[np.ndarray, np.ndarray]:
         state, twist, load, centre = self._inputs(state, twist, normal_force, moments)
         rate, unit = self.compiled.evaluate(state, twist, load, centre)
         return rate, load[..., None] * unit
@@ -149,22 +165,32 @@ class FrictionModel(ByValue):
         """
         compiled = self.compiled
         if moments is not None:
-            return compiled.step(*self._inputs(state, twist, normal_force, moments, dt=dt))
+            return compiled.step(
+                *self._inputs(state, twist, normal_force, moments, dt=dt)
+            )
         return (
             compiled.step_one(state, twist, normal_force, dt)
             or compiled.step_batch(state, twist, normal_force, dt)
             or compiled.step(*self._inputs(state, twist, normal_force, dt=dt))
         )
 
-    def step_jacobians(self, state: Any, twist: Any, normal_force: Any, dt: Any, moments: Any = None) -> StepJacobians:
+    def step_jacobians(
+        self, state: Any, twist: Any, normal_force: Any, dt: Any, moments: Any = None
+    ) -> StepJacobians:
         """Return the analytic derivatives of `step` (see `StepJacobians`); one-sided at kinks.
 
         With `moments` those at the pressure that they cause, which is held.
 
         Raises InvalidValueError as `step` does.
         """
-        done = None if moments is not None else self.compiled.jacobians_one(state, twist, normal_force, dt)
-        return done or self.compiled.step_jacobians(*self._inputs(state, twist, normal_force, moments, dt=dt))
+        done = (
+            None
+            if moments is not None
+            else self.compiled.jacobians_one(state, twist, normal_force, dt)
+        )
+        return done or self.compiled.step_jacobians(
+            *self._inputs(state, twist, normal_force, moments, dt=dt)
+        )
 
     # ------------------------------------------------------------------ machine form
 
@@ -174,9 +200,13 @@ class FrictionModel(ByValue):
 
         Raises InvalidValueError for a model whose steps are not compiled.
         """
-        raise InvalidValueError("model", "have compiled steps (it has no machine form)", type(self).__name__)
+        raise InvalidValueError(
+            "model", "have compiled steps (it has no machine form)", type(self).__name__
+        )
 
-    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
+    def packed(
+        self, loads: Sequence[float | None], between: tuple[float, float] | None = None
+    ) -> PackedModel:
         """Pack the model at distinct `loads` [N] for the compiled solver; `[None]` if the patch ignores the load.
 
         A model of one's own needs this to be simulated in a scene; the solver calls its functions by address. A patch
@@ -204,12 +234,21 @@ class FrictionModel(ByValue):
 
         Addresses hold in this process alone: a copy makes its own machine form.
         """
-        return {name: value for name, value in self.__dict__.copy().items() if name != "compiled"}
+        return {
+            name: value
+            for name, value in self.__dict__.copy().items()
+            if name != "compiled"
+        }
 
     # ------------------------------------------------------------------ inputs
 
     def _inputs(
-        self, state: ArrayLike, twist: ArrayLike, normal_force: ArrayLike, moments: Any = None, **more
+        self,
+        state: ArrayLike,
+        twist: ArrayLike,
+        normal_force: ArrayLike,
+        moments: Any = None,
+        **more,
     ) -> list[Any]:
         """Check the inputs and broadcast their batch axes against each other; last, the centre of pressure, or None.
 
@@ -217,48 +256,79 @@ class FrictionModel(ByValue):
         """
         held = None if moments is None else moments_of(moments)
         if held is not None and self.law.reference_load is not None:
-            raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
+            raise InvalidValueError(
+                "moments", "be None for a law with a reference_load", "moments"
+            )
         state = validation.numbers("state", state)
         inner = self.state_shape
         if state.shape[state.ndim - len(inner) :] != inner:
             wanted = ", ".join(str(n) for n in inner)
-            raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(state.shape)}")
+            raise InvalidValueError(
+                "state", f"have shape [..., {wanted}]", f"shape {list(state.shape)}"
+            )
         twist = validation.vectors("twist", twist, 3)
         scalars = {"normal_force": normal_force, **more}
-        arrays = {name: validation.numbers(name, value) for name, value in scalars.items()}
-        batches = {state.shape[: state.ndim - len(inner)], twist.shape[:-1], *(v.shape for v in arrays.values())}
+        arrays = {
+            name: validation.numbers(name, value) for name, value in scalars.items()
+        }
+        batches = {
+            state.shape[: state.ndim - len(inner)],
+            twist.shape[:-1],
+            *(v.shape for v in arrays.values()),
+        }
         batches |= set() if held is None else {held.shape[:-1]}
         try:
-            batch = batches.pop() if len(batches) == 1 else np.broadcast_shapes(*batches)
+            batch = (
+                batches.pop() if len(batches) == 1 else np.broadcast_shapes(*batches)
+            )
         except ValueError:
-            shapes = ", ".join(str(list(v.shape)) for v in (state, twist, *arrays.values()))
-            raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
+            shapes = ", ".join(
+                str(list(v.shape)) for v in (state, twist, *arrays.values())
+            )
+            raise InvalidValueError(
+                "batch axes", "broadcast", f"shapes {shapes}"
+            ) from None
         if math.prod(batch) > validation.MOST_NUMBERS:
             got = f"{list(batch)} of {', '.join(('state', 'twist', *arrays))}"
-            raise InvalidValueError("batch axes", f"hold at most {validation.MOST_NUMBERS} contacts", got)
+            raise InvalidValueError(
+                "batch axes", f"hold at most {validation.MOST_NUMBERS} contacts", got
+            )
         for name, value in {"state": state, "twist": twist, **arrays}.items():
-            validation.within_range(name, value.min(initial=0.0), value.max(initial=0.0))
+            validation.within_range(
+                name, value.min(initial=0.0), value.max(initial=0.0)
+            )
         for name, value in arrays.items():
             if (value < 0.0).any():
                 raise InvalidValueError(name, "be >= 0", float(value.min()))
         wanted = [batch + inner, (*batch, 3), *(batch for _ in arrays)]
         given = [state, twist, *arrays.values()]
         inputs: list[Any] = [
-            a if a.shape == shape and a.flags.carray else np.broadcast_to(a, shape).copy()
+            a
+            if a.shape == shape and a.flags.carray
+            else np.broadcast_to(a, shape).copy()
             for a, shape in zip(given, wanted, strict=True)
         ]
-        return [*inputs, None if held is None else centre_of(np.broadcast_to(held, (*batch, 2)), inputs[2])]
+        return [
+            *inputs,
+            None
+            if held is None
+            else centre_of(np.broadcast_to(held, (*batch, 2)), inputs[2]),
+        ]
 
 
 def lever_of(model: FrictionModel) -> float:
     """Return the lever arm [m] at which spins of a patch count as speeds."""
     patch = model.patch
-    return math.sqrt(float((patch.positions**2).sum(axis=1).mean() + 0.5 * (patch.radii**2).mean()))
+    return math.sqrt(
+        float((patch.positions**2).sum(axis=1).mean() + 0.5 * (patch.radii**2).mean())
+    )
 
 
 def _named(law: FrictionLaw) -> str:
     """Return a law in few words, with its friction coefficients."""
     numbers = law.numbers
     static = "" if numbers.mu_s == numbers.mu_c else f", mu_s={numbers.mu_s:g}"
-    fixed = "" if law.reference_load is None else f", reference_load={law.reference_load:g}"
+    fixed = (
+        "" if law.reference_load is None else f", reference_load={law.reference_load:g}"
+    )
     return f"{type(law).__name__}(mu_c={numbers.mu_c:g}{static}{fixed}, ...)"

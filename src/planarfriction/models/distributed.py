@@ -42,9 +42,14 @@ class DistributedModel(FrictionModel):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.patch.has_discs:
-            refuse_rate_law(self.law, "patches of discs (dataclasses.replace(patch, radii=None) has points)")
+            refuse_rate_law(
+                self.law,
+                "patches of discs (dataclasses.replace(patch, radii=None) has points)",
+            )
         if self.patch.asymmetric:
-            refuse_creep(self.law, "patches with an asymmetry")  # at rest they would push
+            refuse_creep(
+                self.law, "patches with an asymmetry"
+            )  # at rest they would push
             refuse_rate_law(self.law, "patches with an asymmetry")
         if self.law.reference_load is not None and self.patch.depends_on_load:
             rule = "have a shape that does not depend on the load, for a law with a reference_load"
@@ -58,7 +63,9 @@ class DistributedModel(FrictionModel):
     @functools.cached_property
     def compiled(self) -> CompiledDistributed:
         """Machine form of the model (see `FrictionModel.compiled`)."""
-        return (CompiledRateCells if is_rate_law(self.law) else CompiledDistributed)(self.law, self.patch)
+        return (CompiledRateCells if is_rate_law(self.law) else CompiledDistributed)(
+            self.law, self.patch
+        )
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Return the analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.
@@ -66,14 +73,24 @@ class DistributedModel(FrictionModel):
         Raises InvalidValueError as `step` does.
         """
         state, twist, load, _ = self._inputs(state, twist, normal_force)
-        lever, share = self.compiled.lever, (load[..., None] * self.patch.weights(load))[..., None, None, :]
-        rate_state, rate_velocity, pull_state, pull_velocity = self.compiled.slopes(state, twist, load)
+        lever = self.compiled.lever
+        share = (load[..., None] * self.patch.weights(load))[..., None, None, :]
+        rate_state, rate_velocity, pull_state, pull_velocity = self.compiled.slopes(
+            state, twist, load
+        )
         wrench_state = np.einsum("dan,...abn->...dbn", lever, share * pull_state)
-        rate_load, wrench_load = np.zeros_like(state), self.compiled.evaluate(state, twist, load)[1]
-        if self.compiled.reference > 0.0:  # rates and tractions are functions of `z f_ref/f`
-            per = np.where(load > LIGHTEST * self.compiled.reference, -1.0, 0.0) / np.where(load > 0.0, load, 1.0)
+        rate_load = np.zeros_like(state)
+        wrench_load = self.compiled.evaluate(state, twist, load)[1]
+        if (
+            self.compiled.reference > 0.0
+        ):  # rates and tractions are functions of `z f_ref/f`
+            per = np.where(
+                load > LIGHTEST * self.compiled.reference, -1.0, 0.0
+            ) / np.where(load > 0.0, load, 1.0)
             rate_load = np.einsum("...,...abn,...bn->...an", per, rate_state, state)
-            wrench_load = wrench_load + np.einsum("...,...dbn,...bn->...d", per, wrench_state, state)
+            wrench_load = wrench_load + np.einsum(
+                "...,...dbn,...bn->...d", per, wrench_state, state
+            )
         return ModelJacobians(
             rate_state,
             np.einsum("...abn,dbn->...and", rate_velocity, lever),

@@ -81,7 +81,9 @@ class ReducedModel(FrictionModel):
         if is_rate_law(law) != is_rate_law(self.law):
             return dataclasses.replace(self, law=law)
         changed = object.__new__(type(self))
-        changed.__dict__.update(self.__dict__, law=law, reduction=self.reduction.with_law(law))
+        changed.__dict__.update(
+            self.__dict__, law=law, reduction=self.reduction.with_law(law)
+        )
         return changed
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
@@ -95,7 +97,11 @@ def _refusing_replaced(init: Callable[..., None]) -> Callable[..., None]:
     def checked(self: ReducedModel, *given: Any, **options: Any) -> None:
         for name in self.REPLACED:
             if name in options:
-                raise InvalidValueError(name, "be left out: write cells=, the number of discs", options[name])
+                raise InvalidValueError(
+                    name,
+                    "be left out: write cells=, the number of discs",
+                    options[name],
+                )
         init(self, *given, **options)
 
     return checked
@@ -104,7 +110,9 @@ def _refusing_replaced(init: Callable[..., None]) -> Callable[..., None]:
 ReducedModel.__init__ = _refusing_replaced(ReducedModel.__init__)
 
 
-def _of_discs(few: ContactPatch, patch: ContactPatch, deflections: np.ndarray, load: float) -> np.ndarray:
+def _of_discs(
+    few: ContactPatch, patch: ContactPatch, deflections: np.ndarray, load: float
+) -> np.ndarray:
     """Return the bristles of discs from the `deflections` `[2 or 3, N]` of the cells of a patch.
 
     A disc takes the rigid motion that is nearest to the cells next to it; the least rigid motion of all discs that
@@ -113,20 +121,33 @@ def _of_discs(few: ContactPatch, patch: ContactPatch, deflections: np.ndarray, l
     from scipy.spatial import KDTree
 
     nearest = np.asarray(KDTree(few.positions).query(patch.positions)[1])
-    weights, levers, discs = patch.weights(load), patch.levers(), few.levers()
+    weights = patch.weights(load)
+    levers = patch.levers()
+    discs = few.levers()
     shares = np.bincount(nearest, weights, few.cells)
 
     def sums(values: Iterable[np.ndarray]) -> np.ndarray:
-        return np.array([np.bincount(nearest, weights * each, few.cells) for each in values])
+        return np.array(
+            [np.bincount(nearest, weights * each, few.cells) for each in values]
+        )
 
     state = np.zeros((discs.shape[1], few.cells))
     state[:2] = sums(deflections[:2]) / np.where(shares > 0.0, shares, 1.0)
     turned = (levers[:, :2] - discs[nearest, :2])[:, :, 2].T
-    spread, spin = sums([np.sum(turned**2, axis=0), np.sum(turned * (deflections[:2] - state[:2, nearest]), axis=0)])
+    spread, spin = sums(
+        [
+            np.sum(turned**2, axis=0),
+            np.sum(turned * (deflections[:2] - state[:2, nearest]), axis=0),
+        ]
+    )
     spreads = spread > ALONE * shares * few.lever_radii**2
-    state[2:] = discs[:, 2:, 2].T * np.where(spreads, spin / np.where(spreads, spread, 1.0), 0.0)
+    state[2:] = discs[:, 2:, 2].T * np.where(
+        spreads, spin / np.where(spreads, spread, 1.0), 0.0
+    )
     whole = np.einsum("n,nij,in->j", weights, levers, deflections)
     borne = few.weights(load)
     missing = whole - np.einsum("n,nij,in->j", borne, discs, state)
     stiffness = np.einsum("n,nia,nib->ab", borne, discs, discs)
-    return state + np.einsum("nij,j->in", discs, np.linalg.lstsq(stiffness, missing, rcond=1e-12)[0])
+    return state + np.einsum(
+        "nij,j->in", discs, np.linalg.lstsq(stiffness, missing, rcond=1e-12)[0]
+    )

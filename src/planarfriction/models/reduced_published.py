@@ -59,7 +59,9 @@ class PublishedShape(NamedTuple):
     @property
     def numbers(self) -> np.ndarray:
         """Numbers of the shape in the order of compiled loops."""
-        return np.array([*self.centre_of_pressure, self.contact_radius, self.second_moment])
+        return np.array(
+            [*self.centre_of_pressure, self.contact_radius, self.second_moment]
+        )
 
     @property
     def axes(self) -> np.ndarray:
@@ -83,7 +85,9 @@ class PublishedShape(NamedTuple):
         scale = np.array([1.0, 1.0, self.contact_radius])
         rate_state, scaled = slopes_in(lin)
         per_scale = np.where(scale > 0.0, 1.0 / np.where(scale > 0.0, scale, 1.0), 0.0)
-        return scale[:, None] * rate_state * per_scale, scale[:, None] * scaled * scale @ self.lever
+        return scale[:, None] * rate_state * per_scale, scale[
+            :, None
+        ] * scaled * scale @ self.lever
 
 
 def axes_of(root: np.ndarray) -> np.ndarray:
@@ -96,20 +100,28 @@ def axes_of(root: np.ndarray) -> np.ndarray:
 class PublishedShapes:
     """Shapes of a patch at any load, updated as `on_load_change` says (see `ReducedModelPublished`)."""
 
-    def __init__(self, surface: LimitSurface, patch: ContactPatch, on_load_change: str) -> None:
+    def __init__(
+        self, surface: LimitSurface, patch: ContactPatch, on_load_change: str
+    ) -> None:
         self._arguments = self._surface, self._patch, _ = surface, patch, on_load_change
         self.depends_on_load = patch.depends_on_load and on_load_change != "keep"
         self._rescales = on_load_change == "rescale"
-        self._recent, self._lock = functools.lru_cache(REMEMBERED)(self._built), threading.Lock()
+        self._recent = functools.lru_cache(REMEMBERED)(self._built)
+        self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return PublishedShapes, self._arguments  # threads share recent shapes, copies of a model do not
+        return (
+            PublishedShapes,
+            self._arguments,
+        )  # threads share recent shapes, copies of a model do not
 
     def shape_at(self, load: float | None) -> PublishedShape:
         """Return the shape at a load > 0 [N]; recent loads are cached. None: any load, if it does not change it."""
         if load is None or not self.depends_on_load:
             return self.reference
-        with self._lock:  # threads that ask for one load at once wait for the same shape
+        with (
+            self._lock
+        ):  # threads that ask for one load at once wait for the same shape
             return self._recent(load)
 
     @functools.cached_property
@@ -117,17 +129,30 @@ class PublishedShapes:
         """Shape at the load of the limit surface."""
         surface = self._surface
         second_moment = float(self._patch.second_moment(surface.normal_force))
-        return PublishedShape(self._centre(surface), surface.contact_radius, second_moment, surface, self._root)
+        return PublishedShape(
+            self._centre(surface),
+            surface.contact_radius,
+            second_moment,
+            surface,
+            self._root,
+        )
 
     def _built(self, load: float) -> PublishedShape:
         if is_point(self._patch, load):
-            centre = self._patch.lever_coordinates(*self._patch.centre_of_pressure(load))
+            centre = self._patch.lever_coordinates(
+                *self._patch.centre_of_pressure(load)
+            )
             return PublishedShape(np.array(centre), 0.0, 0.0, _OfPoint(), self._root)  # pyright: ignore
         surface = self._surface.at(load)
-        centre, radius = self._centre(surface), surface.contact_radius
+        centre = self._centre(surface)
+        radius = surface.contact_radius
         if self._rescales:
-            return self.reference._replace(centre_of_pressure=centre, contact_radius=radius)
-        return PublishedShape(centre, radius, float(self._patch.second_moment(load)), surface, self._root)
+            return self.reference._replace(
+                centre_of_pressure=centre, contact_radius=radius
+            )
+        return PublishedShape(
+            centre, radius, float(self._patch.second_moment(load)), surface, self._root
+        )
 
     def _centre(self, surface: LimitSurface) -> np.ndarray:
         return np.array(self._patch.lever_coordinates(*surface.centre_of_pressure))
@@ -180,10 +205,22 @@ class ReducedModelPublished(FrictionModel):
         refuse_cell_metrics(self.patch, by)
         for patch in (self.patch, self.surface.patch):
             if patch.asymmetric:
-                raise InvalidValueError("patch", f"have the same friction forwards and backwards for {by}", "asymmetry")
+                raise InvalidValueError(
+                    "patch",
+                    f"have the same friction forwards and backwards for {by}",
+                    "asymmetry",
+                )
         if not same_metric(self.patch, self.surface.patch):
-            raise InvalidValueError("surface", "have the friction metric of the patch", self.surface.patch.name)
-        if self.patch.depends_on_load and self.on_load_change != "rebuild" and self.surface.normal_force is None:
+            raise InvalidValueError(
+                "surface",
+                "have the friction metric of the patch",
+                self.surface.patch.name,
+            )
+        if (
+            self.patch.depends_on_load
+            and self.on_load_change != "rebuild"
+            and self.surface.normal_force is None
+        ):
             rule = f"have a normal_force when on_load_change={self.on_load_change!r}"
             raise InvalidValueError("surface", rule, "none")
 
@@ -192,7 +229,11 @@ class ReducedModelPublished(FrictionModel):
 
         Raises InvalidValueError for a load that is not > 0.
         """
-        load = validation.positive_load("normal_force", normal_force) if self.depends_on_load else normal_force
+        load = (
+            validation.positive_load("normal_force", normal_force)
+            if self.depends_on_load
+            else normal_force
+        )
         return self.shapes.shape_at(load)
 
     @property
@@ -223,21 +264,34 @@ class ReducedModelPublished(FrictionModel):
         Raises InvalidValueError as `step` does.
         """
         state, twist, load, _ = self._inputs(state, twist, normal_force)
-        law, count = self.law.numbers, load.size
-        z, v, f = state.reshape(count, 3), twist.reshape(count, 3), load.reshape(count)
+        law = self.law.numbers
+        count = load.size
+        z = state.reshape(count, 3)
+        v = twist.reshape(count, 3)
+        f = load.reshape(count)
         rate_state, rate_twist, wrench_state, wrench_twist = np.zeros((4, count, 3, 3))
         for rows, shape in self.compiled.shape_at_each_load(load):
-            by_z, by_v = shape.rate_slopes(self.compiled.linearisation(shape, z[rows], v[rows]))
-            rate_state[rows], rate_twist[rows] = by_z, by_v
+            by_z, by_v = shape.rate_slopes(
+                self.compiled.linearisation(shape, z[rows], v[rows])
+            )
+            rate_state[rows] = by_z
+            rate_twist[rows] = by_v
             pull = law.sigma_0 * np.eye(3) + law.sigma_1 * by_z
             viscous = np.diag([1.0, 1.0, shape.second_moment]) @ shape.lever
             push = law.sigma_1 * by_v + law.sigma_2 * viscous
-            lever, weight = shape.lever.T, -f[rows][:, None, None]
-            wrench_state[rows], wrench_twist[rows] = weight * (lever @ pull), weight * (lever @ push)
-        blocks = (each.reshape(*load.shape, 3, 3) for each in (rate_state, rate_twist, wrench_state, wrench_twist))
+            lever = shape.lever.T
+            weight = -f[rows][:, None, None]
+            wrench_state[rows] = weight * (lever @ pull)
+            wrench_twist[rows] = weight * (lever @ push)
+        blocks = (
+            each.reshape(*load.shape, 3, 3)
+            for each in (rate_state, rate_twist, wrench_state, wrench_twist)
+        )
         by_state, by_twist, pull, push = blocks
         by_load = self.compiled.evaluate(state, twist, load)[1]
-        return ModelJacobians(by_state, by_twist, np.zeros_like(state), pull, push, by_load)
+        return ModelJacobians(
+            by_state, by_twist, np.zeros_like(state), pull, push, by_load
+        )
 
     def with_law(self, law: FrictionLaw) -> Self:
         changed = super().with_law(law)
@@ -245,7 +299,9 @@ class ReducedModelPublished(FrictionModel):
         return changed
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
-        pulls = -self.law.numbers.sigma_0 * load * self.patch.weights(load) * deflections
+        pulls = (
+            -self.law.numbers.sigma_0 * load * self.patch.weights(load) * deflections
+        )
         wrench = np.einsum("nij,in->j", self.patch.levers(), pulls)
         per_state = self.jacobians(self.rest(), np.zeros(3), load).wrench_state
         return np.linalg.lstsq(per_state, wrench, rcond=1e-12)[0]

@@ -4,5 +4,14 @@ from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy
 from planarfriction.online.observer import Estimate, FrictionObserver
 from planarfriction.online.sensors import Measurement, Sensors
 
-__all__ = ["Estimate", "FrictionObserver", "Hinge", "Hold", "Measurement", "Sensors", "SlideBy", "TurnBy"]
+__all__ = [
+    "Estimate",
+    "FrictionObserver",
+    "Hinge",
+    "Hold",
+    "Measurement",
+    "Sensors",
+    "SlideBy",
+    "TurnBy",
+]
 __dir__ = __all__.copy

@@ -34,18 +34,38 @@ class GripController:
     a checkpoint. Its fields are those of `planarfriction.online.loops.grips.STATE`.
     """
 
-    def __init__(self, observer: FrictionObserver, grip: Any, *settings: float, start: float, most: float) -> None:
-        self.observer = validation.instance("observer", observer, FrictionObserver, "a FrictionObserver")
-        self.state = np.full(observer.state.shape[:-1], np.array(grips.FRESH, grips.STATE))
+    def __init__(
+        self,
+        observer: FrictionObserver,
+        grip: Any,
+        *settings: float,
+        start: float,
+        most: float,
+    ) -> None:
+        self.observer = validation.instance(
+            "observer", observer, FrictionObserver, "a FrictionObserver"
+        )
+        self.state = np.full(
+            observer.state.shape[:-1], np.array(grips.FRESH, grips.STATE)
+        )
         if grip is not grips.hold and not observer.sensors.slip_rate:
-            raise InvalidValueError("observer", "have a slip sensor to let parts slip", observer.sensors)
+            raise InvalidValueError(
+                "observer", "have a slip sensor to let parts slip", observer.sensors
+            )
         known = observer._filter
         least_mu = math.exp(known.prior[0] - _LEAST_MU * known.prior_spread[0])
         self._grip = grip
         rate = observer.sensors.slip_rate
         silence = _PERIODS / rate if rate else grips.PAUSE
         most = validation.positive("most", most)
-        self._settings = known.least_load, known.quantum, silence, most, least_mu, *settings
+        self._settings = (
+            known.least_load,
+            known.quantum,
+            silence,
+            most,
+            least_mu,
+            *settings,
+        )
         self.state["grip"] = min(validation.positive("start", start), most)
         self._found: Any = None
 
@@ -62,7 +82,11 @@ class GripController:
         cannot be right: the force is less than half of the weight, or the load does not follow the grip.
         """
         state = self.state
-        return (state["blind"] >= grips.LATE) | (state["mute"] >= grips.LATE) | (state["silent"] > 0.0)
+        return (
+            (state["blind"] >= grips.LATE)
+            | (state["mute"] >= grips.LATE)
+            | (state["silent"] > 0.0)
+        )
 
     def update(self, measurement: Measurement) -> np.ndarray:
         """Take a sample of the sensors; return the grip force `[...]` [N].
@@ -100,8 +124,19 @@ class Hold(GripController):
         if not 0.0 < validation.number("probability", probability) < 0.5:
             raise InvalidValueError("probability", "be between 0 and 0.5", probability)
         explore = validation.non_negative("explore", explore)
-        numbers = validation.positive("reserve", reserve), validation.non_negative("gain", gain)
-        super().__init__(observer, grips.hold, -float(ndtri(probability)), *numbers, explore, start=start, most=most)
+        numbers = (
+            validation.positive("reserve", reserve),
+            validation.non_negative("gain", gain),
+        )
+        super().__init__(
+            observer,
+            grips.hold,
+            -float(ndtri(probability)),
+            *numbers,
+            explore,
+            start=start,
+            most=most,
+        )
         self.state["found"] = explore == 0.0
 
 
@@ -133,10 +168,20 @@ class Slip(GripController):
         start: float = START,
         most: float = 60.0,
     ) -> None:
-        positive, least = validation.positive, validation.non_negative
+        positive = validation.positive
+        least = validation.non_negative
         times = positive("duration", duration), positive("acceleration", acceleration)
         gains = least("adapt", adapt), least("delay", delay)
-        super().__init__(observer, grips.slip, self.axis, self.tolerance, *times, *gains, start=start, most=most)
+        super().__init__(
+            observer,
+            grips.slip,
+            self.axis,
+            self.tolerance,
+            *times,
+            *gains,
+            start=start,
+            most=most,
+        )
         self.state["goal"] = validation.filled("goal", goal, self.state.shape)
         if not self.state["goal"].all():
             raise InvalidValueError("goal", "be finite and not zero", goal)
@@ -145,9 +190,17 @@ class Slip(GripController):
 class SlideBy(Slip):
     """Let a part slide down by `goal` [m] under its weight within `duration` [s], and hold it (see `Slip`)."""
 
-    axis, tolerance = 1, 0.9e-3
+    axis = 1
+    tolerance = 0.9e-3
 
-    def __init__(self, observer: FrictionObserver, goal: Any, *, duration: float = 2.0, **options: Any) -> None:
+    def __init__(
+        self,
+        observer: FrictionObserver,
+        goal: Any,
+        *,
+        duration: float = 2.0,
+        **options: Any,
+    ) -> None:
         options = {"acceleration": GRAVITY, "adapt": 20.0} | options
         super().__init__(observer, goal, duration=duration, **options)
 
@@ -158,9 +211,17 @@ class TurnBy(Slip):
     `acceleration` [rad/s^2] is that of the part without friction.
     """
 
-    axis, tolerance = 2, math.radians(1.6)
+    axis = 2
+    tolerance = math.radians(1.6)
 
-    def __init__(self, observer: FrictionObserver, goal: Any, *, duration: float = 2.0, **options: Any) -> None:
+    def __init__(
+        self,
+        observer: FrictionObserver,
+        goal: Any,
+        *,
+        duration: float = 2.0,
+        **options: Any,
+    ) -> None:
         options = {"acceleration": 100.0, "adapt": 1.0} | options
         super().__init__(observer, goal, duration=duration, **options)
 
@@ -184,5 +245,8 @@ class Hinge(GripController):
         start: float = START,
         most: float = 60.0,
     ) -> None:
-        numbers = validation.positive("reserve", reserve), validation.non_negative("gain", gain)
+        numbers = (
+            validation.positive("reserve", reserve),
+            validation.non_negative("gain", gain),
+        )
         super().__init__(observer, grips.hinge, *numbers, start=start, most=most)

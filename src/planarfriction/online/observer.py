@@ -122,23 +122,40 @@ class FrictionObserver:
         saturation: float = 1e3,
         least_load: float = 0.1,
     ) -> None:
-        validation.instance("model", model, FrictionModel, "a friction model, such as ReducedModel")
+        validation.instance(
+            "model", model, FrictionModel, "a friction model, such as ReducedModel"
+        )
         load = validation.positive("normal_force", normal_force)
         if surface is None:
             from planarfriction.limit_surface import LimitSurfaceTable
 
-            surface = LimitSurfaceTable(model.patch, normal_force=load if model.depends_on_load else None)
+            surface = LimitSurfaceTable(
+                model.patch, normal_force=load if model.depends_on_load else None
+            )
         self.model = model
-        self.surface = validation.instance("surface", surface, LimitSurface, "a limit surface")
+        self.surface = validation.instance(
+            "surface", surface, LimitSurface, "a limit surface"
+        )
         if surface.patch.asymmetric:
-            raise InvalidValueError("model", "have symmetric friction", "a patch with an asymmetry")
+            raise InvalidValueError(
+                "model", "have symmetric friction", "a patch with an asymmetry"
+            )
         self.sensors: Any = (
-            Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
+            Sensors()
+            if sensors is None
+            else validation.instance("sensors", sensors, Sensors, "Sensors")
         )
         self.tolerance = validation.positive("tolerance", tolerance)
-        spreads = {"mu_spread": mu_spread, "ratio_spread": ratio_spread, "radius_spread": radius_spread}
-        prior = np.array([validation.positive(name, value) for name, value in spreads.items()])
-        n, numbers = kernels.N, model.law.numbers
+        spreads = {
+            "mu_spread": mu_spread,
+            "ratio_spread": ratio_spread,
+            "radius_spread": radius_spread,
+        }
+        prior = np.array(
+            [validation.positive(name, value) for name, value in spreads.items()]
+        )
+        n = kernels.N
+        numbers = model.law.numbers
         middle = np.log([numbers.mu_c, numbers.mu_s / numbers.mu_c, 1.0])
         self._filter = _settings(
             model,
@@ -153,15 +170,23 @@ class FrictionObserver:
             middle,
             prior,
         )
-        unsure = np.abs(self._filter.conjugate) @ validation.non_negative_array("bias", bias, (3,))
+        unsure = np.abs(self._filter.conjugate) @ validation.non_negative_array(
+            "bias", bias, (3,)
+        )
         fresh = [kernels.FRESH] * 3
-        root = np.diag(np.concatenate([self._filter.remainder, fresh, prior, np.maximum(unsure, 1e-9)]))
+        root = np.diag(
+            np.concatenate(
+                [self._filter.remainder, fresh, prior, np.maximum(unsure, 1e-9)]
+            )
+        )
         self.state = state = np.zeros(validation.batched(batch, (filter_state.STATE,)))
         state[..., filter_state.MU : filter_state.BIAS] = middle
         state[..., filter_state.TARED] = (unsure <= np.sqrt(self._filter.noise)).all()
         state[..., kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
-        state[..., filter_state.SLIP], state[..., filter_state.TIME] = 1e-3, -math.inf
-        state[..., [filter_state.BOUND, filter_state.PEAK]], state[..., filter_state.GAUGE] = -10.0, kernels.NONE
+        state[..., filter_state.SLIP] = 1e-3
+        state[..., filter_state.TIME] = -math.inf
+        state[..., [filter_state.BOUND, filter_state.PEAK]] = -10.0
+        state[..., filter_state.GAUGE] = kernels.NONE
 
     def update(self, measurement: Measurement) -> Estimate:
         """Take a sample of every part, with NaN or None for what is missing; return what is known now.
@@ -176,13 +201,17 @@ class FrictionObserver:
         Raises InvalidValueError as `update` does.
         """
         validation.instance("measurement", measurement, Measurement, "a Measurement")
-        batch, state = self.state.shape[:-1], self.state.reshape(-1, filter_state.STATE)
-        velocity, samples = measurement.slip_velocity, np.empty((*batch, 8))
+        batch = self.state.shape[:-1]
+        state = self.state.reshape(-1, filter_state.STATE)
+        velocity = measurement.slip_velocity
+        samples = np.empty((*batch, 8))
         try:
             samples[..., 0], samples[..., 1:4], samples[..., 4] = measurement[:3]
             samples[..., 5:] = math.nan if velocity is None else velocity
         except (TypeError, ValueError):
-            raise InvalidValueError("measurement", f"hold numbers of the batch {list(batch)}", measurement) from None
+            raise InvalidValueError(
+                "measurement", f"hold numbers of the batch {list(batch)}", measurement
+            ) from None
         found = np.empty(batch, kernels.ESTIMATE)
         kernels.update(self._filter, state, samples.reshape(-1, 8), found.reshape(-1))
         return found
@@ -198,24 +227,39 @@ class FrictionObserver:
         The inverse covariance less that of the prior; a direction without information is not determined by the motion.
         """
         n = kernels.N
-        root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(*self.state.shape[:-1], n, n)[
-            ..., filter_state.MU : filter_state.BIAS, :
-        ]
-        return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(1.0 / self._filter.prior_spread**2)
+        root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(
+            *self.state.shape[:-1], n, n
+        )[..., filter_state.MU : filter_state.BIAS, :]
+        return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(
+            1.0 / self._filter.prior_spread**2
+        )
 
 
 def estimate_of(found: np.ndarray) -> Estimate:
     """Return the estimate in records of the compiled filter."""
-    return Estimate._make(found[name] for name in Estimate._fields)._replace(determined=found["determined"] > 0)
+    return Estimate._make(found[name] for name in Estimate._fields)._replace(
+        determined=found["determined"] > 0
+    )
 
 
-def _settings(model: FrictionModel, surface: LimitSurface, load: float, sensors: Sensors, *rest: Any) -> Any:
+def _settings(
+    model: FrictionModel,
+    surface: LimitSurface,
+    load: float,
+    sensors: Sensors,
+    *rest: Any,
+) -> Any:
     """Return what the filter reads and never changes; `rest` are its last fields."""
     kind, size, data = surface.numbers
-    frame, numbers = surface._frame(), model.law.numbers
+    frame = surface._frame()
+    numbers = model.law.numbers
     back = np.linalg.inv(frame)
     place = sensors.quantum / max(sensors.slip_rate, 1.0)
-    noise = np.abs(back.T) @ (sensors.force_noise, sensors.force_noise, sensors.torque_noise)
+    noise = np.abs(back.T) @ (
+        sensors.force_noise,
+        sensors.force_noise,
+        sensors.torque_noise,
+    )
     return kernels.Filter(
         kind,
         size,
@@ -243,7 +287,9 @@ def _planes(surface: LimitSurface) -> np.ndarray:
     angle = 0.5 * np.pi / _SEGMENTS * np.arange(4 * _SEGMENTS)
     polar, azimuth = np.meshgrid(angle[: _SEGMENTS + 1], angle, indexing="ij")
     across = np.sin(polar)
-    units = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.cos(polar)], axis=-1).reshape(-1, 3)
+    units = np.stack(
+        [across * np.cos(azimuth), across * np.sin(azimuth), np.cos(polar)], axis=-1
+    ).reshape(-1, 3)
     return units / np.einsum("mi,mi->m", surface.direction(units), units)[:, None]
 
 

@@ -6,7 +6,13 @@ from planarfriction.patch.grid import Grid
 from planarfriction.patch.grid_error import GridError
 from planarfriction.patch.map_files import MapReading, read_pressure_map
 from planarfriction.patch.metric import friction_metric
-from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
+from planarfriction.patch.pressure import (
+    LinearGradient,
+    PerCell,
+    Pressure,
+    SoftFinger,
+    Uniform,
+)
 from planarfriction.patch.pressure_maps import PressureMaps
 
 __all__ = [

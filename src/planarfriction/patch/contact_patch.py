@@ -14,7 +14,14 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
 from planarfriction.patch import pressure as pressures
-from planarfriction.patch.grid import MOST_CELLS, Grid, cell_extents, check_cells, point_shares, warn_of_the_unit
+from planarfriction.patch.grid import (
+    MOST_CELLS,
+    Grid,
+    cell_extents,
+    check_cells,
+    point_shares,
+    warn_of_the_unit,
+)
 from planarfriction.patch.grid_error import GridError, finer, grid_error
 from planarfriction.patch.moments import Moments
 from planarfriction.patch.pressure import Pressure, Uniform
@@ -95,13 +102,24 @@ class ContactPatch(Moments):
             pressures.check_pressure(law.relative(positions), positions)
         kept = law.ever_loaded(positions)
         if not kept.any():
-            raise InvalidValueError("pressure", "be > 0 on at least one cell", "0 on all of them")
+            raise InvalidValueError(
+                "pressure", "be > 0 on at least one cell", "0 on all of them"
+            )
         self._check_anisotropy(kept)
-        self._set(positions=positions[kept], areas=areas[kept], radii=radii[kept], pressure=law.only(kept))
+        self._set(
+            positions=positions[kept],
+            areas=areas[kept],
+            radii=radii[kept],
+            pressure=law.only(kept),
+        )
         if type(law) is not Uniform:  # other pressures keep their ratios
             self._set(point_shares=None)
         elif self.point_shares is not None:
-            self._set(point_shares=validation.positive_array("point_shares", self.point_shares, (len(positions),)))
+            self._set(
+                point_shares=validation.positive_array(
+                    "point_shares", self.point_shares, (len(positions),)
+                )
+            )
             np.asarray(self.point_shares).setflags(write=False)
         for numbers in (self.positions, self.areas, np.asarray(self.radii)):
             numbers.setflags(write=False)
@@ -112,18 +130,31 @@ class ContactPatch(Moments):
         warn_of_the_unit(self.name, self.positions, self.cell_size)
 
     @classmethod
-    def disc(cls, radius: float, cells: int = 21, *, pressure: Any = None, name: str = "disc") -> ContactPatch:
+    def disc(
+        cls, radius: float, cells: int = 21, *, pressure: Any = None, name: str = "disc"
+    ) -> ContactPatch:
         """Return a disc of `radius` [m] about the origin on a grid of `cells` x `cells`; cells at the rim are cut.
 
         A cut cell has the area of its part inside the disc, and its position is the centroid of that part. Raises
         InvalidValueError for a parameter that breaks its rule.
         """
         radius = validation.length("radius", radius)
-        return outlines.clipped(cls, outlines.RoundOutline(0.0, radius), Grid.square(2 * radius, cells), pressure, name)
+        return outlines.clipped(
+            cls,
+            outlines.RoundOutline(0.0, radius),
+            Grid.square(2 * radius, cells),
+            pressure,
+            name,
+        )
 
     @classmethod
     def disc_published(
-        cls, radius: float = 0.01, cells: int = 21, *, pressure: Any = None, name: str = "disc_published"
+        cls,
+        radius: float = 0.01,
+        cells: int = 21,
+        *,
+        pressure: Any = None,
+        name: str = "disc_published",
     ) -> ContactPatch:
         """Return the published mask: cells of a grid `2 radius` [m] wide, within `cells // 2` cells of its centre.
 
@@ -133,12 +164,16 @@ class ContactPatch(Moments):
         """
         grid = Grid.square(2 * validation.length("radius", radius), cells)
         if grid.columns % 2 == 0:
-            raise InvalidValueError("cells", "be odd (the published mask is centred on a cell)", cells)
+            raise InvalidValueError(
+                "cells", "be odd (the published mask is centred on a cell)", cells
+            )
         reach = grid.columns // 2
         row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
         inside = (row - reach) ** 2 + (column - reach) ** 2 <= reach**2
         positions = grid.centres()[inside]
-        return cls(positions, np.full(len(positions), grid.cell_area), pressure, grid, name)
+        return cls(
+            positions, np.full(len(positions), grid.cell_area), pressure, grid, name
+        )
 
     @classmethod
     def rectangle(
@@ -157,17 +192,30 @@ class ContactPatch(Moments):
         """
         width = validation.length("width", width)
         height = width if height is None else validation.length("height", height)
-        grid = Grid.around_origin(width, height, *outlines.columns_and_rows(cells, width, height))
-        positions, corners = grid.centres(), _UNIT_BOX * (width, height)
+        grid = Grid.around_origin(
+            width, height, *outlines.columns_and_rows(cells, width, height)
+        )
+        positions = grid.centres()
+        corners = _UNIT_BOX * (width, height)
         areas = np.full(len(positions), grid.cell_area)
         shares = point_shares(positions, areas, (grid.cell_width, grid.cell_height))
         patch = cls(positions, areas, pressure, grid, name, point_shares=shares)
         patch = outlines.with_outline(patch, outlines.polygon_outline(corners))
-        return patch.discs() if 1 in (grid.columns, grid.rows) and len(areas) > 1 else patch
+        return (
+            patch.discs()
+            if 1 in (grid.columns, grid.rows) and len(areas) > 1
+            else patch
+        )
 
     @classmethod
     def ring(
-        cls, inner_radius: float, outer_radius: float, cells: int = 21, *, pressure: Any = None, name: str = "ring"
+        cls,
+        inner_radius: float,
+        outer_radius: float,
+        cells: int = 21,
+        *,
+        pressure: Any = None,
+        name: str = "ring",
     ) -> ContactPatch:
         """Return a ring between two radii [m] about the origin on a grid of `cells` x `cells`, cut at both rims.
 
@@ -176,12 +224,26 @@ class ContactPatch(Moments):
         inner = validation.length("inner_radius", inner_radius)
         outer = validation.length("outer_radius", outer_radius)
         if inner >= outer:
-            raise InvalidValueError("inner_radius", "be < outer_radius", f"{inner} and {outer}")
-        return outlines.clipped(cls, outlines.RoundOutline(inner, outer), Grid.square(2 * outer, cells), pressure, name)
+            raise InvalidValueError(
+                "inner_radius", "be < outer_radius", f"{inner} and {outer}"
+            )
+        return outlines.clipped(
+            cls,
+            outlines.RoundOutline(inner, outer),
+            Grid.square(2 * outer, cells),
+            pressure,
+            name,
+        )
 
     @classmethod
     def line(
-        cls, length: float, cells: int = 21, *, direction: str = "y", profile: Any = None, name: str = "line"
+        cls,
+        length: float,
+        cells: int = 21,
+        *,
+        direction: str = "y",
+        profile: Any = None,
+        name: str = "line",
     ) -> ContactPatch:
         """Return a line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide, of discs.
 
@@ -194,15 +256,21 @@ class ContactPatch(Moments):
         column or row (across the line it has one cell more than along it where `cells` is even). Raises
         InvalidValueError for a parameter that breaks its rule.
         """
-        length, cells = validation.length("length", length), validation.count("cells", cells, at_most=MOST_CELLS)
+        length = validation.length("length", length)
+        cells = validation.count("cells", cells, at_most=MOST_CELLS)
         along = ["x", "y"].index(validation.choice("direction", direction, ("x", "y")))
-        side, across = length / cells, cells + 1 - cells % 2
+        side = length / cells
+        across = cells + 1 - cells % 2
         columns, rows = (cells, across) if along == 0 else (across, cells)
         grid = Grid.around_origin(columns * side, rows * side, columns, rows)
         positions = np.zeros((cells, 2))
-        positions[:, along] = (np.arange(cells) - (cells - 1) / 2) * (side if along == 0 else -side)
+        positions[:, along] = (np.arange(cells) - (cells - 1) / 2) * (
+            side if along == 0 else -side
+        )
         if callable(profile):
-            profile = pressures.evaluated("profile", profile, positions[:, along, None].tolist())
+            profile = pressures.evaluated(
+                "profile", profile, positions[:, along, None].tolist()
+            )
         elif profile is not None:
             profile = pressures.non_negative_array("profile", profile, (cells,))
         size = (side, 0.0) if along == 0 else (0.0, side)
@@ -212,7 +280,12 @@ class ContactPatch(Moments):
 
     @classmethod
     def polygon(
-        cls, vertices: Any, cells: int | Sequence[int] = 21, *, pressure: Any = None, name: str = "polygon"
+        cls,
+        vertices: Any,
+        cells: int | Sequence[int] = 21,
+        *,
+        pressure: Any = None,
+        name: str = "polygon",
     ) -> ContactPatch:
         """Return a polygon with `vertices` `[M, 2]` [m], convex or not, on a grid over its box, cut along its sides.
 
@@ -224,13 +297,22 @@ class ContactPatch(Moments):
         low = vertices.min(axis=0)
         width, height = vertices.max(axis=0) - low
         if not (width > 0.0 and height > 0.0):
-            raise InvalidValueError("vertices", "enclose an area", f"a box of {width} x {height} m")
+            raise InvalidValueError(
+                "vertices", "enclose an area", f"a box of {width} x {height} m"
+            )
         columns, rows = outlines.columns_and_rows(cells, width, height)
         grid = Grid(low[0], low[1], width / columns, height / rows, columns, rows)
         return outlines.clipped(cls, outline, grid, pressure, name)
 
     @classmethod
-    def points(cls, positions: Any, weights: Any = None, *, area: float = 1e-6, name: str = "points") -> ContactPatch:
+    def points(
+        cls,
+        positions: Any,
+        weights: Any = None,
+        *,
+        area: float = 1e-6,
+        name: str = "points",
+    ) -> ContactPatch:
         """Return a patch of contact points `[N, 2]` [m] with relative `weights` `[N]` (equal if None), such as feet.
 
         `area` [m^2] is what each point stands for; only `areas`, `area` and `pressure_values` look at it. Raises
@@ -238,8 +320,16 @@ class ContactPatch(Moments):
         """
         positions = validation.array("positions", positions, (None, 2))
         if weights is not None:
-            weights = pressures.non_negative_array("weights", weights, (len(positions),))
-        return cls(positions, np.full(len(positions), validation.positive("area", area)), weights, None, name)
+            weights = pressures.non_negative_array(
+                "weights", weights, (len(positions),)
+            )
+        return cls(
+            positions,
+            np.full(len(positions), validation.positive("area", area)),
+            weights,
+            None,
+            name,
+        )
 
     @classmethod
     def from_pressure(
@@ -259,7 +349,13 @@ class ContactPatch(Moments):
         law, shape, file = read_maps(pressure, loads, **reading)
         grid = map_grid(*shape, cell_size, width)
         name = (file or "pressure map") if name is None else name
-        return cls(grid.centres(), np.full(grid.rows * grid.columns, grid.cell_area), law, grid, name)
+        return cls(
+            grid.centres(),
+            np.full(grid.rows * grid.columns, grid.cell_area),
+            law,
+            grid,
+            name,
+        )
 
     def refined(self, parts: int) -> ContactPatch:
         """Return the same patch with every cell divided into `parts` x `parts` (a cell of a line into `parts`).
@@ -284,9 +380,15 @@ class ContactPatch(Moments):
 
     def compressed(self, *_: Any, **__: Any) -> ContactPatch:
         """Refuse an old name, and say what to write instead. Raises InvalidValueError."""
-        raise InvalidValueError("compressed", "be replaced by discs(n): a patch of n small discs", "compressed()")
+        raise InvalidValueError(
+            "compressed",
+            "be replaced by discs(n): a patch of n small discs",
+            "compressed()",
+        )
 
-    def grid_error(self, normal_force: float | None = None, *, refined: int = 1) -> GridError:
+    def grid_error(
+        self, normal_force: float | None = None, *, refined: int = 1
+    ) -> GridError:
         """Return the errors of `refined(refined)` against the continuous patch: of force, torque and breakaway.
 
         Steady sliding is compared with `LimitSurfaceExact` (of the outline, or of cells three times as fine where a law
@@ -311,7 +413,9 @@ class ContactPatch(Moments):
         """True if the weights change with the normal force."""
         return self.pressure.depends_on_load
 
-    def weights(self, normal_force: ArrayLike | None = None, moments: ArrayLike | None = None) -> np.ndarray:
+    def weights(
+        self, normal_force: ArrayLike | None = None, moments: ArrayLike | None = None
+    ) -> np.ndarray:
         """Return the share of the normal force on each cell, `w_i = p_i a_i q_i / sum(p a q)`, shape `[..., N]` [-].
 
         With `moments` `[..., 2]` [N m] of the normal forces `N_i` on the moving body about the origin, `(m_x, m_y) =
@@ -324,7 +428,11 @@ class ContactPatch(Moments):
             return weights_under(self, normal_force, moments)
         if normal_force is None:
             if self._fixed_weights is None:
-                raise InvalidValueError("normal_force", "be given: the shape of this patch depends on it", "None")
+                raise InvalidValueError(
+                    "normal_force",
+                    "be given: the shape of this patch depends on it",
+                    "None",
+                )
             return self._fixed_weights
         load = validation.non_negative_numbers("normal_force", normal_force)
         if load.size * self.cells > validation.MOST_NUMBERS:
@@ -333,7 +441,9 @@ class ContactPatch(Moments):
         if self._fixed_weights is not None:
             return np.broadcast_to(self._fixed_weights, (*load.shape, self.cells))
         loaded = load > 0.0
-        weights = self._shares(self.pressure.relative(self.positions, np.where(loaded, load, 1.0)))
+        weights = self._shares(
+            self.pressure.relative(self.positions, np.where(loaded, load, 1.0))
+        )
         return np.where(loaded[..., None], weights, 0.0)
 
     def plot(self, *, normal_force: float | None = None) -> Any:
@@ -341,10 +451,14 @@ class ContactPatch(Moments):
         return picture("patch", self, normal_force=normal_force)
 
     def __repr__(self) -> str:
-        grid = "" if self.grid is None else f" of {self.grid.columns} x {self.grid.rows}"
+        grid = (
+            "" if self.grid is None else f" of {self.grid.columns} x {self.grid.rows}"
+        )
         law = type(self.pressure).__name__
         cells = "discs" if self.has_discs else "cells"
-        return f"ContactPatch({self.name!r}, {self.cells} {cells}{grid}, {law} pressure)"
+        return (
+            f"ContactPatch({self.name!r}, {self.cells} {cells}{grid}, {law} pressure)"
+        )
 
     def _repr_html_(self) -> str:
         return picture("patch in a notebook", self)
@@ -353,8 +467,20 @@ class ContactPatch(Moments):
         """Return weights `[..., N]` from relative pressures of that shape, scaled first so that no sum can overflow."""
         peak = relative.max(-1, keepdims=True)
         if not (peak > 0.0).all():
-            raise InvalidValueError("pressure", "be > 0 on at least one cell at every load", f"a peak of {peak.min()}")
-        load = relative / peak * (self.areas if self.point_shares is None else self.areas * self.point_shares)
+            raise InvalidValueError(
+                "pressure",
+                "be > 0 on at least one cell at every load",
+                f"a peak of {peak.min()}",
+            )
+        load = (
+            relative
+            / peak
+            * (
+                self.areas
+                if self.point_shares is None
+                else self.areas * self.point_shares
+            )
+        )
         return load / load.sum(-1, keepdims=True)
 
     def to_dict(self) -> dict[str, Any]:
@@ -366,7 +492,10 @@ class ContactPatch(Moments):
             "grid": self.grid and dataclasses.asdict(self.grid), "point_shares": self.point_shares,
             "radii": self.radii if self.has_discs else None,
         }  # fmt: skip
-        plain = {name: part.tolist() if isinstance(part, np.ndarray) else part for name, part in parts.items()}
+        plain = {
+            name: part.tolist() if isinstance(part, np.ndarray) else part
+            for name, part in parts.items()
+        }
         return {name: part for name, part in plain.items() if part is not None}
 
     @classmethod
@@ -377,15 +506,35 @@ class ContactPatch(Moments):
         """
         options = ("cell_size", "metric", "asymmetry", "point_shares", "radii")
         optional = ("shape", "name", "pressure", "grid", "outline", *options)
-        validation.keys("patch", data, required=("positions", "areas"), optional=optional)
+        validation.keys(
+            "patch", data, required=("positions", "areas"), optional=optional
+        )
         validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
-        pressure, grid = data.get("pressure"), data.get("grid")
+        pressure = data.get("pressure")
+        grid = data.get("grid")
         if isinstance(pressure, Mapping):
-            parts = {key: cls.from_dict(value) for key, value in pressure.items() if key == "patch"}
+            parts = {
+                key: cls.from_dict(value)
+                for key, value in pressure.items()
+                if key == "patch"
+            }
             pressure = Pressure.from_dict({**pressure, **parts})
         if grid is not None:
-            validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
+            validation.keys(
+                "grid",
+                grid,
+                required=[entry.name for entry in dataclasses.fields(Grid)],
+            )
             grid = Grid(**grid)
         given = {key: data.get(key) for key in options}
-        patch = cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"), **given)
-        return outlines.with_outline(patch, outlines.outline_from_dict(data.get("outline")))
+        patch = cls(
+            data["positions"],
+            data["areas"],
+            pressure,
+            grid,
+            data.get("name", "patch"),
+            **given,
+        )
+        return outlines.with_outline(
+            patch, outlines.outline_from_dict(data.get("outline"))
+        )

@@ -74,24 +74,34 @@ def _own_discs(patch: ContactPatch) -> ContactPatch:
     radii = np.sqrt((patch.cell_extents() ** 2).sum(axis=1) / 6.0)
     if patch.has_discs or not radii.any():
         return patch
-    with warnings.catch_warnings(action="ignore"):  # of the size, said when the patch was made
-        return with_outline(dataclasses.replace(patch, radii=radii, point_shares=None), patch.outline)
+    with warnings.catch_warnings(
+        action="ignore"
+    ):  # of the size, said when the patch was made
+        return with_outline(
+            dataclasses.replace(patch, radii=radii, point_shares=None), patch.outline
+        )
 
 
 @functools.lru_cache(REMEMBERED)
 def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     """Return fewer discs than the patch has cells; those of each kind of friction are chosen by themselves."""
     cells = _own_discs(patch)
-    places, root_scale = np.stack(cells.lever_coordinates(*cells.positions.T), -1), _ratio(cells)
+    places = np.stack(cells.lever_coordinates(*cells.positions.T), -1)
+    root_scale = _ratio(cells)
     weights = mean_weights(cells)
     squares = 0.5 * cells.lever_radii**2
-    groups, parts = _kinds(cells), []
+    groups = _kinds(cells)
+    parts = []
     for group, count in zip(groups, _counts(places, weights, groups, n), strict=True):
         clusters = _clusters(places[group], weights[group], squares[group], count)
         parts.append(clusters._replace(cells=group[clusters.cells]))
-    first = np.repeat([group[0] for group in groups], [len(part.places) for part in parts])
+    first = np.repeat(
+        [group[0] for group in groups], [len(part.places) for part in parts]
+    )
     start = np.cumsum([0, *(len(part.places) for part in parts)])
-    labels = np.concatenate([part.labels + at for part, at in zip(parts, start[:-1], strict=True)])
+    labels = np.concatenate(
+        [part.labels + at for part, at in zip(parts, start[:-1], strict=True)]
+    )
     order = np.argsort(labels, kind="stable")
     members = np.concatenate([part.cells for part in parts])[order]
     parted = np.concatenate([part.parted for part in parts])[order]
@@ -100,14 +110,21 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     shared = SharedPressure(cells, members, parted, begins, radii)
     areas = shared.sums(cells.areas)
     fields = {
-        "metric": None if cells.metric is None else np.broadcast_to(cells.metric, (cells.cells, 2, 2))[first],
+        "metric": None
+        if cells.metric is None
+        else np.broadcast_to(cells.metric, (cells.cells, 2, 2))[first],
         "asymmetry": None if cells.asymmetry is None else cells.asymmetries()[first],
         "radii": radii,
     }
     if len(groups) == 1:
-        fields |= {name: None if fields[name] is None else fields[name][0] for name in ("metric", "asymmetry")}
+        fields |= {
+            name: None if fields[name] is None else fields[name][0]
+            for name in ("metric", "asymmetry")
+        }
     law = shared if cells.depends_on_load else PerCell(shared.relative(cells.positions))
-    positions = _from_lever_coordinates(cells, np.concatenate([part.places for part in parts]), first)
+    positions = _from_lever_coordinates(
+        cells, np.concatenate([part.places for part in parts]), first
+    )
     with warnings.catch_warnings(action="ignore"):
         return type(patch)(positions, areas, law, None, patch.name, **fields)
 
@@ -121,7 +138,9 @@ def _ratio(patch: ContactPatch) -> np.ndarray:
     return np.broadcast_to(np.sqrt(0.5 * (root**2).sum((-2, -1))), patch.cells)
 
 
-def _from_lever_coordinates(patch: ContactPatch, places: np.ndarray, cells: np.ndarray) -> np.ndarray:
+def _from_lever_coordinates(
+    patch: ContactPatch, places: np.ndarray, cells: np.ndarray
+) -> np.ndarray:
     """Return the positions whose lever coordinates are `places` `[n, 2]`, with the metrics of these `cells` `[n]`."""
     if patch.root is None:
         return places
@@ -135,24 +154,32 @@ def _kinds(patch: ContactPatch) -> list[np.ndarray]:
     """Return the cells of each kind of friction."""
     if patch.metric is None and patch.asymmetry is None:
         return [np.arange(patch.cells)]
-    metric = np.broadcast_to(np.eye(2) if patch.metric is None else patch.metric, (patch.cells, 2, 2))
+    metric = np.broadcast_to(
+        np.eye(2) if patch.metric is None else patch.metric, (patch.cells, 2, 2)
+    )
     numbers = np.hstack([metric.reshape(-1, 4), patch.asymmetries()])
     kind = np.unique(numbers, axis=0, return_inverse=True)[1].reshape(-1)
     return [np.flatnonzero(kind == k) for k in range(kind.max() + 1)]
 
 
-def _counts(places: np.ndarray, weights: np.ndarray, groups: list[np.ndarray], n: int) -> list[int]:
+def _counts(
+    places: np.ndarray, weights: np.ndarray, groups: list[np.ndarray], n: int
+) -> list[int]:
     """Return the numbers of discs of the kinds of friction, which are n or fewer in all, and at least one each.
 
     Proportional to `w r`, the share times the radius of gyration of a kind, with which the sum of costs is least.
     """
     sizes = []
     for group in groups:
-        w, p = weights[group], places[group]
+        w = weights[group]
+        p = places[group]
         total = max(w.sum(), 1e-300)
         sizes.append(math.sqrt(max(total * (w @ (p - w @ p / total) ** 2).sum(), 0.0)))
     per_size = n / max(sum(sizes), 1e-300)
-    return [min(len(g), max(1, math.floor(s * per_size + SAME))) for g, s in zip(groups, sizes, strict=True)]
+    return [
+        min(len(g), max(1, math.floor(s * per_size + SAME)))
+        for g, s in zip(groups, sizes, strict=True)
+    ]
 
 
 # ---------------------------------------------------------------------- clusters of cells of one kind
@@ -208,23 +235,37 @@ class _Partition(NamedTuple):
     """Coordinates `[k, 2]` of centres that are held at 0."""
 
 
-def _clusters(places: np.ndarray, weights: np.ndarray, squares: np.ndarray, n: int) -> _Clusters:
+def _clusters(
+    places: np.ndarray, weights: np.ndarray, squares: np.ndarray, n: int
+) -> _Clusters:
     """Return the discs of points with `weights` `[N]` and second moments of their own; fewer where n does not fit."""
     if len(places) <= n:
         each = np.arange(len(places))
-        return _Clusters(places, np.sqrt(2.0 * squares), each, each, np.ones(len(places)))
-    weights = weights / weights.sum() if weights.any() else np.full(len(places), 1.0 / len(places))
+        return _Clusters(
+            places, np.sqrt(2.0 * squares), each, each, np.ones(len(places))
+        )
+    weights = (
+        weights / weights.sum()
+        if weights.any()
+        else np.full(len(places), 1.0 / len(places))
+    )
     middle, axes, scale = _frame(places, weights)
     points = (places - middle) @ axes / scale
     order = np.argsort(points @ SLANTED, kind="stable")
-    points, weights, squares = points[order], weights[order], squares[order] / scale**2
+    points = points[order]
+    weights = weights[order]
+    squares = squares[order] / scale**2
     period = _period(points, weights, squares)
     chosen = _chosen(period, points, weights, squares, n)
     centres, radii, cells, labels, parted = _finished(period, chosen)
-    return _Clusters(centres @ axes.T * scale + middle, radii * scale, order[cells], labels, parted)
+    return _Clusters(
+        centres @ axes.T * scale + middle, radii * scale, order[cells], labels, parted
+    )
 
 
-def _frame(places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _frame(
+    places: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the mean of points, their principal axes as columns, and their radius of gyration.
 
     Where the axes are not determined, those of the coordinates; they point to the side with the farther load.
@@ -233,9 +274,13 @@ def _frame(places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndar
     offset = places - middle
     scale = math.sqrt(weights @ (offset**2).sum(axis=1)) or 1.0
     x, y = offset.T / scale
-    xx, xy, yy = weights @ x**2, weights @ (x * y), weights @ y**2
+    xx = weights @ x**2
+    xy = weights @ (x * y)
+    yy = weights @ y**2
     angle = 0.0 if abs(xy) < SAME else 0.5 * math.atan2(2.0 * xy, xx - yy)
-    axes = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    axes = np.array(
+        [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+    )
     if yy - xx > SAME and angle == 0.0:
         axes = axes[:, ::-1]
     turned = offset @ axes / scale
@@ -245,19 +290,28 @@ def _frame(places: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _period(points: np.ndarray, weights: np.ndarray, squares: np.ndarray) -> _Period:
     """Return one period of the symmetries of points sorted along `SLANTED`: mirrors on both axes, or `p -> -p`."""
-    every, near = np.arange(len(points)), SAME * float(np.abs(points).max())
+    every = np.arange(len(points))
+    near = SAME * float(np.abs(points).max())
     found = {(1.0, 1.0): every}
     for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
         image = np.empty_like(every)
         image[np.argsort(points * flip @ SLANTED, kind="stable")] = every
-        alike = all(np.abs(each[image] - each).max() <= SAME * each.max() for each in (weights, squares))
-        known = any(np.array_equal(image, other) for other in found.values())  # all points lie on an axis
+        alike = all(
+            np.abs(each[image] - each).max() <= SAME * each.max()
+            for each in (weights, squares)
+        )
+        known = any(
+            np.array_equal(image, other) for other in found.values()
+        )  # all points lie on an axis
         if alike and not known and np.abs(points[image] - points * flip).max() <= near:
             found[flip] = image
-    signs, images = np.array(list(found)), np.array(list(found.values()))
+    signs = np.array(list(found))
+    images = np.array(list(found.values()))
     mirrored = [k for k, flip in enumerate([(-1.0, 1.0), (1.0, -1.0)]) if flip in found]
     # without mirrors any one of a point and its image will do
-    inside = (points[:, mirrored] >= -near).all(axis=1) if mirrored else every <= images[-1]
+    inside = (
+        (points[:, mirrored] >= -near).all(axis=1) if mirrored else every <= images[-1]
+    )
     parted = 1.0 / (images == every).sum(axis=0)
     period = np.flatnonzero(inside)
     own = points[period], (weights * parted)[period], squares[period]
@@ -267,9 +321,13 @@ def _period(points: np.ndarray, weights: np.ndarray, squares: np.ndarray) -> _Pe
 def _arrangements(period: _Period, n: int) -> list[tuple[int, int, int, int]]:
     """Return numbers of centres inside, held at x = 0, at y = 0 and at both, whose images are n in all."""
     flips = {tuple(each) for each in period.signs}
-    at_x, at_y, at_both = (flip in flips for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)))
+    at_x, at_y, at_both = (
+        flip in flips for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
+    )
     pair = max(1, len(flips) // 2)
-    width, height = np.sqrt(period.weights @ period.points**2 / period.weights.sum()) + SAME
+    width, height = (
+        np.sqrt(period.weights @ period.points**2 / period.weights.sum()) + SAME
+    )
     most_x = min(n // pair, int(math.sqrt(n * height / width)) + 1) if at_x else 0
     most_y = min(n // pair, int(math.sqrt(n * width / height)) + 1) if at_y else 0
     ways = []
@@ -284,27 +342,46 @@ def _arrangements(period: _Period, n: int) -> list[tuple[int, int, int, int]]:
 
 def _partitions(period: _Period, n: int) -> list[_Partition]:
     """Return the partitions into n clusters that cost little more than the best, the best first."""
-    from planarfriction._engine.cells import clusters  # compiled code, which a patch alone does not need
+    from planarfriction._engine.cells import (
+        clusters,
+    )  # compiled code, which a patch alone does not need
 
-    points, weights = period.points, period.weights
+    points = period.points
+    weights = period.weights
     ways = [way for way in _arrangements(period, n) if 0 < sum(way) <= len(points)]
-    labels, turned = np.empty(len(points), int), np.empty(len(points), bool)
+    labels = np.empty(len(points), int)
+    turned = np.empty(len(points), bool)
     work = len(points) * n / len(period.signs) * 0.5 * STEPS * max(len(ways), 1)
     found: list[tuple[float, _Partition]] = []
     for inside, at_x, at_y, at_both in ways:
         k = inside + at_x + at_y + at_both
         for seed in range(min(MOST_SEEDS, max(1, round(WORK / work)))):
-            centres, on_axes = np.empty((k, 2)), np.zeros((k, 2), bool)
+            centres = np.empty((k, 2))
+            on_axes = np.zeros((k, 2), bool)
             clusters.seeds(points, weights, seed * k, centres)
-            order = np.argsort(np.hypot(*centres.T) if period.inverted else centres[:, 0], kind="stable")
+            order = np.argsort(
+                np.hypot(*centres.T) if period.inverted else centres[:, 0],
+                kind="stable",
+            )
             on_axes[order[:at_both] if period.inverted else [], :] = True
             on_axes[order[:at_x], 0] = True
             rest = order[at_x:] if not period.inverted else order[:0]
             lowest = rest[np.argsort(centres[rest, 1], kind="stable")[: at_y + at_both]]
             on_axes[lowest, 1] = True
-            on_axes[lowest[np.argsort(centres[lowest, 0], kind="stable")[:at_both]], 0] = True
+            on_axes[
+                lowest[np.argsort(centres[lowest, 0], kind="stable")[:at_both]], 0
+            ] = True
             centres[on_axes] = 0.0
-            cost = clusters.lloyd(points, weights, period.inverted, on_axes, STEPS, centres, labels, turned)
+            cost = clusters.lloyd(
+                points,
+                weights,
+                period.inverted,
+                on_axes,
+                STEPS,
+                centres,
+                labels,
+                turned,
+            )
             if cost < np.inf:
                 found.append((cost, _Partition(centres, on_axes)))
     found.sort(key=lambda each: each[0])
@@ -322,7 +399,13 @@ def _different(found: list[tuple[float, _Partition]]) -> list[_Partition]:
     return [partition for _, partition in kept]
 
 
-def _chosen(period: _Period, points: np.ndarray, weights: np.ndarray, squares: np.ndarray, n: int) -> _Partition:
+def _chosen(
+    period: _Period,
+    points: np.ndarray,
+    weights: np.ndarray,
+    squares: np.ndarray,
+    n: int,
+) -> _Partition:
     """Return the partition into n clusters whose friction is nearest to that of all cells.
 
     A patch with two mirrors, or that is the same when turned by half a turn, has a disc in its middle for odd numbers
@@ -336,14 +419,23 @@ def _chosen(period: _Period, points: np.ndarray, weights: np.ndarray, squares: n
         n -= 1
     if len(good) == 1:
         return good[0]
-    centres = np.concatenate([period.points[:: max(1, len(period.points) // PLACES)], BESIDE])
-    heavier = np.where(np.arange(len(centres)) < len(centres) - len(BESIDE), 1.0, HEAVIER)
+    centres = np.concatenate(
+        [period.points[:: max(1, len(period.points) // PLACES)], BESIDE]
+    )
+    heavier = np.where(
+        np.arange(len(centres)) < len(centres) - len(BESIDE), 1.0, HEAVIER
+    )
     wanted = weights @ _pulls(points, np.sqrt(2.0 * squares), centres)
 
     def error(partition: _Partition) -> float:
         places, radii, cells, labels, parted = _finished(period, partition)
         shares = np.bincount(labels, weights[cells] * parted)
-        return float((heavier[:, None] * (shares @ _pulls(places, radii, centres) - wanted) ** 2).sum())
+        return float(
+            (
+                heavier[:, None]
+                * (shares @ _pulls(places, radii, centres) - wanted) ** 2
+            ).sum()
+        )
 
     return min(good, key=error)
 
@@ -352,14 +444,24 @@ def _finished(period: _Period, chosen: _Partition) -> _Clusters:
     """Return the discs of a partition and of its images."""
     from planarfriction._engine.cells import clusters
 
-    points, weights = period.points, period.weights
-    k, on_axes, centres = len(chosen.centres), chosen.on_axes, chosen.centres.copy()
-    labels, turned = np.empty(len(points), int), np.empty(len(points), bool)
-    clusters.lloyd(points, weights, period.inverted, on_axes, LAST_STEPS, centres, labels, turned)
+    points = period.points
+    weights = period.weights
+    k = len(chosen.centres)
+    on_axes = chosen.on_axes
+    centres = chosen.centres.copy()
+    labels = np.empty(len(points), int)
+    turned = np.empty(len(points), bool)
+    clusters.lloyd(
+        points, weights, period.inverted, on_axes, LAST_STEPS, centres, labels, turned
+    )
     points = np.where(turned[:, None], -points, points)
     share = np.bincount(labels, weights, k)
     for axis in range(2):
-        centres[:, axis] = np.where(on_axes[:, axis], 0.0, np.bincount(labels, weights * points[:, axis], k) / share)
+        centres[:, axis] = np.where(
+            on_axes[:, axis],
+            0.0,
+            np.bincount(labels, weights * points[:, axis], k) / share,
+        )
     squares = ((points - centres[labels]) ** 2).sum(axis=1) + period.squares
     radii = np.sqrt(2.0 * np.bincount(labels, weights * squares, k) / share)
     images = np.where(turned, period.images[::-1], period.images)
@@ -369,14 +471,22 @@ def _finished(period: _Period, chosen: _Partition) -> _Clusters:
     disc = np.take_along_axis(numbered, same, axis=0)
     places = (period.signs[:, None] * centres).reshape(-1, 2)[number] + 0.0
     parted = np.tile(period.parted, len(same))
-    return _Clusters(places, np.tile(radii, len(same))[number], images.ravel(), disc[:, labels].ravel(), parted)
+    return _Clusters(
+        places,
+        np.tile(radii, len(same))[number],
+        images.ravel(),
+        disc[:, labels].ravel(),
+        parted,
+    )
 
 
 def _pulls(places: np.ndarray, radii: np.ndarray, centres: np.ndarray) -> np.ndarray:
     """Return friction `[K, n, 3]` per share of load against unit spins about K centres; a disc has its own torque."""
     x, y = places.T
-    ux, uy = -(y - centres[:, 1:]), x - centres[:, :1]
+    ux = -(y - centres[:, 1:])
+    uy = x - centres[:, :1]
     c_t, c_s, speed = disc_friction(ux**2 + uy**2, radii**2)
     per_speed = np.divide(1.0, speed, out=np.zeros_like(speed), where=speed > 0.0)
-    fx, fy = c_t * ux * per_speed, c_t * uy * per_speed
+    fx = c_t * ux * per_speed
+    fy = c_t * uy * per_speed
     return np.stack([fx, fy, x * fy - y * fx + 0.5 * c_s * radii**2 * per_speed], -1)

@@ -25,12 +25,24 @@ def check_cells(count: int, name: str = "cells") -> None:
         raise InvalidValueError(name, f"be at most {MOST_CELLS} in all", count)
 
 
-def warn_of_the_unit(name: str, positions: np.ndarray, cell_size: tuple[float, float] | None) -> None:
+def warn_of_the_unit(
+    name: str, positions: np.ndarray, cell_size: tuple[float, float] | None
+) -> None:
     """Warn where a patch is so large or so small that millimetres may have been given for metres."""
-    width = max(float(np.ptp(x)) + side for x, side in zip(positions.T, cell_size or (0.0, 0.0), strict=True))
+    width = max(
+        float(np.ptp(x)) + side
+        for x, side in zip(positions.T, cell_size or (0.0, 0.0), strict=True)
+    )
     if not LEAST_WIDTH <= width <= MOST_WIDTH and width > 0.0:  # 0: a point
-        than = f"larger than {MOST_WIDTH:g}" if width > MOST_WIDTH else f"smaller than {LEAST_WIDTH:g}"
-        warnings.warn(f"patch {name!r} is {width:.3g} m wide, {than} m: are its lengths in metres?", stacklevel=4)
+        than = (
+            f"larger than {MOST_WIDTH:g}"
+            if width > MOST_WIDTH
+            else f"smaller than {LEAST_WIDTH:g}"
+        )
+        warnings.warn(
+            f"patch {name!r} is {width:.3g} m wide, {than} m: are its lengths in metres?",
+            stacklevel=4,
+        )
 
 
 FARTHEST = 2.0**62
@@ -62,16 +74,23 @@ class Grid(Checked):
         check_cells(self.rows * self.columns, "cells (rows x columns)")
 
     @classmethod
-    def around_origin(cls, width: float, height: float, columns: int, rows: int) -> Grid:
+    def around_origin(
+        cls, width: float, height: float, columns: int, rows: int
+    ) -> Grid:
         """Return a grid of `columns` x `rows` cells on the box of `width` x `height` [m] whose middle is the origin.
 
         Raises InvalidValueError for sides that are not > 0, and for too many cells.
         """
-        width, height = validation.positive("width", width), validation.positive("height", height)
+        width = validation.positive("width", width)
+        height = validation.positive("height", height)
         columns = validation.count("columns", columns, at_most=MOST_CELLS)
         rows = validation.count("rows", rows, at_most=MOST_CELLS)
-        check_cells(columns * rows, "cells (rows x columns)")  # before the cells are too small to be any
-        return cls(-width / 2, -height / 2, width / columns, height / rows, columns, rows)
+        check_cells(
+            columns * rows, "cells (rows x columns)"
+        )  # before the cells are too small to be any
+        return cls(
+            -width / 2, -height / 2, width / columns, height / rows, columns, rows
+        )
 
     @classmethod
     def square(cls, width: float, cells: int) -> Grid:
@@ -92,7 +111,10 @@ class Grid(Checked):
         # Counted from the middle, so that a grid around the origin is symmetric to the last digit.
         x_middle = self.x_min + self.columns * self.cell_width / 2
         y_middle = self.y_min + self.rows * self.cell_height / 2
-        x = x_middle + (np.arange(self.columns) - (self.columns - 1) / 2) * self.cell_width
+        x = (
+            x_middle
+            + (np.arange(self.columns) - (self.columns - 1) / 2) * self.cell_width
+        )
         y = y_middle - (np.arange(self.rows) - (self.rows - 1) / 2) * self.cell_height
         return np.stack([np.tile(x, self.rows), np.repeat(y, self.columns)], -1)
 
@@ -103,10 +125,15 @@ class Grid(Checked):
 
         Raises InvalidValueError for positions of another shape.
         """
-        positions = validation.vectors("positions", validation.finite_numbers("positions", positions), 2)
+        positions = validation.vectors(
+            "positions", validation.finite_numbers("positions", positions), 2
+        )
         from_top = self.rows - (positions[..., 1] - self.y_min) / self.cell_height
         from_left = (positions[..., 0] - self.x_min) / self.cell_width
-        row, column = (np.floor(np.clip(each, -FARTHEST, FARTHEST)).astype(int) for each in (from_top, from_left))
+        row, column = (
+            np.floor(np.clip(each, -FARTHEST, FARTHEST)).astype(int)
+            for each in (from_top, from_left)
+        )
         return row, column
 
 
@@ -117,7 +144,9 @@ LARGEST_CHANGE = 0.8
 """Largest relative change of a weight, which stays positive; few cells across a thin shape would need larger ones."""
 
 
-def cell_extents(areas: np.ndarray, cell_size: tuple[float, float] | None) -> np.ndarray:
+def cell_extents(
+    areas: np.ndarray, cell_size: tuple[float, float] | None
+) -> np.ndarray:
     """Return the width and height `[N, 2]` [m] of cells; a cut one has the proportions of a whole one."""
     if cell_size is None:
         return np.zeros((len(areas), 2))
@@ -127,7 +156,9 @@ def cell_extents(areas: np.ndarray, cell_size: tuple[float, float] | None) -> np
     return np.sqrt(areas / (width * height))[:, None] * np.array([width, height])
 
 
-def point_shares(positions: np.ndarray, areas: np.ndarray, cell_size: tuple[float, float] | None) -> np.ndarray | None:
+def point_shares(
+    positions: np.ndarray, areas: np.ndarray, cell_size: tuple[float, float] | None
+) -> np.ndarray | None:
     """Return factors `q` `[N]` on the areas with which points at the cells have the second moments of the areas.
 
     `sum(a q p) = sum(a p)` for all polynomials of degree 1, and `sum(a q rho rho') = sum(a (rho rho' + e e'/12))` with
@@ -141,16 +172,21 @@ def point_shares(positions: np.ndarray, areas: np.ndarray, cell_size: tuple[floa
     size = np.sqrt(w @ (rho**2).sum(1))
     if not size > 0.0:
         return None
-    rho, own = rho / size, cell_extents(areas, cell_size) ** 2 / (12.0 * size**2)
+    rho = rho / size
+    own = cell_extents(areas, cell_size) ** 2 / (12.0 * size**2)
     linear = np.column_stack([np.ones(len(w)), rho])
     square = np.column_stack([rho[:, 0] ** 2, rho[:, 0] * rho[:, 1], rho[:, 1] ** 2])
     scale = np.sqrt(w @ square**2)
     square = square / np.where(scale > 0.0, scale, 1.0)
     root = np.sqrt(w)[:, None]
-    free = square - linear @ np.linalg.lstsq(root * linear, root * square, rcond=None)[0]
+    free = (
+        square - linear @ np.linalg.lstsq(root * linear, root * square, rcond=None)[0]
+    )
     variances, axes = np.linalg.eigh((w[:, None] * free).T @ free)
     axes = axes[:, variances > LEAST_SPREAD]
-    missing = np.array([w @ own[:, 0], 0.0, w @ own[:, 1]]) / np.where(scale > 0.0, scale, 1.0)
+    missing = np.array([w @ own[:, 0], 0.0, w @ own[:, 1]]) / np.where(
+        scale > 0.0, scale, 1.0
+    )
     found = axes @ (axes.T @ missing / variances[variances > LEAST_SPREAD])
     change = free @ found
     largest = np.abs(change).max()

@@ -21,24 +21,41 @@ if TYPE_CHECKING:
 
 def finer(patch: ContactPatch, parts: int, name: str = "parts") -> ContactPatch:
     """Implement `ContactPatch.refined`."""
-    parts, extent = validation.count(name, parts, at_most=MOST_CELLS), patch.cell_extents()
+    parts = validation.count(name, parts, at_most=MOST_CELLS)
+    extent = patch.cell_extents()
     if parts == 1 or not extent.any():
         return patch
-    check_cells(patch.cells * parts ** int(extent.any(axis=0).sum()), f"cells (by {name})")
+    check_cells(
+        patch.cells * parts ** int(extent.any(axis=0).sum()), f"cells (by {name})"
+    )
     fine = (np.arange(parts) - (parts - 1) / 2) / parts
-    inside = np.stack(np.meshgrid(*(fine if side else [0.0] for side in extent.max(axis=0))), -1).reshape(-1, 2)
-    times, (width, height) = len(inside), patch.cell_size or (0.0, 0.0)
-    own = {"metric": (patch.metric, 2), "asymmetry": (patch.asymmetry, 1)}  # what each cell has is repeated
+    inside = np.stack(
+        np.meshgrid(*(fine if side else [0.0] for side in extent.max(axis=0))), -1
+    ).reshape(-1, 2)
+    times = len(inside)
+    (width, height) = patch.cell_size or (0.0, 0.0)
+    own = {
+        "metric": (patch.metric, 2),
+        "asymmetry": (patch.asymmetry, 1),
+    }  # what each cell has is repeated
     fields = {
-        name: value if value is None or value.ndim == axes else np.repeat(value, times, axis=0)
+        name: value
+        if value is None or value.ndim == axes
+        else np.repeat(value, times, axis=0)
         for name, (value, axes) in own.items()
     }
-    positions, areas = patch.positions[:, None] + inside * extent[:, None], np.repeat(patch.areas / times, times)
-    positions, size = positions.reshape(-1, 2), (width / parts, height / parts)
-    shares = None if patch.point_shares is None else point_shares(positions, areas, size)
+    positions = patch.positions[:, None] + inside * extent[:, None]
+    areas = np.repeat(patch.areas / times, times)
+    positions = positions.reshape(-1, 2)
+    size = (width / parts, height / parts)
+    shares = (
+        None if patch.point_shares is None else point_shares(positions, areas, size)
+    )
     pressure = patch.pressure.repeated(times)
     fields["radii"] = np.repeat(patch.radii / parts, times)
-    return type(patch)(positions, areas, pressure, None, patch.name, size, shares, **fields)
+    return type(patch)(
+        positions, areas, pressure, None, patch.name, size, shares, **fields
+    )
 
 
 NEAREST = 60
@@ -73,14 +90,25 @@ class GridError:
     """The same of `ContactPatch.discs()`, each cell a small disc, where cells are points; else None."""
 
     def __str__(self) -> str:
-        force, torque, breakaway = (f"{100.0 * each:.2g} %" for each in (self.force, self.torque, self.breakaway))
-        discs = "" if self.as_discs is None else f"; as discs {self.as_discs}".partition(" (")[0]
+        force, torque, breakaway = (
+            f"{100.0 * each:.2g} %"
+            for each in (self.force, self.torque, self.breakaway)
+        )
+        discs = (
+            ""
+            if self.as_discs is None
+            else f"; as discs {self.as_discs}".partition(" (")[0]
+        )
         return f"force {force}, torque {torque}, breakaway {breakaway} ({self.cells} cells){discs}"
 
 
-def grid_error(patch: ContactPatch, normal_force: float | None, refined: int) -> GridError:
+def grid_error(
+    patch: ContactPatch, normal_force: float | None, refined: int
+) -> GridError:
     """Implement `ContactPatch.grid_error`."""
-    with warnings.catch_warnings(action="ignore"):  # of the patch's size, said when it was made
+    with warnings.catch_warnings(
+        action="ignore"
+    ):  # of the patch's size, said when it was made
         fine = finer(patch, refined, "refined")
     if not patch.cell_extents().any():
         return GridError(0.0, 0.0, 0.0, fine.cells)
@@ -92,24 +120,35 @@ def grid_error(patch: ContactPatch, normal_force: float | None, refined: int) ->
 def _error(fine: ContactPatch, exact: Any, normal_force: float | None) -> GridError:
     """Return the errors of the sum over the cells of a patch against an exact surface."""
     cells = SURFACES["cells"](fine, normal_force=normal_force)
-    centre, radius = exact.centre_of_pressure, exact.contact_radius
+    centre = exact.centre_of_pressure
+    radius = exact.contact_radius
     x, y = _beside_cells(fine, centre, radius, normal_force)
     turns = np.stack([y, -x, np.ones_like(x)], -1)  # about (x, y) with 1 rad/s
-    fx, fy, torque = geometry.wrench_at(cells.wrench(turns) - exact.wrench(turns), centre).T
+    fx, fy, torque = geometry.wrench_at(
+        cells.wrench(turns) - exact.wrench(turns), centre
+    ).T
     breakaway = cells.compare(exact, samples=DIRECTIONS).radius.largest
-    return GridError(float(np.hypot(fx, fy).max()), float(np.abs(torque).max()) / radius, breakaway, fine.cells)
+    return GridError(
+        float(np.hypot(fx, fy).max()),
+        float(np.abs(torque).max()) / radius,
+        breakaway,
+        fine.cells,
+    )
 
 
 def _continuous(patch: ContactPatch, normal_force: float | None):
     """Return the exact limit surface of the outline, or of cells so small that a pressure law is continuous on them."""
-    exact, pressure = SURFACES["exact"](patch, normal_force=normal_force), patch.pressure
+    exact = SURFACES["exact"](patch, normal_force=normal_force)
+    pressure = patch.pressure
     by_law = pressure.repeated(2) is pressure and not isinstance(pressure, Uniform)
     if exact.integrates_outline or not by_law:
         return exact
     return SURFACES["exact"](patch.refined(FINER), normal_force=normal_force)
 
 
-def _beside_cells(patch: ContactPatch, centre: np.ndarray, radius: float, normal_force: float | None) -> np.ndarray:
+def _beside_cells(
+    patch: ContactPatch, centre: np.ndarray, radius: float, normal_force: float | None
+) -> np.ndarray:
     """Return points to all four sides of the middles of loaded cells, `[2, M]` [m].
 
     Of the cells within `radius` [m] of `centre` those nearest to it, or the nearest of all.
@@ -119,6 +158,8 @@ def _beside_cells(patch: ContactPatch, centre: np.ndarray, radius: float, normal
     order = np.argsort(distance, kind="stable")[:NEAREST]
     near = loaded[order[distance[order] <= max(radius, distance.min())]]
     sides = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
-    sides = np.concatenate([distance * sides for distance in (BESIDE_DISCS if patch.has_discs else BESIDE)])
+    sides = np.concatenate(
+        [distance * sides for distance in (BESIDE_DISCS if patch.has_discs else BESIDE)]
+    )
     points = patch.positions[near, None] + sides * patch.cell_extents()[near, None]
     return points.reshape(-1, 2).T

@@ -19,7 +19,12 @@ from planarfriction import validation
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import FileError, FrictionError, InvalidValueError, shown
 from planarfriction.patch.grid import MOST_CELLS
-from planarfriction.patch.map_kinds import refuse_named, refuse_other_tables, remark_offset, rim_of
+from planarfriction.patch.map_kinds import (
+    refuse_named,
+    refuse_other_tables,
+    remark_offset,
+    rim_of,
+)
 from planarfriction.reading import number, read_bytes, read_rows, read_text, width
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
@@ -53,10 +58,14 @@ class MapReading(Checked):
     Raises InvalidValueError for a value that breaks its rule.
     """
 
-    header: bool | None = checked(validation.instance, bool, "True or False", default=None)
+    header: bool | None = checked(
+        validation.instance, bool, "True or False", default=None
+    )
     """True: the first row of a CSV file has names, False: pressures; None: names if none of them is a number, or if
     they are 0, 1, 2 ... behind an empty cell."""
-    index: bool | None = checked(validation.instance, bool, "True or False", default=None)
+    index: bool | None = checked(
+        validation.instance, bool, "True or False", default=None
+    )
     """True: the first column of a table has labels or times, False: pressures; None: labels if the header is empty
     there, if none of them is a number, or if they ascend and frames of `frame_shape` fill the rows only without them.
     """
@@ -66,19 +75,33 @@ class MapReading(Checked):
     """Frame of a file with several, or page of an image, counted from 0; None: the only one."""
     threshold: float | None = checked(validation.non_negative, default=None)
     """Share of the peak up to which cells count as empty [-], < 1; None: 0, and 0.1 for a JPEG."""
-    invert: bool | None = checked(validation.instance, bool, "True or False", default=None)
+    invert: bool | None = checked(
+        validation.instance, bool, "True or False", default=None
+    )
     """True: dark means pressure, as on a print; False: bright does; None: bright does, and images that look like prints
     are refused."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.frame_shape is not None:
-            sides = self.frame_shape if isinstance(self.frame_shape, Sequence) and len(self.frame_shape) == 2 else ()
+            sides = (
+                self.frame_shape
+                if isinstance(self.frame_shape, Sequence) and len(self.frame_shape) == 2
+                else ()
+            )
             if not sides:
-                raise InvalidValueError("frame_shape", "be (rows, columns)", self.frame_shape)
-            self._set(frame_shape=tuple(validation.count("frame_shape", side) for side in sides))
+                raise InvalidValueError(
+                    "frame_shape", "be (rows, columns)", self.frame_shape
+                )
+            self._set(
+                frame_shape=tuple(
+                    validation.count("frame_shape", side) for side in sides
+                )
+            )
         if self.threshold is not None and self.threshold >= 1.0:
-            raise InvalidValueError("threshold", "be < 1, a share of the peak", self.threshold)
+            raise InvalidValueError(
+                "threshold", "be < 1, a share of the peak", self.threshold
+            )
 
     def frame_of(self, what: str, values: np.ndarray | list[np.ndarray]) -> np.ndarray:
         """Return the frame `[rows, columns]` of values `[frames, rows, columns]`, or of any that `frame_shape` divides.
@@ -87,7 +110,11 @@ class MapReading(Checked):
         """
         if self.frame_shape is not None and isinstance(values, np.ndarray):
             if values.size == 0 or values.size % math.prod(self.frame_shape):
-                raise InvalidValueError("frame_shape", f"divide the {values.size} values of {what}", self.frame_shape)
+                raise InvalidValueError(
+                    "frame_shape",
+                    f"divide the {values.size} values of {what}",
+                    self.frame_shape,
+                )
             values = values.reshape(-1, *self.frame_shape)
         several = isinstance(values, list) or values.ndim == 3
         place = self.place(what, len(values) if several else 1)
@@ -101,7 +128,10 @@ class MapReading(Checked):
         if self.index is not None or self.frame_shape is None:
             return bool(self.index)
         cells = math.prod(self.frame_shape)
-        fits = [count > 0 and (count % cells == 0 or count == self.frame_shape[1]) for count in (columns, columns - 1)]
+        fits = [
+            count > 0 and (count % cells == 0 or count == self.frame_shape[1])
+            for count in (columns, columns - 1)
+        ]
         return fits == [False, True] and _ascends(first)
 
     def place(self, what: str, count: int) -> int:
@@ -109,7 +139,11 @@ class MapReading(Checked):
         if self.frame is None and count == 1:
             return 0
         if self.frame is None or self.frame >= count:
-            raise InvalidValueError("frame", f"be one of the {count} frames of {what}, 0 to {count - 1}", self.frame)
+            raise InvalidValueError(
+                "frame",
+                f"be one of the {count} frames of {what}, 0 to {count - 1}",
+                self.frame,
+            )
         return self.frame
 
     def pressures(self, what: str, values: np.ndarray, kind: str = "") -> np.ndarray:
@@ -126,17 +160,24 @@ class MapReading(Checked):
             paper = np.median(rim_of(values)) if _is_print(values) else values.max()
             values = np.maximum(paper - values, 0.0)
         lossy = kind in (".jpg", ".jpeg")
-        share = self.threshold if self.threshold is not None else RINGING if lossy else 0.0
+        share = (
+            self.threshold if self.threshold is not None else RINGING if lossy else 0.0
+        )
         empty = (values > 0.0) & (values <= share * values.max())
         if self.threshold is None and empty.any():
             text = f"{empty.sum()} of {(values > 0.0).sum()} cells, up to {share:g} of the peak, count as empty"
-            warnings.warn(f"{what}: {text}, as JPEG leaves traces there; threshold sets the share", stacklevel=5)
+            warnings.warn(
+                f"{what}: {text}, as JPEG leaves traces there; threshold sets the share",
+                stacklevel=5,
+            )
         return np.where(empty, 0.0, values) if empty.any() else values
 
 
 def map_reading(options: Mapping[str, Any]) -> MapReading:
     """Return the options of a map by their names. Raises InvalidValueError for other names and wrong values."""
-    validation.keys("pressure map", options, required=(), optional=MapReading.__dataclass_fields__)
+    validation.keys(
+        "pressure map", options, required=(), optional=MapReading.__dataclass_fields__
+    )
     return MapReading(**options)
 
 
@@ -151,24 +192,40 @@ def read_pressure_map(path: str | Path, **options: Any) -> np.ndarray:
     Raises FileError for a missing file, an unknown format, and content that is not what the suffix says;
     InvalidValueError for an option that breaks its rule, or has to be given.
     """
-    path, reading = validation.path("path", path), map_reading(options)
+    path = validation.path("path", path)
+    reading = map_reading(options)
     readers: dict[str, Any] = {
         ".csv": _read_csv, ".npy": _read_npy, ".npz": _read_npz, ".mat": _read_mat, ".asf": _read_tekscan,
         **dict.fromkeys(IMAGE_SUFFIXES, _read_image),
     }  # fmt: skip
     kind = path.suffix.lower()
     if kind not in readers:
-        tables, images = ".csv, .npy, .npz, .mat, .asf", ", ".join(IMAGE_SUFFIXES)
-        raise FileError(f"pressure map {path}: unknown kind {path.suffix!r}, use {tables} or a grey image ({images})")
+        tables = ".csv, .npy, .npz, .mat, .asf"
+        images = ", ".join(IMAGE_SUFFIXES)
+        raise FileError(
+            f"pressure map {path}: unknown kind {path.suffix!r}, use {tables} or a grey image ({images})"
+        )
     what = f"pressure map {path}"
     try:
-        with np.errstate(all="ignore"):  # what is no number, or too large for a float, no patch takes
+        with np.errstate(
+            all="ignore"
+        ):  # what is no number, or too large for a float, no patch takes
             values = readers[kind](path, reading)
-            if kind in ARRAYS and values.ndim == 2 and reading.labelled(values.shape[1], values[:, 0]):
+            if (
+                kind in ARRAYS
+                and values.ndim == 2
+                and reading.labelled(values.shape[1], values[:, 0])
+            ):
                 values = values[:, 1:]
-            if kind not in IMAGE_SUFFIXES and reading.frame_shape is None and getattr(values, "ndim", 0) == 2:
+            if (
+                kind not in IMAGE_SUFFIXES
+                and reading.frame_shape is None
+                and getattr(values, "ndim", 0) == 2
+            ):
                 refuse_other_tables(what, values, reading.index)
-            values = values if kind in IMAGE_SUFFIXES else reading.frame_of(what, values)
+            values = (
+                values if kind in IMAGE_SUFFIXES else reading.frame_of(what, values)
+            )
             _check_size(path, values.size)
             values = reading.pressures(what, values, kind)
             if reading.threshold is None and not reading.invert:
@@ -187,17 +244,30 @@ def read_pressure_map(path: str | Path, **options: Any) -> np.ndarray:
 
 def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
     """Read a table, or as many frames as blank lines or repeated headers part."""
-    what, rows = f"pressure map {path}", read_rows(path, "a pressure map")
+    what = f"pressure map {path}"
+    rows = read_rows(path, "a pressure map")
     line, names = next(rows, (0, []))
     names = names[: width(names)]
     if names and names[0].startswith("DATA_TYPE"):
         return _read_tekscan(path, reading)
     corner = bool(names) and _is_name(names[0]) and _are_labels(names[1:])
-    header = (all(map(_is_name, names)) and any(names)) or corner if reading.header is None else reading.header
-    if reading.header is None and not header and len(names) >= FEWEST_LABELS and _are_labels(names):
+    header = (
+        (all(map(_is_name, names)) and any(names)) or corner
+        if reading.header is None
+        else reading.header
+    )
+    if (
+        reading.header is None
+        and not header
+        and len(names) >= FEWEST_LABELS
+        and _are_labels(names)
+    ):
         raise FileError(_ambiguous(what, "row", names, "header"))
     rows = rows if header or not names else itertools.chain([(line, names)], rows)
-    first, values, blocks, last = [], array("d"), [0], None
+    first = []
+    values = array("d")
+    blocks = [0]
+    last = None
     for line, row in rows:
         cells = row if len(row) == len(names) else row[: width(row)]
         if (header and cells == names) or (last is not None and line != last + 1):
@@ -206,36 +276,61 @@ def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
         if header and cells == names:
             continue
         if len(cells) != len(names):
-            raise FileError(f"{what}: line {line} has {len(cells)} values, the first row has {len(names)}")
+            raise FileError(
+                f"{what}: line {line} has {len(cells)} values, the first row has {len(names)}"
+            )
         blocks[-1] += 1
         first.append((line, cells[0]))
-        values.extend(number(what, line, f"value {i}", cell) for i, cell in enumerate(cells[1:], 2))
+        values.extend(
+            number(what, line, f"value {i}", cell)
+            for i, cell in enumerate(cells[1:], 2)
+        )
         if len(values) + len(first) > MOST_VALUES:
             raise FileError(f"{what}: has more than {MOST_VALUES} values")
     if not first:
         raise FileError(f"{what}: the file holds no numbers")
-    table, labels = np.array(values).reshape(len(first), -1), [cell for _, cell in first]
+    table = np.array(values).reshape(len(first), -1)
+    labels = [cell for _, cell in first]
     index = reading.labelled(len(names), labels)
     if reading.frame_shape is None and header and reading.index is None:
         refuse_named(what, names)
     if not index and reading.index is None:
-        index = corner or (header and names[0] in ("", "index", "Unnamed: 0")) or all(map(_is_name, labels))
-        if not index and len(names) > 1 and len(labels) >= FEWEST_LABELS and _are_labels(labels):
+        index = (
+            corner
+            or (header and names[0] in ("", "index", "Unnamed: 0"))
+            or all(map(_is_name, labels))
+        )
+        if (
+            not index
+            and len(names) > 1
+            and len(labels) >= FEWEST_LABELS
+            and _are_labels(labels)
+        ):
             raise FileError(_ambiguous(what, "column", labels, "index"))
     if not index:
         column = [number(what, line, "value 1", cell) for line, cell in first]
         table = np.column_stack([column, table])
     blocks = [count for count in blocks if count]
-    return table if reading.frame_shape is not None else _frames(what, table, blocks, reading.frame)
+    return (
+        table
+        if reading.frame_shape is not None
+        else _frames(what, table, blocks, reading.frame)
+    )
 
 
-def _frames(what: str, table: np.ndarray, blocks: Sequence[int], frame: int | None) -> np.ndarray | list[np.ndarray]:
+def _frames(
+    what: str, table: np.ndarray, blocks: Sequence[int], frame: int | None
+) -> np.ndarray | list[np.ndarray]:
     """Return the frames of a table whose blocks of rows are parted by blank lines, or a single one as it is."""
-    if max(blocks) == 1 or len(blocks) == 1:  # a blank line behind every row, as Windows writes it, parts nothing
+    if (
+        max(blocks) == 1 or len(blocks) == 1
+    ):  # a blank line behind every row, as Windows writes it, parts nothing
         return table
     if len(set(blocks)) > 1 and frame is None:
         sizes = ", ".join(map(str, blocks[:5]))
-        raise FileError(f"{what}: blank lines part it into blocks of {sizes} rows: choose one by frame, or join them")
+        raise FileError(
+            f"{what}: blank lines part it into blocks of {sizes} rows: choose one by frame, or join them"
+        )
     return np.split(table, np.cumsum(blocks)[:-1])
 
 
@@ -255,7 +350,13 @@ def _is_name(cell: str) -> bool:
 
 def _are_labels(cells: Sequence[str]) -> bool:
     """Return True if cells are consecutive integers from 0 or 1."""
-    return any(list(cells) == [str(first + i) for i in range(len(cells))] for first in (0, 1)) and len(cells) > 0
+    return (
+        any(
+            list(cells) == [str(first + i) for i in range(len(cells))]
+            for first in (0, 1)
+        )
+        and len(cells) > 0
+    )
 
 
 def _ascends(cells: Any) -> bool:
@@ -270,13 +371,20 @@ def _read_tekscan(path: Path, _: MapReading) -> np.ndarray:
     """Read the frames of a Tekscan ASCII export, in which B stands for places without a sensor."""
     mark, body = read_text(path, "a pressure map").partition("ASCII_DATA")[1:]
     if not mark:
-        raise FileError(f"pressure map {path}: has no ASCII_DATA, as Tekscan exports have")
+        raise FileError(
+            f"pressure map {path}: has no ASCII_DATA, as Tekscan exports have"
+        )
     frames: list[list[list[float]]] = []
     for line in map(str.strip, body.splitlines()[1:]):
         if line.lower().startswith("frame") or (line and not frames and line != "@@"):
             frames.append([])
         if line and line != "@@" and not line.lower().startswith("frame"):
-            frames[-1].append([0.0 if cell.strip() == "B" else float(cell) for cell in line.split(",")])
+            frames[-1].append(
+                [
+                    0.0 if cell.strip() == "B" else float(cell)
+                    for cell in line.split(",")
+                ]
+            )
     if not any(frames):
         raise FileError(f"pressure map {path}: the file holds no numbers")
     return np.array(frames)
@@ -291,19 +399,27 @@ def _read_npy(path: Path, _: MapReading) -> np.ndarray:
 
 def _array(path: Path, content: bytes) -> np.ndarray:
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # of a damaged header, which NumPy reads as source code
+        warnings.simplefilter(
+            "error"
+        )  # of a damaged header, which NumPy reads as source code
         try:
             values = np.load(io.BytesIO(content), allow_pickle=False)
         except Warning as warning:
-            raise FileError(f"pressure map {path}: not a readable {path.suffix} file ({warning})") from None
+            raise FileError(
+                f"pressure map {path}: not a readable {path.suffix} file ({warning})"
+            ) from None
     return _real(path, values)
 
 
 def _read_npz(path: Path, _: MapReading) -> np.ndarray:
-    with zipfile.ZipFile(io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))) as archive:
+    with zipfile.ZipFile(
+        io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))
+    ) as archive:
         _only(path, archive.namelist())
         if archive.infolist()[0].file_size > MOST_BYTES:
-            raise FileError(f"pressure map {path}: its array is larger than {MOST_BYTES / 1e6:g} MB")
+            raise FileError(
+                f"pressure map {path}: its array is larger than {MOST_BYTES / 1e6:g} MB"
+            )
         return _array(path, archive.read(archive.namelist()[0]))
 
 
@@ -311,7 +427,11 @@ def _read_mat(path: Path, _: MapReading) -> np.ndarray:
     from scipy.io import loadmat, whosmat
 
     content = io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))
-    sizes = {name: math.prod(shape) for name, shape, _ in whosmat(content) if math.prod(shape) > 1}
+    sizes = {
+        name: math.prod(shape)
+        for name, shape, _ in whosmat(content)
+        if math.prod(shape) > 1
+    }
     name = _only(path, list(sizes))
     if sizes[name] > MOST_VALUES:
         raise FileError(f"pressure map {path}: has more than {MOST_VALUES} values")
@@ -322,14 +442,18 @@ def _read_mat(path: Path, _: MapReading) -> np.ndarray:
 def _only(path: Path, names: Sequence[str]) -> str:
     if len(names) != 1:
         found = shown(", ".join(names)) or "none"
-        text = f"the file must hold one array, it has {found}: read it, and pass the array"
+        text = (
+            f"the file must hold one array, it has {found}: read it, and pass the array"
+        )
         raise FileError(f"pressure map {path}: {text}")
     return names[0]
 
 
 def _real(path: Path, values: Any) -> np.ndarray:
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "biuf":
-        raise FileError(f"pressure map {path}: the file must hold one array of real numbers")
+        raise FileError(
+            f"pressure map {path}: the file must hold one array of real numbers"
+        )
     return values.astype(float)
 
 
@@ -340,7 +464,10 @@ def _read_image(path: Path, reading: MapReading) -> np.ndarray:
     from PIL import Image
 
     what = f"pressure map {path}"
-    with warnings.catch_warnings(), Image.open(io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))) as image:
+    with (
+        warnings.catch_warnings(),
+        Image.open(io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))) as image,
+    ):
         warnings.simplefilter("error", Image.DecompressionBombWarning)
         pages = getattr(image, "n_frames", 1)
         page = reading.place(what, pages)
@@ -349,22 +476,31 @@ def _read_image(path: Path, reading: MapReading) -> np.ndarray:
         _check_size(path, math.prod(image.size))
         if image.mode in GREY_MODES:
             return np.asarray(image, dtype=float)
-        red, green, blue, alpha = np.moveaxis(np.asarray(image.convert("RGBA"), dtype=float), -1, 0)
+        red, green, blue, alpha = np.moveaxis(
+            np.asarray(image.convert("RGBA"), dtype=float), -1, 0
+        )
     if not ((red == green).all() and (red == blue).all()):
         text = "this is a colour image; if its brightness means pressure, save it in grey (in Pillow: convert('L'))"
         raise FileError(f"{what}: {text}")
     if not (alpha == 255).all():
-        raise FileError(f"{what}: the image is partly transparent; save it without transparency")
+        raise FileError(
+            f"{what}: the image is partly transparent; save it without transparency"
+        )
     return red
 
 
 def _is_print(values: np.ndarray) -> bool:
     """Return True if the rim of an image is bright and some of its inside dark, as of dark on paper."""
     peak = values.max()
-    return bool(np.mean(rim_of(values) >= BRIGHT * peak) >= PAPER and (values < INK * peak).any())
+    return bool(
+        np.mean(rim_of(values) >= BRIGHT * peak) >= PAPER
+        and (values < INK * peak).any()
+    )
 
 
 def _check_size(path: Path, cells: int) -> None:
     """Raise, before memory is asked for, where a map has more cells than a patch may have."""
     if cells > MOST_CELLS:
-        raise FileError(f"pressure map {path}: has more than {MOST_CELLS} cells, the maximum for a patch")
+        raise FileError(
+            f"pressure map {path}: has more than {MOST_CELLS} cells, the maximum for a patch"
+        )

@@ -63,11 +63,19 @@ def refuse_other_tables(what: str, table: np.ndarray, index: bool | None) -> Non
     with np.errstate(all="ignore"):
         if not (table.size and np.isfinite(table).all()):
             return
-        if table.shape[1] == 3 and (_are_places(table[:, :2]) or _are_places(table[:, 1:])):
-            raise FileError(f"{_list_of_places(what)} (frame_shape = {list(table.shape)}: it is a map)")
+        if table.shape[1] == 3 and (
+            _are_places(table[:, :2]) or _are_places(table[:, 1:])
+        ):
+            raise FileError(
+                f"{_list_of_places(what)} (frame_shape = {list(table.shape)}: it is a map)"
+            )
         steady = np.array([_is_steady(column) for column in table.T])
         others = steady[1:] | (np.ptp(table[:, 1:], axis=0) == 0.0)
-        if index is None and steady[0] and (not others.all() or _are_frames(table[:, 1:])):
+        if (
+            index is None
+            and steady[0]
+            and (not others.all() or _are_frames(table[:, 1:]))
+        ):
             shown = ", ".join(f"{value:g}" for value in table[:3, 0])
             text = "labels (index = true), times (frame_shape = [rows, columns]) or pressures (index = false)?"
             raise FileError(f"{what}: the first column is {shown}, ...: {text}")
@@ -83,9 +91,15 @@ def remark_offset(what: str, values: np.ndarray) -> None:
     rim = rim_of(values)
     level = float(np.median(rim))
     above = float(values.max()) - level
-    if above > 0.0 and np.mean(rim > 0.0) >= RIM and np.mean(np.abs(rim - level) <= FLAT * above) >= RIM:
+    if (
+        above > 0.0
+        and np.mean(rim > 0.0) >= RIM
+        and np.mean(np.abs(rim - level) <= FLAT * above) >= RIM
+    ):
         share = np.ceil(100.0 * (level + FLAT * above) / values.max()) / 100.0
-        text = f"its rim is flat at {level:g} of {values.max():g}, and counts as contact"
+        text = (
+            f"its rim is flat at {level:g} of {values.max():g}, and counts as contact"
+        )
         remedy = f"subtract an offset of the sensor, or leave out such cells by threshold = {share:g}"
         warnings.warn(f"{what}: {text}; {remedy}", stacklevel=5)
 
@@ -109,7 +123,11 @@ def _are_places(pairs: np.ndarray) -> bool:
         return False
     for column in pairs.T:
         values = np.unique(column)
-        if len(values) < 2 or 2 * len(values) > len(pairs) or not _are_equal(np.diff(values)):
+        if (
+            len(values) < 2
+            or 2 * len(values) > len(pairs)
+            or not _are_equal(np.diff(values))
+        ):
             return False
     return True
 
@@ -128,7 +146,11 @@ def _are_frames(table: np.ndarray) -> bool:
     """Return True if all rows with a load are one pattern, at different loads, with several humps."""
     sums = table.sum(axis=1)
     rows = table[sums > LOADED * sums.max()]
-    if len(rows) < FEWEST_FRAMES or np.ptp(rows.sum(axis=1)) == 0.0 or _humps(rows.mean(axis=0)) < HUMPS:
+    if (
+        len(rows) < FEWEST_FRAMES
+        or np.ptp(rows.sum(axis=1)) == 0.0
+        or _humps(rows.mean(axis=0)) < HUMPS
+    ):
         return False
     some = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_FRAMES)).astype(int)]
     first, second = np.linalg.svd(some / some.max(), compute_uv=False)[:2]

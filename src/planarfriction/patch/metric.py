@@ -34,7 +34,10 @@ def friction_metric(angle: float, along: float, across: float) -> np.ndarray:
     Raises InvalidValueError for an angle that is not finite, and for frictions that are not > 0.
     """
     angle = validation.number("angle", angle)
-    squares = [validation.positive("along", along) ** 2, validation.positive("across", across) ** 2]
+    squares = [
+        validation.positive("along", along) ** 2,
+        validation.positive("across", across) ** 2,
+    ]
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     return _symmetric((turn * squares) @ turn.T)
 
@@ -48,7 +51,9 @@ class Anisotropy(ByValue):
     asymmetry: Any = None
     """Asymmetry `a`, `[2]` or one per cell `[N, 2]` [-], `|a| < 1`; None: the same forwards and backwards."""
 
-    def with_friction_metric(self: _PatchT, metric: Any, asymmetry: Any = None) -> _PatchT:
+    def with_friction_metric(
+        self: _PatchT, metric: Any, asymmetry: Any = None
+    ) -> _PatchT:
         """Return the same patch with friction that depends on the direction; None and None for friction that does not.
 
         `metric` `M`: sliding along a unit vector e meets the coefficient `mu sqrt(e' M e)`; see `friction_metric`.
@@ -79,7 +84,8 @@ class Anisotropy(ByValue):
         disc, all have a third row `(0, 0, kappa a_i)` with the `lever_radii` a and `kappa^2 = 1/2`: `[N, 3, 3]`.
         """
         x, y = self.positions.T  # pyright: ignore[reportAttributeAccessIssue]
-        one, zero = np.ones_like(x), np.zeros_like(x)
+        one = np.ones_like(x)
+        zero = np.zeros_like(x)
         plain = np.moveaxis(np.array([[one, zero, -y], [zero, one, x]]), -1, 0)
         levers = plain if self.root is None else self.root @ plain
         if not self.has_discs:
@@ -102,12 +108,20 @@ class Anisotropy(ByValue):
     def lever_radii(self) -> np.ndarray:
         """Radii `[N]` [m] of the cells in the space of the metric M, `a sqrt(tr M/2)`; those of points are 0."""
         radii = self.radii  # pyright: ignore[reportAttributeAccessIssue]
-        return radii if self.root is None else radii * np.sqrt(0.5 * (self.root**2).sum((-2, -1)))
+        return (
+            radii
+            if self.root is None
+            else radii * np.sqrt(0.5 * (self.root**2).sum((-2, -1)))
+        )
 
     def asymmetries(self) -> np.ndarray:
         """Return the asymmetry `a_i` of each cell, shape `[N, 2]`; zeros where there is none."""
         shape = self.positions.shape  # pyright: ignore[reportAttributeAccessIssue]
-        return np.zeros(shape) if self.asymmetry is None else np.broadcast_to(self.asymmetry, shape).copy()
+        return (
+            np.zeros(shape)
+            if self.asymmetry is None
+            else np.broadcast_to(self.asymmetry, shape).copy()
+        )
 
     @functools.cached_property
     def root(self) -> np.ndarray | None:
@@ -117,14 +131,18 @@ class Anisotropy(ByValue):
         root = symmetric_root(self.metric)
         return root[0] if root.ndim == 3 and (root == root[0]).all() else root
 
-    def lever_coordinates(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def lever_coordinates(
+        self, x: np.ndarray, y: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return `(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: a cell sees a spin as if it stood there.
 
         For a metric per cell the last axis of `x` and `y` runs over all cells of the patch.
         """
         if self.root is None:
             return x, y
-        xx, xy, yy = self.root[..., 0, 0], self.root[..., 0, 1], self.root[..., 1, 1]
+        xx = self.root[..., 0, 0]
+        xy = self.root[..., 0, 1]
+        yy = self.root[..., 1, 1]
         return yy * x - xy * y, xx * y - xy * x
 
     def _check_anisotropy(self, kept: np.ndarray) -> None:
@@ -149,20 +167,35 @@ class Anisotropy(ByValue):
 def symmetric_root(metric: np.ndarray) -> np.ndarray:
     """Return `L` with `L L = M`, symmetric and positive definite, for metrics `[..., 2, 2]`."""
     values, axes = np.linalg.eigh(metric)
-    return _symmetric((axes * np.sqrt(values)[..., None, :]) @ np.swapaxes(axes, -1, -2))
+    return _symmetric(
+        (axes * np.sqrt(values)[..., None, :]) @ np.swapaxes(axes, -1, -2)
+    )
 
 
 def refuse_anisotropy(patch: Anisotropy, by: str) -> None:
     """Raise where `by`, which knows only friction that is the same in all directions, is given other friction."""
-    if isinstance(patch, Anisotropy) and patch.anisotropic:  # what is no patch at all has its own error
-        raise InvalidValueError("patch", f"have the same friction in all directions for {by}", "a friction metric")
+    if (
+        isinstance(patch, Anisotropy) and patch.anisotropic
+    ):  # what is no patch at all has its own error
+        raise InvalidValueError(
+            "patch",
+            f"have the same friction in all directions for {by}",
+            "a friction metric",
+        )
 
 
 def refuse_cell_metrics(patch: Anisotropy, by: str) -> None:
     """Raise where `by`, which knows one metric and one asymmetry for all cells, is given one for each cell."""
-    different = patch.asymmetry is not None and (patch.asymmetries() != patch.asymmetries()[0]).any()
+    different = (
+        patch.asymmetry is not None
+        and (patch.asymmetries() != patch.asymmetries()[0]).any()
+    )
     if different or (patch.root is not None and patch.root.ndim == 3):
-        raise InvalidValueError("patch", f"have one friction metric and asymmetry for all cells for {by}", "one a cell")
+        raise InvalidValueError(
+            "patch",
+            f"have one friction metric and asymmetry for all cells for {by}",
+            "one a cell",
+        )
 
 
 def same_metric(one: Anisotropy, other: Anisotropy) -> bool:
@@ -178,9 +211,13 @@ def _symmetric(matrix: np.ndarray) -> np.ndarray:
 
 def _positive_definite(metric: np.ndarray) -> np.ndarray:
     """Return the metrics `[..., 2, 2]`, exactly symmetric, or raise an error that shows the first bad one."""
-    skew = np.abs(metric[..., 0, 1] - metric[..., 1, 0]) > _SAME * np.abs(metric).max(axis=(-1, -2))
+    skew = np.abs(metric[..., 0, 1] - metric[..., 1, 0]) > _SAME * np.abs(metric).max(
+        axis=(-1, -2)
+    )
     lowest = np.linalg.eigvalsh(_symmetric(metric))[..., 0]
     bad = skew | ~(lowest > 0.0)
     if bad.any():
-        raise InvalidValueError("metric", "be symmetric and positive definite", metric[bad][0].tolist())
+        raise InvalidValueError(
+            "metric", "be symmetric and positive definite", metric[bad][0].tolist()
+        )
     return _symmetric(metric)

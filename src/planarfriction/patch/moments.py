@@ -25,7 +25,9 @@ def disc_friction(slide: Any, spin: Any) -> tuple[np.ndarray, np.ndarray, np.nda
     Friction is `W/S`, `W = (c_t u, c_s kappa a omega)` (see `formulas.disc_friction`).
     """
     total = np.asarray(slide + spin)
-    per = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)  # shares of the sum keep in range
+    per = np.divide(
+        1.0, total, out=np.zeros_like(total), where=total > 0.0
+    )  # shares of the sum keep in range
     c_t, c_s, m = formulas.disc_friction(np, slide * per, spin * per)
     return c_t, c_s, np.sqrt(slide + m * spin)
 
@@ -59,12 +61,16 @@ class Moments(Anisotropy):
         Raises InvalidValueError without a load that is needed, as all sums here.
         """
         weights = self.weights(normal_force)
-        return np.stack([(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1)
+        return np.stack(
+            [(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1
+        )
 
     @overload
     def contact_radius(self, normal_force: float | None = None) -> float: ...
     @overload
-    def contact_radius(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
+    def contact_radius(
+        self, normal_force: np.ndarray | Sequence[Any]
+    ) -> np.ndarray: ...
     def contact_radius(self, normal_force: Any = None) -> Any:
         """Return the contact radius `r = sum(w |rho - CoP|)` [m]: a spin about the CoP has the torque `mu f_N r`.
 
@@ -95,7 +101,9 @@ class Moments(Anisotropy):
         """Return the area of the cells under load [m^2]."""
         return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
 
-    def moments(self, degree: int, normal_force: ArrayLike | None = None, *, about: Any = None) -> np.ndarray:
+    def moments(
+        self, degree: int, normal_force: ArrayLike | None = None, *, about: Any = None
+    ) -> np.ndarray:
         """Return the moments of the pressure `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
 
         Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
@@ -112,7 +120,9 @@ class Moments(Anisotropy):
                 result[..., i, j] = (weights * dx**i * dy**j).sum(-1)
         return result
 
-    def _about_centre_of_pressure(self, normal_force: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _about_centre_of_pressure(
+        self, normal_force: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the weights and both coordinates of the cells relative to the CoP, each of shape `[..., N]`."""
         weights = self.weights(normal_force)
         dx, dy = ((x - (weights * x).sum(-1, keepdims=True)) for x in self.positions.T)

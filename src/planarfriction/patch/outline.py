@@ -24,13 +24,18 @@ SLIVER = 1e-12
 """Share of a box below which the part inside an outline is rounding noise of the clipping, and no cell."""
 
 
-def columns_and_rows(cells: int | Sequence[int], width: float, height: float) -> tuple[int, int]:
+def columns_and_rows(
+    cells: int | Sequence[int], width: float, height: float
+) -> tuple[int, int]:
     """Return the number of columns and rows on a box of `width` x `height` [m].
 
     A pair is taken as it is; one number counts the cells along the longer side, and the shorter side gets as many as
     keep the cells closest to square.
     """
-    if not (isinstance(cells, (list, tuple)) or (isinstance(cells, np.ndarray) and cells.ndim)):
+    if not (
+        isinstance(cells, (list, tuple))
+        or (isinstance(cells, np.ndarray) and cells.ndim)
+    ):
         along = validation.count("cells", cells, at_most=MOST_CELLS)
         side = max(width, height) / along
         return max(1, round(width / side)), max(1, round(height / side))
@@ -46,7 +51,11 @@ def circle(radius: float) -> np.ndarray:
     """
     step = 2 * math.pi / CIRCLE_SIDES
     angle = (np.arange(CIRCLE_SIDES) + 0.5) * step
-    return radius * math.sqrt(step / math.sin(step)) * np.stack([np.cos(angle), np.sin(angle)], -1)
+    return (
+        radius
+        * math.sqrt(step / math.sin(step))
+        * np.stack([np.cos(angle), np.sin(angle)], -1)
+    )
 
 
 def clip(outline: Any, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -97,7 +106,14 @@ class PolygonOutline(ByValue):
     def triangles(self) -> np.ndarray:
         """Return triangles `[M - 2, 3, 2]` [m] from the first vertex; their signed sum is the polygon."""
         others = self.vertices[1:]
-        return np.stack([np.broadcast_to(self.vertices[0], others[1:].shape), others[:-1], others[1:]], 1)
+        return np.stack(
+            [
+                np.broadcast_to(self.vertices[0], others[1:].shape),
+                others[:-1],
+                others[1:],
+            ],
+            1,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the outline as plain data, which `outline_from_dict` reads."""
@@ -130,20 +146,28 @@ def outline_from_dict(data: Any) -> Outline | None:
     if data is None:
         return None
     if not isinstance(data, Mapping) or list(data) not in (["vertices"], ["radii"]):
-        raise InvalidValueError("outline", "be a table with either vertices or radii", data)
+        raise InvalidValueError(
+            "outline", "be a table with either vertices or radii", data
+        )
     if "vertices" in data:
         return polygon_outline(data["vertices"])
     inner, outer = validation.vector("radii", data["radii"], 2).tolist()
     if not 0.0 <= inner < outer:
-        raise InvalidValueError("radii", "be (inner, outer) with 0 <= inner < outer", f"{inner} and {outer}")
+        raise InvalidValueError(
+            "radii", "be (inner, outer) with 0 <= inner < outer", f"{inner} and {outer}"
+        )
     return RoundOutline(inner, outer)
 
 
 def polygon_outline(vertices: Any) -> PolygonOutline:
     """Return the outline with those `vertices` `[M, 2]` [m]."""
-    vertices = validation.array("vertices", vertices, (None, 2), largest=validation.LONGEST)
+    vertices = validation.array(
+        "vertices", vertices, (None, 2), largest=validation.LONGEST
+    )
     if len(vertices) < 3:
-        raise InvalidValueError("vertices", "hold at least 3 points", f"{len(vertices)}")
+        raise InvalidValueError(
+            "vertices", "hold at least 3 points", f"{len(vertices)}"
+        )
     vertices.setflags(write=False)
     return PolygonOutline(vertices)
 
@@ -154,16 +178,26 @@ def with_outline(patch: ContactPatch, outline: Outline | None) -> ContactPatch:
     return patch
 
 
-def clipped(kind: type[ContactPatch], outline: Outline, grid: Grid, pressure: Any, name: str) -> ContactPatch:
+def clipped(
+    kind: type[ContactPatch], outline: Outline, grid: Grid, pressure: Any, name: str
+) -> ContactPatch:
     """Return a patch of the parts of the grid's boxes inside an outline."""
     import shapely
 
     polygon = shapely.Polygon(*outline.rims())
     if not polygon.is_valid:
-        raise InvalidValueError("vertices", "form a simple polygon", shapely.is_valid_reason(polygon))
+        raise InvalidValueError(
+            "vertices", "form a simple polygon", shapely.is_valid_reason(polygon)
+        )
     try:
         positions, areas = clip(polygon, grid)
-    except shapely.errors.GEOSException as error:  # rounding of coordinates far apart in size
-        raise InvalidValueError("vertices", "form a polygon that can be cut into cells", str(error)) from None
+    except (
+        shapely.errors.GEOSException
+    ) as error:  # rounding of coordinates far apart in size
+        raise InvalidValueError(
+            "vertices", "form a polygon that can be cut into cells", str(error)
+        ) from None
     shares = point_shares(positions, areas, (grid.cell_width, grid.cell_height))
-    return with_outline(kind(positions, areas, pressure, grid, name, point_shares=shares), outline)
+    return with_outline(
+        kind(positions, areas, pressure, grid, name, point_shares=shares), outline
+    )

@@ -30,14 +30,18 @@ class Pressure(Checked):
         """True if the shape of the pressure, and not only its scale, changes with the normal force."""
         return False
 
-    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+    def relative(
+        self, positions: np.ndarray, normal_force: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return the relative pressure at `positions` `[N, 2]` [m], at any scale [-].
 
         Shape `[N]`; for laws that depend on the load `[..., N]` for `normal_force` `[...]`, all > 0 [N].
         """
         raise NotImplementedError
 
-    def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
+    def ever_loaded(
+        self, positions: np.ndarray, between: tuple[float, float] | None = None
+    ) -> np.ndarray:
         """Return which of `positions` `[N, 2]` [m] can carry pressure at any load, or one `between` two [N], `[N]`."""
         return self.relative(positions) > 0.0
 
@@ -51,9 +55,15 @@ class Pressure(Checked):
 
     def to_dict(self) -> dict[str, Any] | list[float]:
         """Return the law as plain data: `{"law": name, parameter: value, ...}`, or a list of one pressure per cell."""
-        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # pyright: ignore
+        fields = {
+            field.name: getattr(self, field.name) for field in dataclasses.fields(self)
+        }  # pyright: ignore
         given = {name: value for name, value in fields.items() if value is not None}
-        lists = {name: np.asarray(v).tolist() for name, v in given.items() if isinstance(v, (tuple, np.ndarray))}
+        lists = {
+            name: np.asarray(v).tolist()
+            for name, v in given.items()
+            if isinstance(v, (tuple, np.ndarray))
+        }
         return {"law": self.law, **given, **lists}
 
     @staticmethod
@@ -63,12 +73,21 @@ class Pressure(Checked):
         Raises InvalidValueError if this is not such a table, or the law does not exist.
         """
         if not isinstance(data, Mapping) or "law" not in data:
-            raise InvalidValueError("pressure", f"be a table with law = {' or '.join(PRESSURES)}", data)
+            raise InvalidValueError(
+                "pressure", f"be a table with law = {' or '.join(PRESSURES)}", data
+            )
         kind = PRESSURES.choose(data["law"])
         given = {name: value for name, value in data.items() if name != "law"}
         fields = dataclasses.fields(kind)
-        required = [field.name for field in fields if field.default is dataclasses.MISSING]
-        validation.keys(f"{kind.law} pressure", given, required=required, optional=[field.name for field in fields])
+        required = [
+            field.name for field in fields if field.default is dataclasses.MISSING
+        ]
+        validation.keys(
+            f"{kind.law} pressure",
+            given,
+            required=required,
+            optional=[field.name for field in fields],
+        )
         return kind(**given)
 
 
@@ -78,7 +97,9 @@ class Uniform(Pressure):
 
     law = "uniform"
 
-    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+    def relative(
+        self, positions: np.ndarray, normal_force: np.ndarray | None = None
+    ) -> np.ndarray:
         return np.ones(len(positions))
 
 
@@ -96,9 +117,13 @@ class LinearGradient(Pressure):
     """(gx, gy): change of the pressure per metre, relative to the pressure at the origin [1/m]."""
 
     def __post_init__(self) -> None:
-        self._set(gradient=tuple(validation.vector("gradient", self.gradient, 2).tolist()))
+        self._set(
+            gradient=tuple(validation.vector("gradient", self.gradient, 2).tolist())
+        )
 
-    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+    def relative(
+        self, positions: np.ndarray, normal_force: np.ndarray | None = None
+    ) -> np.ndarray:
         gx, gy = self.gradient
         return 1.0 + gx * positions[:, 0] + gy * positions[:, 1]
 
@@ -131,10 +156,16 @@ class SoftFinger(Pressure):
     def __post_init__(self) -> None:
         if (self.k is None) == (self.k_per_newton is None):
             given = f"k={shown(self.k)}, k_per_newton={shown(self.k_per_newton)}"
-            raise InvalidValueError("SoftFinger", "have exactly one of k and k_per_newton", given)
+            raise InvalidValueError(
+                "SoftFinger", "have exactly one of k and k_per_newton", given
+            )
         super().__post_init__()
         if self.n > 1.0:
-            raise InvalidValueError("n", "be at most 1: a contact does not grow faster than its load", self.n)
+            raise InvalidValueError(
+                "n",
+                "be at most 1: a contact does not grow faster than its load",
+                self.n,
+            )
 
     @property
     def depends_on_load(self) -> bool:
@@ -145,27 +176,39 @@ class SoftFinger(Pressure):
 
         Raises InvalidValueError for a load below zero.
         """
-        return self._radius(validation.non_negative_numbers("normal_force", normal_force))
+        return self._radius(
+            validation.non_negative_numbers("normal_force", normal_force)
+        )
 
     def _radius(self, load: np.ndarray) -> np.ndarray:
-        with np.errstate(over="ignore", under="ignore"):  # a radius of 0 would divide by zero
+        with np.errstate(
+            over="ignore", under="ignore"
+        ):  # a radius of 0 would divide by zero
             radius = np.maximum(self.c * load**self.n, validation.SMALLEST)
-        return radius if self.radius_max is None else np.minimum(radius, self.radius_max)
+        return (
+            radius if self.radius_max is None else np.minimum(radius, self.radius_max)
+        )
 
     def exponent(self, normal_force: ArrayLike) -> np.ndarray:
         """Return the exponent `k` of the profile [-] at `normal_force` `[...]` [N].
 
         Raises InvalidValueError for a load below zero.
         """
-        return self._exponent(validation.non_negative_numbers("normal_force", normal_force))
+        return self._exponent(
+            validation.non_negative_numbers("normal_force", normal_force)
+        )
 
     def _exponent(self, load: np.ndarray) -> np.ndarray:
         if self.k_per_newton is None:
             return np.full_like(load, self.k)
         return np.maximum(self.k_per_newton * load, validation.SMALLEST)
 
-    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
-        load = np.asarray(1.0 if normal_force is None else normal_force, dtype=float)[..., None]
+    def relative(
+        self, positions: np.ndarray, normal_force: np.ndarray | None = None
+    ) -> np.ndarray:
+        load = np.asarray(1.0 if normal_force is None else normal_force, dtype=float)[
+            ..., None
+        ]
         k = self._exponent(load)
         distance = np.hypot(positions[:, 0], positions[:, 1])
         ratio = distance / self._radius(load)
@@ -175,16 +218,22 @@ class SoftFinger(Pressure):
         with np.errstate(divide="ignore"):
             profile = formulas.soft_finger(np, np.where(inside, ratio, 0.5), k)
         profile = np.where(inside, profile, -np.inf)
-        profile = np.where(inside.any(-1, keepdims=True), profile, np.where(nearest, 0.0, -np.inf))
+        profile = np.where(
+            inside.any(-1, keepdims=True), profile, np.where(nearest, 0.0, -np.inf)
+        )
         return np.exp((profile - profile.max(-1, keepdims=True)) / k)
 
-    def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
+    def ever_loaded(
+        self, positions: np.ndarray, between: tuple[float, float] | None = None
+    ) -> np.ndarray:
         if not self.depends_on_load:
             return super().ever_loaded(positions)
         distance = np.hypot(positions[:, 0], positions[:, 1])
         highest = np.inf if between is None else between[1]
         largest = self._radius(np.array(1.0 if self.n == 0.0 else highest))
-        return (distance < largest) | (distance <= distance.min() * (1.0 + SAME_DISTANCE))
+        return (distance < largest) | (
+            distance <= distance.min() * (1.0 + SAME_DISTANCE)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,10 +251,16 @@ class PerCell(ByValue, Pressure):
         values.setflags(write=False)
         self._set(values=values)
 
-    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+    def relative(
+        self, positions: np.ndarray, normal_force: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return the pressures of the cells, `[N]`. Raises InvalidValueError for another number of positions."""
         if len(self.values) != len(positions):
-            raise InvalidValueError("pressure", f"have shape [{len(positions)}]", f"shape [{len(self.values)}]")
+            raise InvalidValueError(
+                "pressure",
+                f"have shape [{len(positions)}]",
+                f"shape [{len(self.values)}]",
+            )
         return self.values
 
     def only(self, kept: np.ndarray) -> PerCell:
@@ -234,21 +289,31 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
 
 def pressure_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
     """Return relative pressures as a new float array; a mask is taken as zeros and ones, and any scale will do."""
-    if isinstance(value, np.ndarray) and value.dtype.kind == "b" and not isinstance(value, np.ma.MaskedArray):
+    if (
+        isinstance(value, np.ndarray)
+        and value.dtype.kind == "b"
+        and not isinstance(value, np.ma.MaskedArray)
+    ):
         value = value.astype(float)
     return validation.array(name, value, shape, largest=np.inf)
 
 
-def evaluated(name: str, function: Callable[..., Any], points: list[list[float]]) -> list[Any]:
+def evaluated(
+    name: str, function: Callable[..., Any], points: list[list[float]]
+) -> list[Any]:
     """Return the values of a function that a user gave as `name`, at each of the points."""
     try:
         return [function(*point) for point in points]
     except Exception as error:
         wanted = f"be a function of {' and '.join('xy'[: len(points[0])])} [m] that gives a number"
-        raise InvalidValueError(name, wanted, f"{type(error).__name__}: {error}") from error
+        raise InvalidValueError(
+            name, wanted, f"{type(error).__name__}: {error}"
+        ) from error
 
 
-def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+def non_negative_array(
+    name: str, value: Any, shape: tuple[int | None, ...]
+) -> np.ndarray:
     """Return relative pressures as `pressure_array` does, or raise an error that shows the first below zero."""
     values = pressure_array(name, value, shape)
     return validation.non_negative_array(name, values, values.shape, largest=np.inf)
@@ -256,8 +321,15 @@ def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...]) -> 
 
 def check_pressure(values: np.ndarray, positions: np.ndarray) -> None:
     """Raise where a pressure is not finite or negative, naming the cell."""
-    for rule, broken in (("be finite", ~np.isfinite(values)), ("be >= 0", values < 0.0)):
+    for rule, broken in (
+        ("be finite", ~np.isfinite(values)),
+        ("be >= 0", values < 0.0),
+    ):
         if broken.any():
             index = int(broken.argmax())
             x, y = positions[index].tolist()
-            raise InvalidValueError("pressure", rule, f"{values[index]} at index {index}, position ({x:g}, {y:g}) m")
+            raise InvalidValueError(
+                "pressure",
+                rule,
+                f"{values[index]} at index {index}, position ({x:g}, {y:g}) m",
+            )

@@ -20,7 +20,10 @@ from planarfriction.patch.pressure import Pressure, non_negative_array
 
 def title(path: str | Path) -> str:
     """Return the name of the patch of a map: that of its file, with ? for what cannot be printed."""
-    return "".join(each if each.isprintable() else "?" for each in Path(path).stem).strip() or "map"
+    return (
+        "".join(each if each.isprintable() else "?" for each in Path(path).stem).strip()
+        or "map"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +49,9 @@ class PressureMaps(ByValue, Pressure):
         peak = values.max(axis=1, initial=0.0)
         if not (peak > 0.0).all():
             given = f"0 at {loads[peak.argmin()]:g} N"
-            raise InvalidValueError("pressure values", "have a total > 0 at every load", given)
+            raise InvalidValueError(
+                "pressure values", "have a total > 0 at every load", given
+            )
         for each in (loads, values):
             each.setflags(write=False)
         self._set(loads=loads, values=values)
@@ -55,29 +60,42 @@ class PressureMaps(ByValue, Pressure):
     @functools.cached_property
     def _shares(self) -> np.ndarray:
         """Share of each cell in the total of its map, `[L, N]`."""
-        shares = self.values / self.values.max(axis=1, keepdims=True)  # first, so that no sum can overflow
+        shares = self.values / self.values.max(
+            axis=1, keepdims=True
+        )  # first, so that no sum can overflow
         return shares / shares.sum(axis=1, keepdims=True)
 
     @property
     def depends_on_load(self) -> bool:
         return len(self.loads) > 1
 
-    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+    def relative(
+        self, positions: np.ndarray, normal_force: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return the relative pressures of the cells at the loads, `[..., N]`. Raises InvalidValueError for another
         number of positions, and for a load below zero."""
         if self.values.shape[1] != len(positions):
-            raise InvalidValueError("pressure", f"have shape [L, {len(positions)}]", f"shape {list(self.values.shape)}")
+            raise InvalidValueError(
+                "pressure",
+                f"have shape [L, {len(positions)}]",
+                f"shape {list(self.values.shape)}",
+            )
         if not self.depends_on_load:
             return self._shares[0]
-        load = np.asarray(self.loads[0] if normal_force is None else normal_force, dtype=float)
+        load = np.asarray(
+            self.loads[0] if normal_force is None else normal_force, dtype=float
+        )
         place = np.interp(load, self.loads, np.arange(len(self.loads)))
         below = np.minimum(place.astype(int), len(self.loads) - 2)
         share = (place - below)[..., None]
         return (1.0 - share) * self._shares[below] + share * self._shares[below + 1]
 
-    def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
+    def ever_loaded(
+        self, positions: np.ndarray, between: tuple[float, float] | None = None
+    ) -> np.ndarray:
         self.relative(positions)
-        first, last = 0, len(self.loads) - 1
+        first = 0
+        last = len(self.loads) - 1
         if between is not None:
             first = max(int(np.searchsorted(self.loads, between[0], "right")) - 1, 0)
             last = min(int(np.searchsorted(self.loads, between[1])), last)
@@ -90,7 +108,9 @@ class PressureMaps(ByValue, Pressure):
         return PressureMaps(self.loads, np.repeat(self.values, times, axis=1))
 
 
-def read_maps(pressure: Any, loads: Any = None, **options: Any) -> tuple[Any, tuple[int, int], str | None]:
+def read_maps(
+    pressure: Any, loads: Any = None, **options: Any
+) -> tuple[Any, tuple[int, int], str | None]:
     """Return the pressure law or numbers, `(rows, columns)` and the name of one map, or of several with `loads` [N].
 
     A map is an array `[rows, columns]` or the path of a file; several are a stack, a list, or a mapping by load.
@@ -99,8 +119,13 @@ def read_maps(pressure: Any, loads: Any = None, **options: Any) -> tuple[Any, tu
     reading = map_reading(options)
     if isinstance(pressure, Mapping):
         if loads is not None:
-            raise InvalidValueError("loads", "be left out, because the mapping has them", loads)
-        loads = sorted(pressure, key=lambda load: validation.positive("load of a pressure map", load))
+            raise InvalidValueError(
+                "loads", "be left out, because the mapping has them", loads
+            )
+        loads = sorted(
+            pressure,
+            key=lambda load: validation.positive("load of a pressure map", load),
+        )
         pressure = [pressure[load] for load in loads]
     if loads is None:
         values, name = _one_map(pressure, reading)
@@ -108,14 +133,24 @@ def read_maps(pressure: Any, loads: Any = None, **options: Any) -> tuple[Any, tu
             raise InvalidValueError(_what(pressure), "have a total > 0", "0")
         return values.ravel(), values.shape, name
     loads = validation.array("loads", loads, (None,))
-    count = 1 if isinstance(pressure, (str, Path)) or not hasattr(pressure, "__len__") else len(pressure)
+    count = (
+        1
+        if isinstance(pressure, (str, Path)) or not hasattr(pressure, "__len__")
+        else len(pressure)
+    )
     if count != len(loads) or isinstance(pressure, (str, Path)):
-        raise InvalidValueError("pressure", f"have one map for each of {len(loads)} loads", count)
+        raise InvalidValueError(
+            "pressure", f"have one map for each of {len(loads)} loads", count
+        )
     maps = [_one_map(each, reading) for each in pressure]
     shape = maps[0][0].shape if maps else (0, 0)
     for each, (values, _) in zip(pressure, maps, strict=True):
         if values.shape != shape:
-            raise InvalidValueError(_what(each), f"have the shape of the first, {list(shape)}", list(values.shape))
+            raise InvalidValueError(
+                _what(each),
+                f"have the shape of the first, {list(shape)}",
+                list(values.shape),
+            )
     stack = [values.ravel() for values, _ in maps]
     return PressureMaps(loads, stack if stack else np.empty((0, 0))), shape, maps[0][1]
 
@@ -126,23 +161,37 @@ def map_grid(rows: int, columns: int, cell_size: Any, width: Any) -> Grid:
     Raises InvalidValueError unless one of both is given, and > 0.
     """
     if (cell_size is None) == (width is None):
-        raise InvalidValueError("cell_size", "be given, or else the width of the whole map", cell_size)
-    cell_size = validation.length("width", width) / columns if cell_size is None else cell_size
+        raise InvalidValueError(
+            "cell_size", "be given, or else the width of the whole map", cell_size
+        )
+    cell_size = (
+        validation.length("width", width) / columns if cell_size is None else cell_size
+    )
     size = validation.numbers("cell_size", cell_size)
     size = validation.array("cell_size", size, (2,) if size.ndim else ())
-    width, height = np.broadcast_to([validation.length("cell_size", side) for side in size.flat], 2)
+    width, height = np.broadcast_to(
+        [validation.length("cell_size", side) for side in size.flat], 2
+    )
     return Grid.around_origin(columns * width, rows * height, columns, rows)
 
 
 def _what(pressure: Any) -> str:
-    return f"pressure map {pressure}" if isinstance(pressure, (str, Path)) else "pressure"
+    return (
+        f"pressure map {pressure}" if isinstance(pressure, (str, Path)) else "pressure"
+    )
 
 
 def _one_map(pressure: Any, reading: MapReading) -> tuple[np.ndarray, str | None]:
     """Return the values `[rows, columns]` of an array or a file, and the name of the file."""
     if isinstance(pressure, (str, Path)):
-        values, name = read_pressure_map(pressure, **vars(reading)), title(pressure)
+        values = read_pressure_map(pressure, **vars(reading))
+        name = title(pressure)
     else:
-        values, name = reading.frame_of("pressure", pressure) if isinstance(pressure, np.ndarray) else pressure, None
+        values = (
+            reading.frame_of("pressure", pressure)
+            if isinstance(pressure, np.ndarray)
+            else pressure
+        )
+        name = None
     values = non_negative_array(_what(pressure), values, (None, None))
     return values if name else reading.pressures("pressure", values), name

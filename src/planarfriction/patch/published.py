@@ -30,7 +30,9 @@ def square(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
 
 def circle(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a uniform disc, as the published mask on a grid `width` [m] wide."""
-    return ContactPatch.disc_published(validation.positive("width", width) / 2, cells, name="Circle")
+    return ContactPatch.disc_published(
+        validation.positive("width", width) / 2, cells, name="Circle"
+    )
 
 
 def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
@@ -40,29 +42,47 @@ def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
 
 def line_grad(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
-    return _even(ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad"))
+    return _even(
+        ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad")
+    )
 
 
 def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
-    return _even(ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX"))
+    return _even(
+        ContactPatch.line(
+            width, cells, direction="x", profile=_steps(cells), name="LineGradX"
+        )
+    )
 
 
 def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return two square pads (3 x 3 of 21 x 21 cells) at the left and right ends of the middle rows."""
-    return _masked([(slice(9, 12), slice(0, 3)), (slice(9, 12), slice(18, 21))], cells, width, "NonConvex1")
+    return _masked(
+        [(slice(9, 12), slice(0, 3)), (slice(9, 12), slice(18, 21))],
+        cells,
+        width,
+        "NonConvex1",
+    )
 
 
 def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a lying T of two bars: rows 9..11 x columns 0..13, and rows 4..17 x columns 18..20 (of 21 x 21 cells)."""
-    return _masked([(slice(9, 12), slice(0, 14)), (slice(4, 18), slice(18, 21))], cells, width, "NonConvex2")
+    return _masked(
+        [(slice(9, 12), slice(0, 14)), (slice(4, 18), slice(18, 21))],
+        cells,
+        width,
+        "NonConvex2",
+    )
 
 
 def _even(patch: ContactPatch) -> ContactPatch:
     """Return the patch of points with weights in proportion to pressure and area alone, as published."""
     with warnings.catch_warnings():  # that the shape itself has given
         warnings.simplefilter("ignore")
-        return with_outline(dataclasses.replace(patch, point_shares=None, radii=None), patch.outline)
+        return with_outline(
+            dataclasses.replace(patch, point_shares=None, radii=None), patch.outline
+        )
 
 
 def _steps(cells: int) -> np.ndarray:
@@ -70,15 +90,20 @@ def _steps(cells: int) -> np.ndarray:
     return np.arange(validation.count("cells", cells, at_most=MOST_CELLS), 0, -1)
 
 
-def _masked(blocks: list[tuple[slice, slice]], cells: int, width: float, name: str) -> ContactPatch:
+def _masked(
+    blocks: list[tuple[slice, slice]], cells: int, width: float, name: str
+) -> ContactPatch:
     """Return a patch of even pressure on blocks of the published grid, of all cells whose centre is in a block."""
-    cells, width = validation.count("cells", cells, at_most=MOST_CELLS), validation.positive("width", width)
+    cells = validation.count("cells", cells, at_most=MOST_CELLS)
+    width = validation.positive("width", width)
     check_cells(cells**2)
     mask = np.zeros((PUBLISHED_CELLS, PUBLISHED_CELLS))
     for block in blocks:
         mask[block] = 1.0
     nearest = ((2 * np.arange(cells) + 1) * PUBLISHED_CELLS) // (2 * cells)
-    return ContactPatch.from_pressure(mask[np.ix_(nearest, nearest)], width / cells, name=name)
+    return ContactPatch.from_pressure(
+        mask[np.ix_(nearest, nearest)], width / cells, name=name
+    )
 
 
 def pressure_map(
@@ -92,20 +117,44 @@ def pressure_map(
 
     Raises `InvalidValueError` unless exactly one of `file`, `files` and `values` is given.
     """
-    given = {key: value for key, value in (("file", file), ("files", files), ("values", values)) if value is not None}
+    given = {
+        key: value
+        for key, value in (("file", file), ("files", files), ("values", values))
+        if value is not None
+    }
     if len(given) != 1:
         rule = "have either file or values (or files, one for each load)"
-        raise InvalidValueError("pressure map", rule, " and ".join(given) or "none of them")
+        raise InvalidValueError(
+            "pressure map", rule, " and ".join(given) or "none of them"
+        )
     if files is not None and loads is None:
-        raise InvalidValueError("loads", "be given: the normal force of each of the files", "none")
-    reading = {"header": header, "index": index, "frame_shape": frame_shape, "frame": frame, "threshold": threshold}
-    options = {"width": width, "loads": loads, "name": name, "invert": invert, **reading}
+        raise InvalidValueError(
+            "loads", "be given: the normal force of each of the files", "none"
+        )
+    reading = {
+        "header": header,
+        "index": index,
+        "frame_shape": frame_shape,
+        "frame": frame,
+        "threshold": threshold,
+    }
+    options = {
+        "width": width,
+        "loads": loads,
+        "name": name,
+        "invert": invert,
+        **reading,
+    }
     return ContactPatch.from_pressure(next(iter(given.values())), cell_size, **options)
 
 
 def published(name: str, cells: Any = None, width: Any = None) -> ContactPatch:
     """Return the published patch `name` of so many `cells` along a side, `width` [m] wide."""
-    size = {key: value for key, value in (("cells", cells), ("width", width)) if value is not None}
+    size = {
+        key: value
+        for key, value in (("cells", cells), ("width", width))
+        if value is not None
+    }
     return PUBLISHED_PATCHES.choose(name)(**size)
 
 
@@ -114,4 +163,6 @@ def cells(
     name: Any = None, point_shares: Any = None, radii: Any = None,
 ) -> ContactPatch:  # fmt: skip
     """Return the patch that `ContactPatch.to_dict` described."""
-    return ContactPatch.from_dict({key: value for key, value in locals().items() if value is not None})
+    return ContactPatch.from_dict(
+        {key: value for key, value in locals().items() if value is not None}
+    )

@@ -41,7 +41,11 @@ def mean_weights(patch: ContactPatch) -> np.ndarray:
         return patch.weights()
     loads = loads_of_change(patch)
     sizes = np.sqrt(patch.second_moment(loads))
-    return sizes @ patch.weights(loads) / sizes.sum() if sizes.any() else patch.weights(loads).mean(axis=0)
+    return (
+        sizes @ patch.weights(loads) / sizes.sum()
+        if sizes.any()
+        else patch.weights(loads).mean(axis=0)
+    )
 
 
 def loads_of_change(patch: ContactPatch) -> np.ndarray:
@@ -81,41 +85,63 @@ class SharedPressure(ByValue, Pressure):
     def __post_init__(self) -> None:
         members = len(np.atleast_1d(self.cells))
         for name in ("cells", "begins"):
-            numbers = validation.array(name, getattr(self, name), (members if name == "cells" else None,)).astype(int)
+            numbers = validation.array(
+                name, getattr(self, name), (members if name == "cells" else None,)
+            ).astype(int)
             self._set(**{name: numbers})
-        self._set(parted=validation.non_negative_array("parted", self.parted, (members,)))
-        self._set(radii=validation.non_negative_array("radii", self.radii, self.begins.shape))
+        self._set(
+            parted=validation.non_negative_array("parted", self.parted, (members,))
+        )
+        self._set(
+            radii=validation.non_negative_array("radii", self.radii, self.begins.shape)
+        )
 
     @property
     def depends_on_load(self) -> bool:
         return self.patch.depends_on_load
 
-    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+    def relative(
+        self, positions: np.ndarray, normal_force: np.ndarray | None = None
+    ) -> np.ndarray:
         areas = self.sums(self.patch.areas)
         if not self.depends_on_load:
             return self.sums(self.patch.weights()) / areas
         loads = np.asarray(1.0 if normal_force is None else normal_force, dtype=float)
         different, place = np.unique(loads, return_inverse=True)
-        shares = np.array([self._at(positions, weights) for weights in self.patch.weights(different)])
+        shares = np.array(
+            [self._at(positions, weights) for weights in self.patch.weights(different)]
+        )
         return (shares / areas)[place.reshape(loads.shape)]
 
-    def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
+    def ever_loaded(
+        self, positions: np.ndarray, between: tuple[float, float] | None = None
+    ) -> np.ndarray:
         loaded = self.patch.pressure.ever_loaded(self.patch.positions, between)
         return self.sums(loaded.astype(float)) > 0.0
 
     def sums(self, values: np.ndarray) -> np.ndarray:
         """Return the sums `[..., n]` of values `[..., N]` of cells over those of each disc."""
-        return np.add.reduceat(values[..., self.cells] * self.parted, self.begins, axis=-1)
+        return np.add.reduceat(
+            values[..., self.cells] * self.parted, self.begins, axis=-1
+        )
 
     def _at(self, positions: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Return the shares of discs at `positions` `[n, 2]` for `weights` `[N]` of all cells."""
-        shares, cells = self.sums(weights), self.patch.positions
+        shares = self.sums(weights)
+        cells = self.patch.positions
         centre = weights @ cells
-        size = math.sqrt(weights @ ((cells - centre) ** 2).sum(axis=1) + 0.5 * weights @ self.patch.radii**2) or 1.0
+        size = (
+            math.sqrt(
+                weights @ ((cells - centre) ** 2).sum(axis=1)
+                + 0.5 * weights @ self.patch.radii**2
+            )
+            or 1.0
+        )
         wanted = _moments((cells - centre) / size, self.patch.radii / size) @ weights
         moments = _moments((positions - centre) / size, self.radii / size)
         for _ in range(ROUNDS):
-            gram, missing = moments * shares @ moments.T, wanted - moments @ shares
+            gram = moments * shares @ moments.T
+            missing = wanted - moments @ shares
             change = moments.T @ np.linalg.lstsq(gram, missing, rcond=INDEPENDENT)[0]
             length = min(1.0, MOST_LOST / max(-change.min(), MOST_LOST))
             shares = shares * (1.0 + length * change)
@@ -129,6 +155,7 @@ class SharedPressure(ByValue, Pressure):
 
 def _moments(places: np.ndarray, radii: np.ndarray) -> np.ndarray:
     """Return the moments of unit loads on discs, up to degree 2 and the mean distance from the origin, `[7, n]`."""
-    (x, y), own = places.T, 0.25 * radii**2
+    (x, y) = places.T
+    own = 0.25 * radii**2
     distance = disc_friction(x**2 + y**2, radii**2)[2]
     return np.array([np.ones_like(x), x, y, x * x + own, x * y, y * y + own, distance])

@@ -14,18 +14,27 @@ from planarfriction.errors import InvalidValueError
 def moments_of(value: Any) -> np.ndarray:
     """Return moments `[..., 2]` [N m], checked."""
     moments = validation.vectors("moments", value, 2)
-    validation.within_range("moments", moments.min(initial=0.0), moments.max(initial=0.0))
+    validation.within_range(
+        "moments", moments.min(initial=0.0), moments.max(initial=0.0)
+    )
     return moments
 
 
 def centre_of(moments: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
-    from planarfriction._engine.cells.tilt import REACH  # compiled code, which a patch alone does not need
+    from planarfriction._engine.cells.tilt import (
+        REACH,
+    )  # compiled code, which a patch alone does not need
 
     loaded = load > 0.0
     with np.errstate(over="ignore"):
-        x, y = (each / np.where(loaded, load, 1.0) for each in (-moments[..., 1], moments[..., 0]))
-    return np.where(loaded[..., None], np.clip(np.stack([x, y], -1), -REACH, REACH), 0.0)
+        x, y = (
+            each / np.where(loaded, load, 1.0)
+            for each in (-moments[..., 1], moments[..., 0])
+        )
+    return np.where(
+        loaded[..., None], np.clip(np.stack([x, y], -1), -REACH, REACH), 0.0
+    )
 
 
 def weights_under(patch: Any, normal_force: Any, moments: Any) -> np.ndarray:
@@ -33,14 +42,19 @@ def weights_under(patch: Any, normal_force: Any, moments: Any) -> np.ndarray:
     from planarfriction._engine.cells.tilt import tilted
 
     if normal_force is None:
-        raise InvalidValueError("normal_force", "be given with moments: they are of its size", "None")
-    load, moments = validation.non_negative_numbers("normal_force", normal_force), moments_of(moments)
+        raise InvalidValueError(
+            "normal_force", "be given with moments: they are of its size", "None"
+        )
+    load = validation.non_negative_numbers("normal_force", normal_force)
+    moments = moments_of(moments)
     shapes = load.shape, moments.shape[:-1]
     batch = validation.common_shape("moments", shapes, "broadcast with normal_force")
     if math.prod(batch) * patch.cells > validation.MOST_NUMBERS:
         rule = f"be at most {validation.MOST_NUMBERS // patch.cells} pairs for {patch.cells} cells"
         raise InvalidValueError("moments", rule, math.prod(batch))
-    weights = np.broadcast_to(patch.weights(load), (*batch, patch.cells)).reshape(-1, patch.cells)
+    weights = np.broadcast_to(patch.weights(load), (*batch, patch.cells)).reshape(
+        -1, patch.cells
+    )
     centre = np.broadcast_to(centre_of(moments, load), (*batch, 2)).reshape(-1, 2)
     loaded = np.broadcast_to(load, batch).reshape(-1, 1) > 0.0
     found = np.where(loaded, tilted(patch.positions, weights, centre), weights)

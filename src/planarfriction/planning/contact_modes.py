@@ -51,7 +51,9 @@ class SliderMotion(NamedTuple):
     """A face that cannot stay flush: 1 where it turns about its left end, -1 about its right one."""
 
 
-def motion_cone(surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: float) -> np.ndarray:
+def motion_cone(
+    surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: float
+) -> np.ndarray:
     """Return the edges of the motion cone `[2, 2]`: velocities of a point for both edges of the friction cone.
 
     If the velocity of the pusher is between the two, it sticks; otherwise it slides along the slider, which then moves
@@ -63,15 +65,23 @@ def motion_cone(surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: flo
     Source: Mason 1986; Lynch, Maekawa and Tanie 1992.
     """
     validation.instance("surface", surface, LimitSurface, "a limit surface")
-    at, normal = validation.vector("at", at, 2), validation.vector("normal", normal, 2)
+    at = validation.vector("at", at, 2)
+    normal = validation.vector("normal", normal, 2)
     length = validation.positive("length of normal", float(np.hypot(*normal)))
     angle = math.atan(validation.non_negative("mu", mu))
-    found = [pushed_by(surface, TouchPoint(at, normal / length), each)[1] for each in (-angle, angle)]
+    found = [
+        pushed_by(surface, TouchPoint(at, normal / length), each)[1]
+        for each in (-angle, angle)
+    ]
     return np.array(found) / np.hypot(*np.transpose(found))[:, None]
 
 
 def motion_at(
-    surface: LimitSurface, place: TouchPoint, mu: float, velocity: np.ndarray, held: str = ""
+    surface: LimitSurface,
+    place: TouchPoint,
+    mu: float,
+    velocity: np.ndarray,
+    held: str = "",
 ) -> SliderMotion:
     """Compute the motion of a slider touched at a place by a pusher with a `velocity` `(vx, vy, omega)` there.
 
@@ -80,7 +90,8 @@ def motion_at(
     """
     if place.half_width > 0.0:
         return _flush(surface, place, mu, velocity, held)
-    angle, wanted = math.atan(mu), _angle(place, velocity)
+    angle = math.atan(mu)
+    wanted = _angle(place, velocity)
     edges = [pushed_by(surface, place, each) for each in (-angle, angle)]
     right, left = (_angle(place, each[1]) for each in edges)
     if angle == 0.0:  # left or right, the force is the same, and no mode has an end
@@ -92,30 +103,41 @@ def motion_at(
         return SliderMotion(scale * twist, mode, min(wanted - right, left - wanted))
     twist, moved = edges[mode == LEFT]
     scale = (velocity[:2] @ place.normal) / (moved @ place.normal)
-    slack = math.inf if angle == 0.0 else wanted - left if mode == LEFT else right - wanted
+    slack = (
+        math.inf if angle == 0.0 else wanted - left if mode == LEFT else right - wanted
+    )
     return SliderMotion(scale * twist, mode, slack)
 
 
 def _angle(place: TouchPoint, vector: Any) -> float:
     """Return the angle of a vector to the left of the normal [rad]."""
-    (x, y), (a, b) = place.normal.tolist(), (float(vector[0]), float(vector[1]))
+    (x, y) = place.normal.tolist()
+    (a, b) = (float(vector[0]), float(vector[1]))
     return math.atan2(x * b - y * a, x * a + y * b)
 
 
-def pushed_by(surface: LimitSurface, place: TouchPoint, angle: float) -> tuple[np.ndarray, tuple[float, float]]:
+def pushed_by(
+    surface: LimitSurface, place: TouchPoint, angle: float
+) -> tuple[np.ndarray, tuple[float, float]]:
     """Return the twist of unit power under a force at an angle to the normal, and the velocity of the place."""
-    (nx, ny), (x, y), c, s = place.normal.tolist(), place.at.tolist(), math.cos(angle), math.sin(angle)
-    fx, fy = c * nx - s * ny, s * nx + c * ny
+    (nx, ny) = place.normal.tolist()
+    (x, y) = place.at.tolist()
+    c = math.cos(angle)
+    s = math.sin(angle)
+    fx = c * nx - s * ny
+    fy = s * nx + c * ny
     twist = surface.twist((-fx, -fy, y * fx - x * fy))
     vx, vy, omega = twist.tolist()
     return twist, (vx - omega * y, vy + omega * x)
 
 
-def _stuck(surface: LimitSurface, place: TouchPoint, angle: float, wanted: float) -> tuple[np.ndarray, Any]:
+def _stuck(
+    surface: LimitSurface, place: TouchPoint, angle: float, wanted: float
+) -> tuple[np.ndarray, Any]:
     """Return the twist whose place has a velocity of the wanted angle, and that velocity."""
     from scipy.optimize import brentq
 
-    off = lambda each: _angle(place, pushed_by(surface, place, each)[1]) - wanted  # noqa: E731
+    off = lambda each: _angle(place, pushed_by(surface, place, each)[1]) - wanted
     try:
         found: float = brentq(off, -angle, angle, xtol=1e-13)  # pyright: ignore
     except ValueError:  # far beyond the end of the mode: a step that will be taken back
@@ -126,13 +148,23 @@ def _stuck(surface: LimitSurface, place: TouchPoint, angle: float, wanted: float
 # ---------------------------------------------------------------------- a face that lies flush
 
 
-def _flush(surface: LimitSurface, place: TouchPoint, mu: float, velocity: np.ndarray, held: str = "") -> SliderMotion:
+def _flush(
+    surface: LimitSurface,
+    place: TouchPoint,
+    mu: float,
+    velocity: np.ndarray,
+    held: str = "",
+) -> SliderMotion:
     """Compute the motion of a slider under a flush face with the `velocity` `(vx, vy, omega)` at its middle.
 
     The pressure of the face has a resultant that crosses it, at an angle within the friction cone.
     """
-    (x, y), (nx, ny), h = place.at, place.normal, place.half_width
-    tangent, angle, omega = np.array([-ny, nx]), math.atan(mu), velocity[2]
+    (x, y) = place.at
+    (nx, ny) = place.normal
+    h = place.half_width
+    tangent = np.array([-ny, nx])
+    angle = math.atan(mu)
+    omega = velocity[2]
     stuck = np.array([velocity[0] + omega * y, velocity[1] - omega * x, omega])
     speed = math.hypot(velocity[0], velocity[1]) + abs(omega) * (h + math.hypot(x, y))
 
@@ -140,20 +172,30 @@ def _flush(surface: LimitSurface, place: TouchPoint, mu: float, velocity: np.nda
         """Return twist, angle of the force, and its crossing of the face as a share of the half width."""
         twist = stuck - slip * np.array([*tangent, 0.0])
         fx, fy, tau = -surface.wrench(twist)
-        pressed, along = fx * nx + fy * ny, fx * tangent[0] + fy * tangent[1]
+        pressed = fx * nx + fy * ny
+        along = fx * tangent[0] + fy * tangent[1]
         turn = tau - (x * fy - y * fx)  # about the middle, of the normal force alone
-        share = -turn / (pressed * h) if pressed > 0.0 else math.copysign(math.inf, -turn)
+        share = (
+            -turn / (pressed * h) if pressed > 0.0 else math.copysign(math.inf, -turn)
+        )
         return twist, math.atan2(along, pressed), share
 
     twist, lean, share = of(0.0)
-    mode, slack = STICK, angle - abs(lean)
+    mode = STICK
+    slack = angle - abs(lean)
     if angle == 0.0:
         held = LEFT if lean > 0.0 else RIGHT
     if held in (LEFT, RIGHT) or (not held and slack < 0.0):
         mode = held or (LEFT if lean > 0.0 else RIGHT)
         slip = _slip(lambda u: of(u)[1], angle if mode == LEFT else -angle, speed)
         twist, _, share = of(slip)
-        slack = math.inf if angle == 0.0 else slip / speed if mode == LEFT else -slip / speed
+        slack = (
+            math.inf
+            if angle == 0.0
+            else slip / speed
+            if mode == LEFT
+            else -slip / speed
+        )
     leans = int(math.copysign(1.0, share)) if abs(share) > _EDGE else 0
     return SliderMotion(twist, mode, min(slack, 1.0 - abs(share)), leans)
 
@@ -163,5 +205,7 @@ def _slip(angle_of: Any, wanted: float, speed: float) -> float:
     from scipy.optimize import brentq
 
     # from far to the right to far to the left the force turns from one side of the normal to the other
-    slip: Any = lambda x: speed * x / (1.0 - abs(x))  # noqa: E731
-    return slip(brentq(lambda x: angle_of(slip(x)) - wanted, -0.999999, 0.999999, xtol=1e-14))
+    slip: Any = lambda x: speed * x / (1.0 - abs(x))
+    return slip(
+        brentq(lambda x: angle_of(slip(x)) - wanted, -0.999999, 0.999999, xtol=1e-14)
+    )

@@ -16,7 +16,16 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
 from planarfriction.planning.holding import dynamic_holding_load, holding_load
-from planarfriction.planning.motions import LOOSE, ROUGH, Aim, GripReport, Grips, grip_position, load_on, report_of
+from planarfriction.planning.motions import (
+    LOOSE,
+    ROUGH,
+    Aim,
+    GripReport,
+    Grips,
+    grip_position,
+    load_on,
+    report_of,
+)
 from planarfriction.scenes import Scene, Signal
 
 LEVELS = (0.93, 0.85, 0.7, 0.5, 0.25, 0.02)
@@ -117,23 +126,38 @@ def plan_grip(
         raise InvalidValueError("friction", "be below 1", friction)
     validation.choice("aim", aim, ("nominal", "worst"))
     chosen = scene.contacts[index]
-    patch, law = chosen.model.patch, chosen.model.law.numbers
-    at_start = holding_load(load_on(scene, index, 0.0, np.zeros(2), 0.0), patch, law.mu_c)
+    patch = chosen.model.patch
+    law = chosen.model.law.numbers
+    at_start = holding_load(
+        load_on(scene, index, 0.0, np.zeros(2), 0.0), patch, law.mu_c
+    )
     if at_start == 0.0:
-        raise InvalidValueError("scene", "have a load that moves the body", "no gravity and no force")
-    at_end = _holding_at(scene, index, load_on(scene, index, angle or 0.0, slide, scene.t_end))
+        raise InvalidValueError(
+            "scene", "have a load that moves the body", "no gravity and no force"
+        )
+    at_end = _holding_at(
+        scene, index, load_on(scene, index, angle or 0.0, slide, scene.t_end)
+    )
     low, high = _bounds(bounds, at_start)
     least = (1.0 + validation.non_negative("margin", margin)) * at_end
     if least > high:
-        raise InvalidValueError("bounds", f"reach the {least:.3g} N that hold the body at the end", [low, high])
+        raise InvalidValueError(
+            "bounds",
+            f"reach the {least:.3g} N that hold the body at the end",
+            [low, high],
+        )
     radius = float(patch.contact_radius(at_start))
     shares = (1.0, 1.0 - friction, 1.0 + friction) if friction else (1.0,)
     seen = sorted({*shares, 0.99, 1.01})
     grips = Grips(scene, index, seen)
     wanted = Aim(angle, slide, radius)
     factors = shares if aim == "worst" else (1.0,)
-    searches = [_ProfileSearch(grips, wanted, factors, times, (low, least, high), at_start) for times in spread]
-    kick, hold = KICK * law.mu_c / law.mu_s, min(high, max(2.0 * least, at_start))
+    searches = [
+        _ProfileSearch(grips, wanted, factors, times, (low, least, high), at_start)
+        for times in spread
+    ]
+    kick = KICK * law.mu_c / law.mu_s
+    hold = min(high, max(2.0 * least, at_start))
     profile = max(searches, key=lambda each: each.begin(kick, hold)).bent()
     ends = grips.ends(profile, seen, rtol=None)
     cost = grips.simulations, grips.jacobians, time.perf_counter() - begin
@@ -146,16 +170,31 @@ class _ProfileSearch:
     """The search for the values at some knots, between `low`, `least` for those that hold, and `high` [N]."""
 
     def __init__(
-        self, grips: Grips, aim: Aim, factors: Sequence[float], times: np.ndarray, between: tuple, holding: float
+        self,
+        grips: Grips,
+        aim: Aim,
+        factors: Sequence[float],
+        times: np.ndarray,
+        between: tuple,
+        holding: float,
     ) -> None:
         low, least, high = between
         held = times >= SPANS[0] * grips.scene.t_end
         held[-1] = True
-        self._grips, self._aim, self._factors, self._times = grips, aim, factors, times
-        self._low, self._highest = np.where(held, least, low), np.full(len(times), high * (1.0 + 1e-6))
+        self._grips = grips
+        self._aim = aim
+        self._factors = factors
+        self._times = times
+        self._low = np.where(held, least, low)
+        self._highest = np.full(len(times), high * (1.0 + 1e-6))
         self._first = grips.first
-        if self._first is not None:  # whoever holds the body at first goes on from there
-            self._low[0], self._highest[0] = self._first * (1.0 - 1e-6), self._first * (1.0 + 1e-6)
+        if (
+            self._first is not None
+        ):  # whoever holds the body at first goes on from there
+            self._low[0], self._highest[0] = (
+                self._first * (1.0 - 1e-6),
+                self._first * (1.0 + 1e-6),
+            )
         self._holding = holding
         self._bend = ROUGH / holding * np.diff(np.eye(len(times)), 2, axis=0)
         self._weights = np.full(len(factors), 1.0 / len(factors))
@@ -172,23 +211,30 @@ class _ProfileSearch:
         profiles = [values for _, values in found if values is not None]
         if not profiles:
             return -np.inf
-        costs = threads.each(lambda values: float((self._residuals(values) ** 2).sum()), profiles)
+        costs = threads.each(
+            lambda values: float((self._residuals(values) ** 2).sum()), profiles
+        )
         best = int(np.argmin(costs))
         self._values = profiles[best]
         return -0.5 * costs[best]
 
-    def _released(self, level: float, kick: float, hold: float) -> tuple[float, np.ndarray | None]:
+    def _released(
+        self, level: float, kick: float, hold: float
+    ) -> tuple[float, np.ndarray | None]:
         """Return the share of the goal that a release at one level reaches at most, and its knots if it reaches it."""
         from scipy.optimize import brentq
 
-        times, first = self._times, np.array([min(level, kick), level]) * self._holding
+        times = self._times
+        first = np.array([min(level, kick), level]) * self._holding
         first = first if self._first is None else np.append(self._first, first)
         rise = float(np.diff(times).max())
         low = np.interp(times, times[0] + rise * np.arange(len(first)), first)
 
         def released(until: float) -> np.ndarray:
             """Return the values of a profile that stays low until some time, and then holds."""
-            return self._inside(low + (hold - low) * np.interp(times, [until, until + rise], [0.0, 1.0]))
+            return self._inside(
+                low + (hold - low) * np.interp(times, [until, until + rise], [0.0, 1.0])
+            )
 
         @functools.cache
         def missing(until: float) -> float:
@@ -196,7 +242,8 @@ class _ProfileSearch:
             off = self._aim.progress(end) - 1.0
             return off if abs(off) > NEAR else 0.0
 
-        earliest, latest = float(times[0]) - rise, float(times[-1]) - rise
+        earliest = float(times[0]) - rise
+        latest = float(times[-1]) - rise
         most = missing(latest)
         if most <= 0.0:
             return most + 1.0, None
@@ -207,11 +254,19 @@ class _ProfileSearch:
         from scipy.optimize import least_squares
 
         if not len(self._values):
-            name, goal = ("slide", self._aim.slide.tolist()) if self._aim.angle is None else ("angle", self._aim.angle)
+            name, goal = (
+                ("slide", self._aim.slide.tolist())
+                if self._aim.angle is None
+                else ("angle", self._aim.angle)
+            )
             rule = f"be within reach of the load on the body (it gets at most {100.0 * self._reached:.3g} % of the way)"
             raise InvalidValueError(name, rule, goal)
-        values, best, least = self._values, self._values, np.inf
-        rounds, tries = (1, TRIES) if len(self._factors) == 1 else (1 + ROUNDS, TRIES // 2)
+        values = self._values
+        best = self._values
+        least = np.inf
+        rounds, tries = (
+            (1, TRIES) if len(self._factors) == 1 else (1 + ROUNDS, TRIES // 2)
+        )
         for _ in range(rounds):
             found = least_squares(
                 self._residuals,
@@ -225,8 +280,13 @@ class _ProfileSearch:
             values = found.x
             misses = np.linalg.norm(self._misses(values), axis=1)
             if misses.max() < least:
-                best, least = values, misses.max()
-            self._weights = self._weights * misses / (self._weights @ misses) if misses.any() else self._weights
+                best = values
+                least = misses.max()
+            self._weights = (
+                self._weights * misses / (self._weights @ misses)
+                if misses.any()
+                else self._weights
+            )
         return self._signal(best)
 
     def _signal(self, values: np.ndarray) -> Signal:
@@ -234,7 +294,9 @@ class _ProfileSearch:
 
     def _misses(self, values: np.ndarray) -> np.ndarray:
         """Return the misses `[F, 6]` with each friction."""
-        return self._aim.misses(np.array(self._grips.ends(self._signal(values), self._factors)))
+        return self._aim.misses(
+            np.array(self._grips.ends(self._signal(values), self._factors))
+        )
 
     def _inside(self, values: np.ndarray) -> np.ndarray:
         inside = 1e-2 * np.minimum(self._highest - self._low, self._holding)
@@ -245,8 +307,13 @@ class _ProfileSearch:
         return np.concatenate([misses.ravel(), self._bend @ values])
 
     def _slopes(self, values: np.ndarray) -> np.ndarray:
-        slopes = np.array(self._grips.slopes(self._signal(values), self._factors)) / self._aim.scales()[:, None]
-        return np.concatenate([*self._weights[:, None, None] ** 0.5 * slopes, self._bend])
+        slopes = (
+            np.array(self._grips.slopes(self._signal(values), self._factors))
+            / self._aim.scales()[:, None]
+        )
+        return np.concatenate(
+            [*self._weights[:, None, None] ** 0.5 * slopes, self._bend]
+        )
 
 
 # ---------------------------------------------------------------------- what was asked for
@@ -256,17 +323,28 @@ def _contact_of(scene: Any, name: str | None) -> int:
     """Return the index of the contact whose grip is planned."""
     validation.instance("scene", scene, Scene, "a Scene")
     if scene.start == "sliding":
-        raise InvalidValueError("start", "be 'rest' or 'equilibrium' for a grip plan", scene.start)
+        raise InvalidValueError(
+            "start", "be 'rest' or 'equilibrium' for a grip plan", scene.start
+        )
     names = [each.name for each in scene.contacts]
     for what, given, purpose in (
         ("velocity", scene.velocity, "a body that a grip moves"),
         ("stop_speed", scene.stop_speed, "a plan, which has to hold until the end"),
-        *((f"support_velocity of contact {c.name!r}", c.support_velocity, "a grip plan") for c in scene.contacts),
+        *(
+            (
+                f"support_velocity of contact {c.name!r}",
+                c.support_velocity,
+                "a grip plan",
+            )
+            for c in scene.contacts
+        ),
     ):
         if given is not None:
             raise InvalidValueError(what, f"be None for {purpose}", given)
     if name is None and len(names) > 1:
-        raise InvalidValueError("contact", f"be given if there are several ({', '.join(names)})", name)
+        raise InvalidValueError(
+            "contact", f"be given if there are several ({', '.join(names)})", name
+        )
     return 0 if name is None else names.index(validation.choice("contact", name, names))
 
 
@@ -275,24 +353,33 @@ def _holding_at(scene: Scene, contact: int, load: np.ndarray) -> float:
 
     Laws that creep, and models whose bristles cannot start in equilibrium, have that of mu_c alone.
     """
-    body, chosen = scene.body, scene.contacts[contact]
-    model, apart = chosen.model, np.subtract(body.position, grip_position(scene, contact))
+    body = scene.body
+    chosen = scene.contacts[contact]
+    model = chosen.model
+    apart = np.subtract(body.position, grip_position(scene, contact))
     stops = holding_load(load, model.patch, model.law.numbers.mu_c)
     if not (model.law.holds_at_rest and hasattr(model, "state_of")):
         return stops
-    mass, inertia = body.mass / chosen.count, (body.inertia + body.mass * float(apart @ apart)) / chosen.count
+    mass = body.mass / chosen.count
+    inertia = (body.inertia + body.mass * float(apart @ apart)) / chosen.count
     return max(stops, dynamic_holding_load(load, model, mass=mass, inertia=inertia))
 
 
 def _goal(goal: Any) -> tuple[float | None, np.ndarray]:
     """Return the angle of the goal, None for a slide, and the slide, zeros for an angle."""
     if not isinstance(goal, Mapping) or len(goal) != 1:
-        raise InvalidValueError("goal", 'be {"angle": radians} or {"slide": (dx, dy)}', validation.quoted(goal))
+        raise InvalidValueError(
+            "goal",
+            'be {"angle": radians} or {"slide": (dx, dy)}',
+            validation.quoted(goal),
+        )
     validation.keys("goal", goal, [], ["angle", "slide"])
     if "angle" in goal:
-        angle, slide = validation.number("angle", goal["angle"]), np.zeros(2)
+        angle = validation.number("angle", goal["angle"])
+        slide = np.zeros(2)
     else:
-        angle, slide = None, validation.array("slide", goal["slide"], (2,))
+        angle = None
+        slide = validation.array("slide", goal["slide"], (2,))
     if not angle and not slide.any():
         raise InvalidValueError("goal", "not be zero", dict(goal))
     return angle, slide
@@ -304,10 +391,18 @@ def _knots(scene: Scene, knots: Any) -> list[np.ndarray]:
         count = validation.count("knots", knots, 4, MOST_KNOTS)
         return [np.linspace(0.0, share * scene.t_end, count) for share in SPANS]
     times = validation.array("knots", knots, (None,))
-    if not 4 <= len(times) <= MOST_KNOTS or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
-        raise InvalidValueError("knots", f"be 4 to {MOST_KNOTS} increasing times >= 0", times.tolist())
+    if (
+        not 4 <= len(times) <= MOST_KNOTS
+        or times[0] != 0.0
+        or (np.diff(times) <= 0.0).any()
+    ):
+        raise InvalidValueError(
+            "knots", f"be 4 to {MOST_KNOTS} increasing times >= 0", times.tolist()
+        )
     if times[-1] >= scene.t_end:
-        raise InvalidValueError("knots", f"end before the scene does, at {scene.t_end:g} s", times.tolist())
+        raise InvalidValueError(
+            "knots", f"end before the scene does, at {scene.t_end:g} s", times.tolist()
+        )
     return [times]
 
 
@@ -316,5 +411,7 @@ def _bounds(bounds: Any, holding: float) -> tuple[float, float]:
         return 0.02 * holding, 4.0 * holding
     low, high = validation.non_negative_array("bounds", bounds, (2,)).tolist()
     if not low < high:
-        raise InvalidValueError("bounds", "be the least and the largest normal force", [low, high])
+        raise InvalidValueError(
+            "bounds", "be the least and the largest normal force", [low, high]
+        )
     return low, high

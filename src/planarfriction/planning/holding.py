@@ -11,7 +11,11 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import twist_at
-from planarfriction.limit_surface import LimitSurface, LimitSurfaceCells, LimitSurfaceExact
+from planarfriction.limit_surface import (
+    LimitSurface,
+    LimitSurfaceCells,
+    LimitSurfaceExact,
+)
 from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
 from planarfriction.scenes.contact import checked_model
@@ -38,7 +42,9 @@ WIDEST = 4.0
 """Factor by which the result may differ from the `holding_load` either way; the search gives up there [-]."""
 
 
-def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: float = 0.0) -> float:
+def holding_load(
+    wrench: ArrayLike, patch: ContactPatch, mu: float, margin: float = 0.0
+) -> float:
     """Return the normal force [N] down to which a contact holds a load `wrench` `(fx, fy, tau)` [N, N, N m].
 
     Quasi-static: exact for the continuous patch and a grip that falls slowly. As it falls faster, the cells that break
@@ -56,31 +62,48 @@ def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: floa
     """
     load = validation.array("wrench", wrench, (3,))
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
-    mu, margin = validation.positive("mu", mu), validation.non_negative("margin", margin)
+    mu = validation.positive("mu", mu)
+    margin = validation.non_negative("margin", margin)
     if not load.any():
         return 0.0
     if not patch.depends_on_load:
         return (1.0 + margin) * _needed(load, patch, mu, None)
     reach = float(np.hypot(*patch.positions.T).max())
-    metric = 1.0 if patch.root is None else float(np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max())
-    strongest = metric * (1.0 + float(np.hypot(*patch.asymmetries().T).max()))  # bounds friction over mu
-    low = max(float(np.hypot(*load[:2])), abs(float(load[2])) / reach) / (mu * strongest)
+    metric = (
+        1.0
+        if patch.root is None
+        else float(np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max())
+    )
+    strongest = metric * (
+        1.0 + float(np.hypot(*patch.asymmetries().T).max())
+    )  # bounds friction over mu
+    low = max(float(np.hypot(*load[:2])), abs(float(load[2])) / reach) / (
+        mu * strongest
+    )
     tried = low * (1.0 - 1e-9)
     for _ in range(_STEPS):
         if _needed(load, patch, mu, tried) <= tried:
             break
         tried, low = _STEP * tried, tried
     else:
-        raise InvalidValueError("wrench", "be a load that this patch holds at some normal force", load.tolist())
+        raise InvalidValueError(
+            "wrench",
+            "be a load that this patch holds at some normal force",
+            load.tolist(),
+        )
     if tried <= low:
         return (1.0 + margin) * tried
     from scipy.optimize import brentq
 
-    found = brentq(lambda each: each - _needed(load, patch, mu, each), low, tried, xtol=1e-12 * low)
+    found = brentq(
+        lambda each: each - _needed(load, patch, mu, each), low, tried, xtol=1e-12 * low
+    )
     return (1.0 + margin) * float(found)  # pyright: ignore[reportArgumentType]
 
 
-def _needed(load: np.ndarray, patch: ContactPatch, mu: float, normal_force: float | None) -> float:
+def _needed(
+    load: np.ndarray, patch: ContactPatch, mu: float, normal_force: float | None
+) -> float:
     """Return the normal force that holds the load on the shape at `normal_force`."""
     surface = _surface(patch, normal_force)
     twist = surface.twist(-load)
@@ -90,7 +113,9 @@ def _needed(load: np.ndarray, patch: ContactPatch, mu: float, normal_force: floa
 @functools.lru_cache(maxsize=8)
 def _surface(patch: ContactPatch, normal_force: float | None) -> LimitSurface:
     """Return the limit surface of a patch, whose table for twists is dear: a plan asks several times."""
-    few = patch.has_discs and not patch.cell_extents().any()  # these pull as they do in models
+    few = (
+        patch.has_discs and not patch.cell_extents().any()
+    )  # these pull as they do in models
     cells = few or (patch.root is not None and patch.root.ndim == 3)
     kind: type[LimitSurface] = LimitSurfaceCells if cells else LimitSurfaceExact
     return kind(patch, normal_force=normal_force)
@@ -122,24 +147,33 @@ def dynamic_holding_load(
     """
     load = validation.array("wrench", wrench, (3,))
     checked_model("model", model)
-    ramp, margin = validation.non_negative("ramp", ramp), validation.non_negative("margin", margin)
+    ramp = validation.non_negative("ramp", ramp)
+    margin = validation.non_negative("margin", margin)
     if not model.law.holds_at_rest:
-        raise InvalidValueError("model", "have a law that holds at rest", type(model.law).__name__)
+        raise InvalidValueError(
+            "model", "have a law that holds at rest", type(model.law).__name__
+        )
     fall = validation.number("fall", fall)
     if fall < 1.0 + CLOSE:
         raise InvalidValueError("fall", f"be at least {1.0 + CLOSE:g}", fall)
     slow = holding_load(load, model.patch, model.law.numbers.mu_s)
     if slow == 0.0:
         return 0.0
-    radius = max(float(model.patch.contact_radius(slow)), SLIP)  # soft fingers shrink to a point
+    radius = max(
+        float(model.patch.contact_radius(slow)), SLIP
+    )  # soft fingers shrink to a point
     if mass is None:
         mass = float(np.linalg.norm(load / [1.0, 1.0, radius])) / GRAVITY
     mass = validation.positive("mass", mass)
-    inertia = mass * radius**2 if inertia is None else validation.positive("inertia", inertia)
+    inertia = (
+        mass * radius**2 if inertia is None else validation.positive("inertia", inertia)
+    )
     body = Body(mass, inertia, gravity=(0.0, 0.0))
 
     def slips(share: float) -> bool:
-        return _slips(model, body, load, _falling(max(fall, share) * slow, share * slow, ramp))
+        return _slips(
+            model, body, load, _falling(max(fall, share) * slow, share * slow, ramp)
+        )
 
     return (1.0 + margin) * slow * _least_share(slips)
 
@@ -150,14 +184,22 @@ def _least_share(slips: Any) -> float:
     step = 1.0 + FIRST_STEP
     if slips(1.0):
         while slips(high := low * step):
-            low, step = high, step**2
+            low = high
+            step = step**2
             if high > WIDEST:
-                raise InvalidValueError("wrench", f"be held within {WIDEST:g} times the holding_load", "a slip")
+                raise InvalidValueError(
+                    "wrench",
+                    f"be held within {WIDEST:g} times the holding_load",
+                    "a slip",
+                )
     else:
         while not slips(low := high / step):
-            high, step = low, step**2
+            high = low
+            step = step**2
             if low < 1.0 / WIDEST:
-                raise InvalidValueError("model", f"let go below 1/{WIDEST:g} of the holding_load", "no slip")
+                raise InvalidValueError(
+                    "model", f"let go below 1/{WIDEST:g} of the holding_load", "no slip"
+                )
     while high - low > CLOSE:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if slips(middle) else (low, middle)
@@ -174,7 +216,9 @@ def _falling(high: float, low: float, ramp: float) -> Signal:
 def _slips(model: Any, body: Body, load: np.ndarray, grip: Signal) -> bool:
     """Return True if a body under a constant load `[3]` slips as the grip changes."""
     end = float(grip.times[-1]) + AFTER
-    scene = Scene(body, Contact(model, grip), end, force=load, save_every=end, start="equilibrium")
+    scene = Scene(
+        body, Contact(model, grip), end, force=load, save_every=end, start="equilibrium"
+    )
     data = simulate(scene).data
     force = float(grip.values[-1])
     x, y, theta = (float(data[name][-1]) for name in ("x", "y", "theta"))

@@ -56,9 +56,11 @@ class Aim(NamedTuple):
     def scales(self) -> np.ndarray:
         """Units of the speeds (3), the slide (2) and the angle, as `[6]`."""
         if self.angle is not None:
-            slide, angle = SHIFT * self.radius, ANGLE * abs(self.angle)
+            slide = SHIFT * self.radius
+            angle = ANGLE * abs(self.angle)
         else:
-            slide, angle = 1e-3 * float(np.hypot(*self.slide)), TURN
+            slide = 1e-3 * float(np.hypot(*self.slide))
+            angle = TURN
         return np.array([SPEED, SPEED, SPEED / self.radius, slide, slide, angle])
 
     def misses(self, end: np.ndarray) -> np.ndarray:
@@ -73,13 +75,17 @@ class Grips:
     """
 
     def __init__(self, scene: Scene, contact: int, factors: Sequence[float]) -> None:
-        self.scene, self.index = scene, contact
+        self.scene = scene
+        self.index = contact
         self.name = f"{scene.contacts[contact].name}.normal_force"
         for law in (each.model.law for each in scene.contacts):
             if not (hasattr(law, "mu_c") or hasattr(law, "mu_s")):
                 rule = "have mu_c and mu_s to plan with uncertain friction"
                 raise InvalidValueError("law", rule, type(law).__name__)
-        self._members = {factor: [with_friction(each, factor) for each in scene.contacts] for factor in factors}
+        self._members = {
+            factor: [with_friction(each, factor) for each in scene.contacts]
+            for factor in factors
+        }
         held = scene.start == "equilibrium"
         self.first = float(scene.contacts[contact].normal_force(0.0)) if held else None
         """Normal force that holds the body at first [N]; None where it may be any."""
@@ -94,18 +100,30 @@ class Grips:
     def scene_of(self, profile: Signal, factor: float = 1.0) -> Scene:
         """Return the scene with the profile in place."""
         contacts = list(self._members[factor])
-        contacts[self.index] = dataclasses.replace(contacts[self.index], normal_force=profile)
+        contacts[self.index] = dataclasses.replace(
+            contacts[self.index], normal_force=profile
+        )
         return dataclasses.replace(self.scene, contacts=contacts)
 
-    def ends(self, profile: Signal, factors: Sequence[float], rtol: float | None = TIGHT) -> list[np.ndarray]:
+    def ends(
+        self, profile: Signal, factors: Sequence[float], rtol: float | None = TIGHT
+    ) -> list[np.ndarray]:
         """Return the end `[6]` of the motion under each friction."""
         self._simulated.append(len(factors))
 
         def one(factor: float) -> np.ndarray:
             scene = self.scene_of(profile, factor)
             histories = simulate(scene, rtol=rtol, save_every=scene.t_end).histories
-            last = np.array([float(np.asarray(histories[name].values)[-1]) for name in STATES])
-            return np.array([*last[:3], *slide_of(scene, self.index, last[3:]), last[5] - scene.body.angle])
+            last = np.array(
+                [float(np.asarray(histories[name].values)[-1]) for name in STATES]
+            )
+            return np.array(
+                [
+                    *last[:3],
+                    *slide_of(scene, self.index, last[3:]),
+                    last[5] - scene.body.angle,
+                ]
+            )
 
         return threads.each(one, factors)
 
@@ -114,11 +132,17 @@ class Grips:
         self.jacobians += len(factors)
 
         def one(factor: float) -> np.ndarray:
-            scene, knots = self.scene_of(profile, factor), {self.name: profile.times}
+            scene = self.scene_of(profile, factor)
+            knots = {self.name: profile.times}
             options = SolverOptions(rtol=LOOSE, save_every=scene.t_end)
             found = scene_sensitivities(scene, (), signals=knots, options=options)
-            slopes, pose = found.d_motion[-1].copy(), found.motion[-1, 3:]
-            x, y = slide_of(scene, self.index, pose) + grip_position(scene, self.index) - pose[:2]
+            slopes = found.d_motion[-1].copy()
+            pose = found.motion[-1, 3:]
+            x, y = (
+                slide_of(scene, self.index, pose)
+                + grip_position(scene, self.index)
+                - pose[:2]
+            )
             slopes[3:5] += np.outer([-y, x], slopes[5])
             return slopes
 
@@ -127,7 +151,8 @@ class Grips:
 
 def grip_position(scene: Scene, contact: int) -> np.ndarray:
     """Return the initial position of the contact frame's origin in the world `[2]` [m]."""
-    body, chosen = scene.body, scene.contacts[contact]
+    body = scene.body
+    chosen = scene.contacts[contact]
     if chosen.mounted_on == "world":
         return np.array(chosen.position)
     return body.position + rotate(chosen.position, body.angle)
@@ -136,20 +161,33 @@ def grip_position(scene: Scene, contact: int) -> np.ndarray:
 def slide_of(scene: Scene, contact: int, pose: np.ndarray) -> np.ndarray:
     """Return the displacement `[..., 2]` [m] of the place that was under a contact, at poses `[..., 3]`."""
     grip = grip_position(scene, contact)
-    return pose[..., :2] + rotate(grip - scene.body.position, pose[..., 2] - scene.body.angle) - grip
+    return (
+        pose[..., :2]
+        + rotate(grip - scene.body.position, pose[..., 2] - scene.body.angle)
+        - grip
+    )
 
 
-def load_on(scene: Scene, contact: int, angle: float, slide: Any, time: float) -> np.ndarray:
+def load_on(
+    scene: Scene, contact: int, angle: float, slide: Any, time: float
+) -> np.ndarray:
     """Return the load of gravity, applied force and springs on one contact `[3]` [N, N, N m] once the body has moved.
 
     By `angle` [rad] about the grip and by `slide` `[2]` [m]; about the origin of the contact frame, in its axes, of one
     of the identical contacts.
     """
-    body, chosen, grip = scene.body, scene.contacts[contact], grip_position(scene, contact)
+    body = scene.body
+    chosen = scene.contacts[contact]
+    grip = grip_position(scene, contact)
     at = grip + slide + rotate(body.position - grip, angle)
-    moved = dataclasses.replace(body, position=at, angle=body.angle + angle, velocity=(0.0, 0.0, 0.0))
+    moved = dataclasses.replace(
+        body, position=at, angle=body.angle + angle, velocity=(0.0, 0.0, 0.0)
+    )
     there = dataclasses.replace(scene, body=moved, start="rest")
-    return np.linalg.solve(contact_map(there, chosen).T, pull_on(scene, moved, time)) / chosen.count
+    return (
+        np.linalg.solve(contact_map(there, chosen).T, pull_on(scene, moved, time))
+        / chosen.count
+    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -196,28 +234,59 @@ class GripReport(ByValue):
             wanted = f"turn by {np.rad2deg(self.goal['angle']):.4g} degrees"
             per = f"{np.rad2deg(self.per_percent):.2g} degrees"
         else:
-            wanted = "slide by ({:.4g}, {:.4g}) mm".format(*(1e3 * np.array(self.goal["slide"])))
+            wanted = "slide by ({:.4g}, {:.4g}) mm".format(
+                *(1e3 * np.array(self.goal["slide"]))
+            )
             per = f"{1e3 * self.per_percent:.2g} mm"
         lines = [f"Grip plan: {wanted}.", ""]
-        lines += [f"{'friction':>9}{'turn [deg]':>13}{'slide x [mm]':>15}{'slide y [mm]':>15}"]
-        for factor, angle, (x, y) in zip(self.frictions, self.angles, self.slides, strict=True):
+        lines += [
+            f"{'friction':>9}{'turn [deg]':>13}{'slide x [mm]':>15}{'slide y [mm]':>15}"
+        ]
+        for factor, angle, (x, y) in zip(
+            self.frictions, self.angles, self.slides, strict=True
+        ):
             change = f"{100.0 * (factor - 1.0):+.3g} %" if factor != 1.0 else "nominal"
-            lines.append(f"{change:>9}{np.rad2deg(angle):>13.3f}{1e3 * x:>15.3f}{1e3 * y:>15.3f}")
-        lines += ["", f"An error of one percent in friction changes the result by {per}."]
-        lines += [f"The final grip is {self.grip:.3g} N, {self.grip / self.holding:.2f} times the holding force."]
-        lines += [f"{self.simulations} simulations, {self.jacobians} Jacobians, {self.wall_time:.2g} s."]
+            lines.append(
+                f"{change:>9}{np.rad2deg(angle):>13.3f}{1e3 * x:>15.3f}{1e3 * y:>15.3f}"
+            )
+        lines += [
+            "",
+            f"An error of one percent in friction changes the result by {per}.",
+        ]
+        lines += [
+            f"The final grip is {self.grip:.3g} N, {self.grip / self.holding:.2f} times the holding force."
+        ]
+        lines += [
+            f"{self.simulations} simulations, {self.jacobians} Jacobians, {self.wall_time:.2g} s."
+        ]
         return "\n".join(lines)
 
     __repr__ = __str__
 
 
 def report_of(
-    aim: Any, frictions: Sequence[float], ends: Sequence[np.ndarray], grip: float, holding: float, cost: Any
+    aim: Any,
+    frictions: Sequence[float],
+    ends: Sequence[np.ndarray],
+    grip: float,
+    holding: float,
+    cost: Any,
 ) -> GripReport:
     """Return the report on the ends `[6]` of a plan, one for each friction (see `motions.Aim`)."""
     less, end, more = (ends[frictions.index(each)] for each in (0.99, 1.0, 1.01))
-    goal = {"slide": tuple(aim.slide.tolist())} if aim.angle is None else {"angle": aim.angle}
-    per_percent = abs(aim.progress(more) - aim.progress(less)) / 2.0 * float(np.linalg.norm(aim.end))
-    speed, every = float(np.linalg.norm(end[:3] * [1.0, 1.0, aim.radius])), np.array(ends)
+    goal = (
+        {"slide": tuple(aim.slide.tolist())}
+        if aim.angle is None
+        else {"angle": aim.angle}
+    )
+    per_percent = (
+        abs(aim.progress(more) - aim.progress(less))
+        / 2.0
+        * float(np.linalg.norm(aim.end))
+    )
+    speed = float(np.linalg.norm(end[:3] * [1.0, 1.0, aim.radius]))
+    every = np.array(ends)
     of_nominal = goal, float(end[5]), end[3:5], speed, grip, holding
-    return GripReport(*of_nominal, np.array(frictions), every[:, 5], every[:, 3:5], per_percent, *cost)
+    return GripReport(
+        *of_nominal, np.array(frictions), every[:, 5], every[:, 3:5], per_percent, *cost
+    )

@@ -68,10 +68,19 @@ class PushReport:
     """Computing time of the plan [s]."""
 
     def __str__(self) -> str:
-        rows = (("goal", self.goal), ("reached", self.end), ("with an ellipsoid", self.ellipsoid_end))
+        rows = (
+            ("goal", self.goal),
+            ("reached", self.end),
+            ("with an ellipsoid", self.ellipsoid_end),
+        )
         lines = [f"{'':18}{'x [mm]':>10}{'y [mm]':>10}{'turn [deg]':>12}"]
-        lines += [f"{name:18}{1e3 * x:>10.2f}{1e3 * y:>10.2f}{math.degrees(a):>12.2f}" for name, (x, y, a) in rows]
-        lines += [f"{1e3 * self.length:.4g} mm long, on edge {self.edge}, using {self.used:.0%} of the friction cone."]
+        lines += [
+            f"{name:18}{1e3 * x:>10.2f}{1e3 * y:>10.2f}{math.degrees(a):>12.2f}"
+            for name, (x, y, a) in rows
+        ]
+        lines += [
+            f"{1e3 * self.length:.4g} mm long, on edge {self.edge}, using {self.used:.0%} of the friction cone."
+        ]
         return "\n".join(lines)
 
 
@@ -121,27 +130,41 @@ def plan_push(
     validation.instance("slider", slider, Slider, "a Slider")
     validation.instance("pusher", pusher, Pusher, "a Pusher")
     if pusher.width > 0.0 or pusher.mu == 0.0:
-        raise InvalidValueError("pusher", "be a point with friction, for a plan", pusher)
-    start, goal = validation.vector("start", start, 3), validation.vector("goal", goal, 3)
+        raise InvalidValueError(
+            "pusher", "be a point with friction, for a plan", pusher
+        )
+    start = validation.vector("start", start, 3)
+    goal = validation.vector("goal", goal, 3)
     margin = validation.number("margin", margin)
     if not 0.0 <= margin < 1.0:
         raise InvalidValueError("margin", "be >= 0 and < 1", margin)
     count = len(slider.outline)
-    chosen = range(count) if edges is None else [validation.count("edges", each, 0, count - 1) for each in edges]
-    begin, largest = time.perf_counter(), (1.0 - margin) * math.atan(pusher.mu)
+    chosen = (
+        range(count)
+        if edges is None
+        else [validation.count("edges", each, 0, count - 1) for each in edges]
+    )
+    begin = time.perf_counter()
+    largest = (1.0 - margin) * math.atan(pusher.mu)
     if not np.any(goal - start):
         raise InvalidValueError("goal", "differ from the start", goal.tolist())
-    aim, found = _relative(start, goal), []
+    aim = _relative(start, goal)
+    found = []
     for shares in PLACES:
         for edge in chosen:
-            corner, end = slider.outline[edge], slider.outline[(edge + 1) % count]
+            corner = slider.outline[edge]
+            end = slider.outline[(edge + 1) % count]
             for at in (corner + share * (end - corner) for share in shares):
-                length, x = _shortest(slider, TouchPoint(at, slider.inward[edge]), largest, aim)
+                length, x = _shortest(
+                    slider, TouchPoint(at, slider.inward[edge]), largest, aim
+                )
                 found += [(length, x, edge, at)] if length < math.inf else []
         if found:
             break
     if not found:
-        raise SolverError("no plan reaches the goal: try other edges, a smaller margin or a pose further ahead")
+        raise SolverError(
+            "no plan reaches the goal: try other edges, a smaller margin or a pose further ahead"
+        )
     length, x, edge, at = min(found, key=lambda each: each[0])
     place = TouchPoint(at, slider.inward[edge])
     path = _path(slider, place, x, start)
@@ -153,8 +176,13 @@ def plan_push(
             break
         tried = _path(slider, place, x, start)
         both = (path, done), (tried, push(slider, pusher, tried, start=start))
-        path, done = min(both, key=lambda e: np.abs((e[1].end - goal) * [1.0, 1.0, slider.size]).max())
-    ellipsoid = LimitSurfaceEllipsoid(slider.surface.patch, normal_force=slider.surface.normal_force)
+        path, done = min(
+            both,
+            key=lambda e: np.abs((e[1].end - goal) * [1.0, 1.0, slider.size]).max(),
+        )
+    ellipsoid = LimitSurfaceEllipsoid(
+        slider.surface.patch, normal_force=slider.surface.normal_force
+    )
     rest = push(Slider(ellipsoid, slider.outline), pusher, path, start=start)
     report = PushReport(
         _triple(goal), _triple(done.end), _triple(rest.end), edge, (float(at[0]), float(at[1])), length,
@@ -177,9 +205,11 @@ def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
 def _moved(pose: np.ndarray, twist: np.ndarray, distance: float) -> np.ndarray:
     """Return a pose after a twist of its own axes has been held: an arc."""
     vx, vy, omega = twist.tolist()
-    half, (x, y, angle) = 0.5 * distance * omega, pose.tolist()
+    half = 0.5 * distance * omega
+    (x, y, angle) = pose.tolist()
     chord = distance * (math.sin(half) / half if abs(half) > 1e-12 else 1.0)
-    c, s = chord * math.cos(angle + half), chord * math.sin(angle + half)
+    c = chord * math.cos(angle + half)
+    s = chord * math.sin(angle + half)
     return np.array([x + c * vx - s * vy, y + s * vx + c * vy, angle + 2.0 * half])
 
 
@@ -190,13 +220,18 @@ def _twist(slider: Slider, place: TouchPoint, angle: float) -> np.ndarray:
 
 
 def _shortest(
-    slider: Slider, place: TouchPoint, largest: float, goal: np.ndarray, known: np.ndarray | None = None
+    slider: Slider,
+    place: TouchPoint,
+    largest: float,
+    goal: np.ndarray,
+    known: np.ndarray | None = None,
 ) -> tuple[float, np.ndarray]:
     """Return the length of the shortest plan at a place, infinite without one, and angles and lengths `[2 PARTS]`."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import least_squares, minimize
 
-    unit, nodes = slider.size, np.linspace(-largest, largest, NODES)
+    unit = slider.size
+    nodes = np.linspace(-largest, largest, NODES)
     twists = CubicSpline(nodes, [_twist(slider, place, each) for each in nodes])
 
     def miss(x: np.ndarray) -> np.ndarray:
@@ -211,24 +246,42 @@ def _shortest(
     far = max(math.hypot(goal[0], goal[1]) / unit, 0.3)
     bounds = [(-largest, largest)] * PARTS + [(0.0, 10.0 * far + 20.0)] * PARTS
     slope = np.repeat([0.0, 1.0], PARTS)
-    best, found = math.inf, np.zeros(2 * PARTS)
-    begins = [np.array([largest * each for each in turns] + [0.4 * far] * PARTS) for turns in _TURNS]
+    best = math.inf
+    found = np.zeros(2 * PARTS)
+    begins = [
+        np.array([largest * each for each in turns] + [0.4 * far] * PARTS)
+        for turns in _TURNS
+    ]
     for begin in begins if known is None else [known]:
-        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # older SciPy rounds beyond the bounds
+        with warnings.catch_warnings(
+            action="ignore", category=RuntimeWarning
+        ):  # older SciPy rounds beyond the bounds
             run = minimize(
                 length, begin, jac=lambda x: slope, method="SLSQP", bounds=bounds,
                 constraints={"type": "eq", "fun": miss}, options={"ftol": 1e-6, "maxiter": 30},
             )  # fmt: skip
         low, high = np.transpose(bounds)
-        x = least_squares(miss, np.clip(run.x, low + 1e-9, high - 1e-9), bounds=(low, high), xtol=1e-14, ftol=1e-14).x
+        x = least_squares(
+            miss,
+            np.clip(run.x, low + 1e-9, high - 1e-9),
+            bounds=(low, high),
+            xtol=1e-14,
+            ftol=1e-14,
+        ).x
         if np.abs(miss(x)).max() < REACHED and length(x) < best:
-            best, found = length(x), x
+            best = length(x)
+            found = x
     return unit * best, found
 
 
-def _path(slider: Slider, place: TouchPoint, x: np.ndarray, start: np.ndarray) -> Signal:
+def _path(
+    slider: Slider, place: TouchPoint, x: np.ndarray, start: np.ndarray
+) -> Signal:
     """Return the path of the pusher at unit speed, as lines."""
-    pose, now, times, at = start, 0.0, [], []
+    pose = start
+    now = 0.0
+    times = []
+    at = []
     for angle, distance in zip(x[:PARTS], slider.size * x[PARTS:], strict=True):
         if distance < 1e-9:
             continue
@@ -237,5 +290,6 @@ def _path(slider: Slider, place: TouchPoint, x: np.ndarray, start: np.ndarray) -
             here = _moved(pose, twist, share * distance)
             at.append(here[:2] + rotate(place.at, here[2]))
             times.append(now + share * distance)
-        pose, now = _moved(pose, twist, distance), now + distance
+        pose = _moved(pose, twist, distance)
+        now = now + distance
     return Signal.sampled(times, at, "linear")

@@ -13,8 +13,23 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
-from planarfriction.planning.contact_modes import LEFT, RIGHT, STICK, TouchPoint, motion_at
-from planarfriction.planning.slider import FACE, Pusher, Scenery, Slider, Touch, flush_after, place_of, touch_after
+from planarfriction.planning.contact_modes import (
+    LEFT,
+    RIGHT,
+    STICK,
+    TouchPoint,
+    motion_at,
+)
+from planarfriction.planning.slider import (
+    FACE,
+    Pusher,
+    Scenery,
+    Slider,
+    Touch,
+    flush_after,
+    place_of,
+    touch_after,
+)
 from planarfriction.scenes import Signal
 from planarfriction.scenes.signal import as_signal
 
@@ -55,7 +70,10 @@ class Push(ByValue):
 
     def __repr__(self) -> str:
         x, y, theta = self.end
-        modes = ", ".join(f"{name} {np.mean(self.mode == name):.0%}" for name in dict.fromkeys(self.mode.tolist()))
+        modes = ", ".join(
+            f"{name} {np.mean(self.mode == name):.0%}"
+            for name in dict.fromkeys(self.mode.tolist())
+        )
         return f"Push to ({1e3 * x:.4g} mm, {1e3 * y:.4g} mm, {np.degrees(theta):.4g} deg): {modes}"
 
     def plot(self) -> Any:
@@ -99,10 +117,15 @@ def push(
     validation.instance("slider", slider, Slider, "a Slider")
     validation.instance("pusher", pusher, Pusher, "a Pusher")
     if not isinstance(path, Signal) or path.hold != "linear" or len(path.times) < 2:
-        raise InvalidValueError("path", 'be a Signal of two samples or more with hold="linear"', path)
-    path = as_signal("path", path, 2 if path.columns == 2 and pusher.width == 0.0 else 3)
+        raise InvalidValueError(
+            "path", 'be a Signal of two samples or more with hold="linear"', path
+        )
+    path = as_signal(
+        "path", path, 2 if path.columns == 2 and pusher.width == 0.0 else 3
+    )
     start = validation.vector("start", start, 3).astype(float)
-    count, rtol = validation.count("samples", samples, 2, MOST_SAMPLES), validation.positive("rtol", rtol)
+    count = validation.count("samples", samples, 2, MOST_SAMPLES)
+    rtol = validation.positive("rtol", rtol)
     poses = path.values if path.columns == 3 else np.pad(path.values, ((0, 0), (0, 1)))
     scenery = Scenery(slider, pusher, path.times, poses)
     time = np.linspace(path.times[0], path.times[-1], count)
@@ -111,15 +134,24 @@ def push(
     return Push(slider, pusher, time, found[0], at, np.array(found[1]), found[2])
 
 
-def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) -> tuple[np.ndarray, list[str], Any]:
+def _follow(
+    scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float
+) -> tuple[np.ndarray, list[str], Any]:
     """Return poses, modes and places at given times, phase after phase."""
     from scipy.integrate import solve_ivp
 
-    poses, modes, places = np.tile(start, (len(time), 1)), [FREE] * len(time), np.full((len(time), 2), np.nan)
-    slider, mu = scenery.slider, scenery.pusher.mu
+    poses = np.tile(start, (len(time), 1))
+    modes = [FREE] * len(time)
+    places = np.full((len(time), 2), np.nan)
+    slider = scenery.slider
+    mu = scenery.pusher.mu
     if scenery.gap(time[0], start) < -1e-6 * slider.size:
-        raise InvalidValueError("path", "begin outside the slider", scenery.pose(time[0]).tolist())
-    now, q, held = float(time[0]), start.copy(), ""
+        raise InvalidValueError(
+            "path", "begin outside the slider", scenery.pose(time[0]).tolist()
+        )
+    now = float(time[0])
+    q = start.copy()
+    held = ""
     contact: Touch | None = None
     restless = 0
     for _ in range(MOST_PHASES):
@@ -130,49 +162,82 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
             touched = touch_after(scenery, now, q)
             if touched is None:
                 return poses, modes, places
-            (now, contact), held = touched, ""
+            (now, contact) = touched
+            held = ""
         end = scenery.piece_end(now)
         place, velocity = place_of(scenery, contact, now, q, forward=True)
         if velocity[:2] @ place.normal <= 0.0:
-            now, contact = float(np.nextafter(now, np.inf)), None
+            now = float(np.nextafter(now, np.inf))
+            contact = None
             continue
         first = motion_at(slider.surface, place, mu, velocity)
-        mode = first.mode if first.mode != held else _neighbour(slider, place, mu, velocity, held)
+        mode = (
+            first.mode
+            if first.mode != held
+            else _neighbour(slider, place, mu, velocity, held)
+        )
         held = ""
         if first.leans:
             contact = flush_after(scenery, contact, now, q, first.leans)
             continue
         mode = "" if restless >= RESTLESS and not place.half_width else mode
         rate, ends = _phase(scenery, contact, mode)
-        options = {"rtol": rtol, "atol": rtol * np.array([slider.size, slider.size, 1.0]), "first_step": end - now}
-        run = solve_ivp(rate, (now, end), q, events=list(ends.values()), dense_output=True, **options)
+        options = {
+            "rtol": rtol,
+            "atol": rtol * np.array([slider.size, slider.size, 1.0]),
+            "first_step": end - now,
+        }
+        run = solve_ivp(
+            rate,
+            (now, end),
+            q,
+            events=list(ends.values()),
+            dense_output=True,
+            **options,
+        )
         here = (time > now) & (time <= run.t[-1]) | (time == now)
         if here.any():
             poses[here] = run.sol(time[here]).T
             for k in np.flatnonzero(here):
                 place, velocity = place_of(scenery, contact, time[k], poses[k])
-                modes[k] = mode if mode and mu > 0.0 else motion_at(slider.surface, place, mu, velocity).mode
+                modes[k] = (
+                    mode
+                    if mode and mu > 0.0
+                    else motion_at(slider.surface, place, mu, velocity).mode
+                )
                 places[k] = place.at
         restless = restless + 1 if run.t[-1] - now < STILL * (time[-1] - time[0]) else 0
-        q, now = run.y[:, -1].copy(), float(run.t[-1])
+        q = run.y[:, -1].copy()
+        now = float(run.t[-1])
         poses[time > now] = q
         if run.status == 0:
             continue
-        what = next(name for name, each in zip(ends, run.t_events, strict=True) if len(each))
+        what = next(
+            name for name, each in zip(ends, run.t_events, strict=True) if len(each)
+        )
         if what == "mode":
             held = mode
         elif what == "closes":
             contact = scenery.flush(now, q)
         else:
             contact = None
-    raise InvalidValueError("path", f"change the contact of the pusher at most {MOST_PHASES} times", f"t = {now:g} s")
+    raise InvalidValueError(
+        "path",
+        f"change the contact of the pusher at most {MOST_PHASES} times",
+        f"t = {now:g} s",
+    )
 
 
-def _neighbour(slider: Slider, place: TouchPoint, mu: float, velocity: np.ndarray, held: str) -> str:
+def _neighbour(
+    slider: Slider, place: TouchPoint, mu: float, velocity: np.ndarray, held: str
+) -> str:
     """Return the mode after one that has come to its end, where rounding still takes it for the old one."""
     if held != STICK:
         return STICK
-    left, right = (motion_at(slider.surface, place, mu, velocity, mode).slack for mode in (LEFT, RIGHT))
+    left, right = (
+        motion_at(slider.surface, place, mu, velocity, mode).slack
+        for mode in (LEFT, RIGHT)
+    )
     return LEFT if left > right else RIGHT
 
 
@@ -182,11 +247,16 @@ def _phase(scenery: Scenery, contact: Touch, mode: str) -> tuple[Any, dict[str, 
     @functools.lru_cache(maxsize=1)
     def motion(t: float, *q: float) -> tuple[Any, Any, np.ndarray]:
         place, velocity = place_of(scenery, contact, t, np.array(q))
-        return motion_at(scenery.slider.surface, place, scenery.pusher.mu, velocity, mode), place, velocity
+        return (
+            motion_at(scenery.slider.surface, place, scenery.pusher.mu, velocity, mode),
+            place,
+            velocity,
+        )
 
     def rate(t: float, q: np.ndarray) -> np.ndarray:
         vx, vy, omega = motion(t, *q)[0].twist
-        c, s = np.cos(q[2]), np.sin(q[2])
+        c = np.cos(q[2])
+        s = np.sin(q[2])
         return np.array([c * vx - s * vy, s * vx + c * vy, omega])
 
     def approach(t: float, q: np.ndarray) -> float:
@@ -195,8 +265,11 @@ def _phase(scenery: Scenery, contact: Touch, mode: str) -> tuple[Any, dict[str, 
 
     ends: dict[str, Any] = {"mode": lambda t, q: motion(t, *q)[0].slack} if mode else {}
     ends |= {"leaves": approach, "ends": functools.partial(scenery.within, contact)}
-    if scenery.pusher.width > 0.0 and contact.kind != FACE:  # something else may begin to touch
+    if (
+        scenery.pusher.width > 0.0 and contact.kind != FACE
+    ):  # something else may begin to touch
         ends["closes"] = functools.partial(scenery.clear, contact)
     for event in ends.values():
-        event.terminal, event.direction = True, -1
+        event.terminal = True
+        event.direction = -1
     return rate, ends

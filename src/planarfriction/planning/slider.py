@@ -33,12 +33,24 @@ class Slider(ByValue):
         validation.instance("surface", self.surface, LimitSurface, "a limit surface")
         corners = validation.array("outline", self.outline, (None, 2))
         if len(corners) < 3:
-            raise InvalidValueError("outline", "have at least 3 points", f"{len(corners)}")
+            raise InvalidValueError(
+                "outline", "have at least 3 points", f"{len(corners)}"
+            )
         edges = np.roll(corners, -1, axis=0) - corners
-        turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
-        winding = np.angle(np.roll(edges, -1, axis=0) @ [1, 1j] / np.where(edges.any(1), edges @ [1, 1j], 1)).sum()
+        turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(
+            edges[:, 0], -1
+        )
+        winding = np.angle(
+            np.roll(edges, -1, axis=0)
+            @ [1, 1j]
+            / np.where(edges.any(1), edges @ [1, 1j], 1)
+        ).sum()
         if not ((turns > 0.0).all() or (turns < 0.0).all()) or abs(winding) > 7.0:
-            raise InvalidValueError("outline", "be convex, without three corners on a line", "another polygon")
+            raise InvalidValueError(
+                "outline",
+                "be convex, without three corners on a line",
+                "another polygon",
+            )
         if turns[0] < 0.0:
             corners = corners[::-1].copy()
         corners.setflags(write=False)
@@ -65,7 +77,9 @@ class Slider(ByValue):
 
         Raises `InvalidValueError` unless it is a point.
         """
-        return np.einsum("mi,mi->m", self.outline - validation.vector("point", point, 2), self.inward)
+        return np.einsum(
+            "mi,mi->m", self.outline - validation.vector("point", point, 2), self.inward
+        )
 
 
 @dataclass(frozen=True)
@@ -111,11 +125,17 @@ class Touch(NamedTuple):
 class Scenery:
     """A slider, a pusher and the path of the latter: all the geometry of a push."""
 
-    def __init__(self, slider: Slider, pusher: Pusher, times: np.ndarray, poses: np.ndarray) -> None:
-        self.slider, self.pusher = slider, pusher
-        self._times, self._poses, self.path_end = times, poses, float(times[-1])
+    def __init__(
+        self, slider: Slider, pusher: Pusher, times: np.ndarray, poses: np.ndarray
+    ) -> None:
+        self.slider = slider
+        self.pusher = pusher
+        self._times = times
+        self._poses = poses
+        self.path_end = float(times[-1])
         self._rates = np.diff(poses, axis=0) / np.diff(times)[:, None]
-        self._ends, self.near = pusher.ends, _NEAR * slider.size
+        self._ends = pusher.ends
+        self.near = _NEAR * slider.size
         edges = np.roll(slider.outline, -1, axis=0) - slider.outline
         self._lengths = np.hypot(*edges.T)
 
@@ -125,7 +145,10 @@ class Scenery:
         return self._poses[i] + (t - self._times[i]) * self._rates[i]
 
     def _piece(self, t: float, forward: bool = False) -> int:
-        i = int(np.searchsorted(self._times, t, side="right" if forward else "left")) - 1
+        i = (
+            int(np.searchsorted(self._times, t, side="right" if forward else "left"))
+            - 1
+        )
         return min(max(i, 0), len(self._rates) - 1)
 
     def piece_end(self, t: float) -> float:
@@ -135,15 +158,19 @@ class Scenery:
     def end(self, i: int, t: float, q: np.ndarray) -> np.ndarray:
         """Return an end of the pusher in the slider's axes `[2]`."""
         x, y, angle = self.pose(t)
-        (a, b), c, s = self._ends[i], math.cos(angle), math.sin(angle)
+        (a, b) = self._ends[i]
+        c = math.cos(angle)
+        s = math.sin(angle)
         return _inside(q, x + c * a - s * b, y + s * a + c * b)
 
     def corners(self, t: float, q: np.ndarray) -> np.ndarray:
         """Return the corners of the slider in the pusher's axes `[M, 2]`."""
-        c, s = math.cos(q[2]), math.sin(q[2])
+        c = math.cos(q[2])
+        s = math.sin(q[2])
         world = self.slider.outline @ np.array([[c, s], [-s, c]]) + q[:2]
         x, y, angle = self.pose(t)
-        c, s = math.cos(angle), math.sin(angle)
+        c = math.cos(angle)
+        s = math.sin(angle)
         return (world - [x, y]) @ np.array([[c, -s], [s, c]])
 
     def features(self, t: float, q: np.ndarray) -> list[tuple[float, Touch]]:
@@ -171,23 +198,40 @@ class Scenery:
 
         ends = [self.end(i, t, q) for i in range(len(self._ends))]
         pusher = shapely.Point(ends[0]) if len(ends) == 1 else shapely.LineString(ends)
-        away = max(shapely.distance(shapely.Polygon(self.slider.outline), pusher), _LEAST * self.slider.size)
+        away = max(
+            shapely.distance(shapely.Polygon(self.slider.outline), pusher),
+            _LEAST * self.slider.size,
+        )
         vx, vy, omega = self.rate(t, forward=True)
-        speed = math.hypot(vx, vy) + abs(omega) * float(np.hypot(*np.transpose(self._ends)).max())
+        speed = math.hypot(vx, vy) + abs(omega) * float(
+            np.hypot(*np.transpose(self._ends)).max()
+        )
         end = self.piece_end(t)
         return min(end, t + away / speed) if speed * (end - t) > away else end
 
     def clear(self, contact: Touch, t: float, q: np.ndarray) -> float:
         """Return the distance of all that does not touch yet [m]."""
-        return min(gap for gap, each in self.features(t, q) if not _same(contact, each, len(self._lengths))) + self.near
+        return (
+            min(
+                gap
+                for gap, each in self.features(t, q)
+                if not _same(contact, each, len(self._lengths))
+            )
+            + self.near
+        )
 
     def flush(self, t: float, q: np.ndarray) -> Touch:
         """Return the face at the edge that it has closed with."""
-        c, s = math.cos(self.pose(t)[2] - q[2]), math.sin(self.pose(t)[2] - q[2])
+        c = math.cos(self.pose(t)[2] - q[2])
+        s = math.sin(self.pose(t)[2] - q[2])
         along = self.slider.inward @ [c, s]
         edge = int(along.argmax())
         if math.acos(min(along[edge], 1.0)) > _FLUSH:
-            raise InvalidValueError("path", "not wedge the slider between two points of the face", f"t = {t:g} s")
+            raise InvalidValueError(
+                "path",
+                "not wedge the slider between two points of the face",
+                f"t = {t:g} s",
+            )
         return Touch(FACE, edge)
 
     def within(self, contact: Touch, t: float, q: np.ndarray) -> float:
@@ -216,15 +260,19 @@ class Scenery:
 
 def _inside(q: np.ndarray, x: float, y: float) -> np.ndarray:
     """Return a point of the world in the axes of a slider with the pose q."""
-    c, s = math.cos(q[2]), math.sin(q[2])
-    dx, dy = x - q[0], y - q[1]
+    c = math.cos(q[2])
+    s = math.sin(q[2])
+    dx = x - q[0]
+    dy = y - q[1]
     return np.array([c * dx + s * dy, c * dy - s * dx])
 
 
 def _same(contact: Touch, other: Touch, edges: int) -> bool:
     """Return True if a feature is the one that touches: an end at any edge, or a corner."""
     return contact.kind == other.kind and (
-        contact.end == other.end if contact.kind == END else contact.edge % edges == other.edge
+        contact.end == other.end
+        if contact.kind == END
+        else contact.edge % edges == other.edge
     )
 
 
@@ -232,26 +280,39 @@ def place_of(
     scenery: Scenery, contact: Touch, t: float, q: np.ndarray, forward: bool = False
 ) -> tuple[TouchPoint, np.ndarray]:
     """Return the place at which a slider is touched, and the velocity of the pusher there, `[3]`, in its axes."""
-    slider, (x, y, angle), half = scenery.slider, scenery.pose(t), 0.0
+    slider = scenery.slider
+    (x, y, angle) = scenery.pose(t)
+    half = 0.0
     if contact.kind == END:
-        at, normal = scenery.end(contact.end, t, q), slider.inward[contact.edge]
+        at = scenery.end(contact.end, t, q)
+        normal = slider.inward[contact.edge]
     elif contact.kind == CORNER:
         at = slider.outline[contact.edge]
         normal = np.array([math.cos(angle - q[2]), math.sin(angle - q[2])])
     else:
         low, high = scenery.overlap(contact.edge, t, q)
-        half, normal = 0.5 * max(high - low, 0.0), slider.inward[contact.edge]
-        at = slider.outline[contact.edge] + 0.5 * (low + high) * slider.along[contact.edge]
+        half = 0.5 * max(high - low, 0.0)
+        normal = slider.inward[contact.edge]
+        at = (
+            slider.outline[contact.edge]
+            + 0.5 * (low + high) * slider.along[contact.edge]
+        )
     vx, vy, omega = scenery.rate(t, forward)
-    c, s = math.cos(q[2]), math.sin(q[2])
+    c = math.cos(q[2])
+    s = math.sin(q[2])
     arm = at - _inside(q, x, y)
-    velocity = np.array([c * vx + s * vy - omega * arm[1], c * vy - s * vx + omega * arm[0], omega])
+    velocity = np.array(
+        [c * vx + s * vy - omega * arm[1], c * vy - s * vx + omega * arm[0], omega]
+    )
     return TouchPoint(at, normal, half), velocity
 
 
-def flush_after(scenery: Scenery, contact: Touch, t: float, q: np.ndarray, leans: int) -> Touch:
+def flush_after(
+    scenery: Scenery, contact: Touch, t: float, q: np.ndarray, leans: int
+) -> Touch:
     """Return what still touches when a face turns about its left end (1) or its right one (-1)."""
-    edge, corners = contact.edge, len(scenery.slider.outline)
+    edge = contact.edge
+    corners = len(scenery.slider.outline)
     right, left = (scenery.along(edge, scenery.end(i, t, q)) for i in range(2))
     if leans > 0:
         return Touch(END, edge, 1) if left >= 0.0 else Touch(CORNER, edge)
@@ -259,20 +320,28 @@ def flush_after(scenery: Scenery, contact: Touch, t: float, q: np.ndarray, leans
     return Touch(END, edge, 0) if inside else Touch(CORNER, (edge + 1) % corners)
 
 
-def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Touch] | None:
+def touch_after(
+    scenery: Scenery, t: float, q: np.ndarray
+) -> tuple[float, Touch] | None:
     """Return time and place at which a pusher that does not touch a slider at rest begins to, or None."""
     from scipy.optimize import brentq
 
-    off = lambda at: scenery.gap(at, q) + scenery.near  # noqa: E731
-    low, before = t, off(t)
+    off = lambda at: scenery.gap(at, q) + scenery.near
+    low = t
+    before = off(t)
     while low < scenery.path_end:
         high = scenery.not_before(low, q)
         after = off(high)
         if after < 0.0 <= before:
             at = brentq(off, low, high, xtol=1e-14 * max(abs(high), 1.0))
-            near = [each for gap, each in scenery.features(at, q) if gap < 100.0 * scenery.near]  # pyright: ignore
+            near = [
+                each
+                for gap, each in scenery.features(at, q)
+                if gap < 100.0 * scenery.near
+            ]  # pyright: ignore
             if len(near) > 1:
                 return at, scenery.flush(at, q)  # pyright: ignore
             return at, min(scenery.features(at, q))[1]  # pyright: ignore
-        low, before = high, after
+        low = high
+        before = after
     return None

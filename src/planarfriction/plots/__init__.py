@@ -7,7 +7,10 @@ label. Animations are written to files.
 
 from planarfriction.plots.animation import animate_solution
 from planarfriction.plots.histories import plot_histories
-from planarfriction.plots.limit_surface import interactive_limit_surface, plot_limit_surface
+from planarfriction.plots.limit_surface import (
+    interactive_limit_surface,
+    plot_limit_surface,
+)
 from planarfriction.plots.motion import plot_motion, plot_solution
 from planarfriction.plots.patch import plot_patch
 

@@ -63,18 +63,27 @@ def animate_solution(
     """
     from planarfriction.scenes.solution import scene_of
 
-    scene_of(validation.instance("solution", solution, pf.Solution, "a Solution"), "the animation")
+    scene_of(
+        validation.instance("solution", solution, pf.Solution, "a Solution"),
+        "the animation",
+    )
     path = validation.path("path", path)
     check_kind(path)
-    times, pace = frame_times(np.asarray(solution.histories["time"].values, dtype=float), slow, fps)
+    times, pace = frame_times(
+        np.asarray(solution.histories["time"].values, dtype=float), slow, fps
+    )
     validation.instance("follow", follow, bool, "True or False")
     dpi = validation.positive("dpi", dpi)
     if not 20.0 <= dpi <= 400.0:
         raise InvalidValueError("dpi", "be from 20 to 400", dpi)
     if not (progress is None or callable(progress)):
-        raise InvalidValueError("progress", "be a function of the time of a frame, or None", progress)
+        raise InvalidValueError(
+            "progress", "be a function of the time of a frame, or None", progress
+        )
     with replacing(path) as file:
-        film = Film(solution, track_of(solution, times), follow=follow, pace=pace, dpi=dpi)
+        film = Film(
+            solution, track_of(solution, times), follow=follow, pace=pace, dpi=dpi
+        )
 
         def frame(number: int) -> np.ndarray:
             if progress is not None:
@@ -85,7 +94,9 @@ def animate_solution(
     return path
 
 
-def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np.ndarray, str]:
+def frame_times(
+    sampled: np.ndarray, slow: float | None, fps: float
+) -> tuple[np.ndarray, str]:
     """Return the times of the frames [s] of a solution with samples at `sampled` [s], and their pace in words."""
     fps = validation.positive("fps", fps)
     if fps > FASTEST:
@@ -108,14 +119,20 @@ def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np
     if slow == 1.0 or span == 0.0:
         words = ""
     else:
-        words = f"   ({slow:g} x slower)" if slow > 1.0 else f"   ({1.0 / slow:g} x faster)"
+        words = (
+            f"   ({slow:g} x slower)" if slow > 1.0 else f"   ({1.0 / slow:g} x faster)"
+        )
     return np.linspace(sampled[0], sampled[-1], count), words
 
 
 def _round_up(value: float) -> float:
     """Return the next of 1, 2, 5, 10, 20, ..."""
     power = 10.0 ** math.floor(math.log10(value))
-    return next(each * power for each in (1.0, 2.0, 5.0, 10.0) if each * power >= value * (1.0 - 1e-12))
+    return next(
+        each * power
+        for each in (1.0, 2.0, 5.0, 10.0)
+        if each * power >= value * (1.0 - 1e-12)
+    )
 
 
 WIDTH, HEIGHT = 9.6, 5.4
@@ -134,11 +151,25 @@ ARROW = 0.3
 class Film:
     """The frames of a track."""
 
-    def __init__(self, solution: pf.Solution, track: Track, *, follow: bool, pace: str, dpi: float):
-        self.track, self.pace = track, pace
-        self.figure = style.PlotFigure(figsize=(WIDTH, HEIGHT), dpi=dpi, facecolor="white")
+    def __init__(
+        self,
+        solution: pf.Solution,
+        track: Track,
+        *,
+        follow: bool,
+        pace: str,
+        dpi: float,
+    ):
+        self.track = track
+        self.pace = pace
+        self.figure = style.PlotFigure(
+            figsize=(WIDTH, HEIGHT), dpi=dpi, facecolor="white"
+        )
         self.canvas = FigureCanvasAgg(self.figure)
-        hardest = sorted(track.contacts, key=lambda each: -each.contact.count * float(each.loads.max()))
+        hardest = sorted(
+            track.contacts,
+            key=lambda each: -each.contact.count * float(each.loads.max()),
+        )
         chosen = sorted(hardest[:MOST_PANELS], key=lambda each: each.index)
         world, places = _places(len(chosen))
         self.axes = self.figure.add_axes(world)
@@ -150,10 +181,16 @@ class Film:
                 axes = self.figure.add_axes(surface, projection="3d")
                 self.panels.append(SurfacePanel(axes, each, beside=len(chosen) - 1))
         self._draw_body(solution)
-        self.views = _filling(_views(solution, track, follow), self.axes.bbox.width / self.axes.bbox.height)
-        far, side = float(np.abs(self.views).max()), float(np.diff(self.views[0], axis=-1).max())
+        self.views = _filling(
+            _views(solution, track, follow),
+            self.axes.bbox.width / self.axes.bbox.height,
+        )
+        far = float(np.abs(self.views).max())
+        side = float(np.diff(self.views[0], axis=-1).max())
         style.show_lengths(self.axes, 1e-3 * max(0.1 * far, side))
-        self.axes.yaxis.set_label_coords(0.022, 0.5, transform=self.figure.transFigure)  # clear of any tick label
+        self.axes.yaxis.set_label_coords(
+            0.022, 0.5, transform=self.figure.transFigure
+        )  # clear of any tick label
         self.axes.locator_params(nbins=7)
         style.tidy(self.axes)
         self._legend()
@@ -180,7 +217,8 @@ class Film:
     def show(self, frame: int) -> None:
         """Show a frame."""
         track = self.track
-        pose, (x, y) = track.poses[frame], self.views[frame]
+        pose = track.poses[frame]
+        (x, y) = self.views[frame]
         self.axes.set(xlim=x, ylim=y)
         move(self.body, self.axes, pose)
         self.path.set_data(*(1e3 * track.poses[: frame + 1, :2].T))
@@ -189,7 +227,9 @@ class Film:
             move([cells], self.axes, each.poses[frame])
             _, centre = each.shape(frame)
             start = 1e3 * placed(centre, each.poses[frame])
-            arrow.set_positions(start, start + self.millimetres_per_newton * each.forces[frame])
+            arrow.set_positions(
+                start, start + self.millimetres_per_newton * each.forces[frame]
+            )
         panels.put_centre(self.centre, track.twists[frame], pose[:2], still=self.still)
         self.clock.set_text(f"t = {track.times[frame]:.{self.digits}f} s{self.pace}")
         self.words.set_text(self._moved(frame))
@@ -197,45 +237,97 @@ class Film:
             panel.show(frame)
 
     def _draw_body(self, solution: pf.Solution) -> None:
-        axes, track = self.axes, self.track
-        lines = [Line2D(*(1e3 * each.T), color="0.25", linewidth=1.5, zorder=5) for each in body_lines(solution)]
+        axes = self.axes
+        track = self.track
+        lines = [
+            Line2D(*(1e3 * each.T), color="0.25", linewidth=1.5, zorder=5)
+            for each in body_lines(solution)
+        ]
         self.body = [axes.add_artist(each) for each in lines]
         (self.path,) = axes.plot([], [], color="0.45", linewidth=0.9, zorder=5)
         self.contacts = []
         for each in track.contacts:
-            cells = axes.add_collection(panels.cells_of(each, edge="face"), autolim=False)
+            cells = axes.add_collection(
+                panels.cells_of(each, edge="face"), autolim=False
+            )
             cells.set_zorder(4)
-            look = {"arrowstyle": "-|>,head_length=5,head_width=2.5", "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
-            arrow = FancyArrowPatch((0, 0), (1, 1), color=style.PALETTE[2], zorder=7, **look)
+            look = {
+                "arrowstyle": "-|>,head_length=5,head_width=2.5",
+                "linewidth": 2.2,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            }
+            arrow = FancyArrowPatch(
+                (0, 0), (1, 1), color=style.PALETTE[2], zorder=7, **look
+            )
             arrow.set_path_effects([withStroke(linewidth=4.2, foreground="white")])
             self.contacts.append((each, cells, axes.add_patch(arrow)))
         self.centre = panels.centre_mark(axes)
         self.still = panels.still_speed(track.twists)
         span = float(track.times[-1] - track.times[0])
-        self.digits = int(np.clip(2 - math.floor(math.log10(span)), 2, 9)) if span > 0.0 else 3
-        self.clock = axes.text(0.0, 1.06, "", transform=axes.transAxes, va="bottom", fontsize="medium")
-        self.words = axes.text(0.0, 1.01, "", transform=axes.transAxes, va="bottom", fontsize="small", color="0.3")
+        self.digits = (
+            int(np.clip(2 - math.floor(math.log10(span)), 2, 9)) if span > 0.0 else 3
+        )
+        self.clock = axes.text(
+            0.0, 1.06, "", transform=axes.transAxes, va="bottom", fontsize="medium"
+        )
+        self.words = axes.text(
+            0.0,
+            1.01,
+            "",
+            transform=axes.transAxes,
+            va="bottom",
+            fontsize="small",
+            color="0.3",
+        )
 
     def _legend(self) -> None:
-        forces = np.concatenate([np.hypot(*each.forces.T)[:, None] for each in self.track.contacts], axis=1)
+        forces = np.concatenate(
+            [np.hypot(*each.forces.T)[:, None] for each in self.track.contacts], axis=1
+        )
         largest = float(forces.max())
         side = float(np.diff(self.views[0], axis=-1).min())
         self.millimetres_per_newton = ARROW * side / largest if largest > 0.0 else 0.0
         unit = unit_for("force", largest)
-        words = f"friction on the body (longest {unit.factor * largest:.3g} {unit.label})"
-        handles: list[Any] = [Line2D([], [], color=style.PALETTE[2], linewidth=2.2, label=words), self.centre]
+        words = (
+            f"friction on the body (longest {unit.factor * largest:.3g} {unit.label})"
+        )
+        handles: list[Any] = [
+            Line2D([], [], color=style.PALETTE[2], linewidth=2.2, label=words),
+            self.centre,
+        ]
         if len(self.track.contacts) > 1:  # one has its colours beside its cells
-            handles += [Patch(color=panels.STICK, label="sticks"), Patch(color=panels.SLIP, label="slips")]
-        look = {"frameon": False, "fontsize": "small", "columnspacing": 1.2, "handlelength": 1.4}
-        self.figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.03, 0.0), ncols=len(handles), **look)
+            handles += [
+                Patch(color=panels.STICK, label="sticks"),
+                Patch(color=panels.SLIP, label="slips"),
+            ]
+        look = {
+            "frameon": False,
+            "fontsize": "small",
+            "columnspacing": 1.2,
+            "handlelength": 1.4,
+        }
+        self.figure.legend(
+            handles=handles,
+            loc="lower left",
+            bbox_to_anchor=(0.03, 0.0),
+            ncols=len(handles),
+            **look,
+        )
 
     def _moved(self, frame: int) -> str:
         """Return the distance that the body has moved, in units that fit the whole motion."""
         moved = self.track.poses - self.track.poses[0]
         parts = []
-        for words, kind, column in (("moved by x", "length", 0), ("y", "length", 1), ("turned by", "angle", 2)):
+        for words, kind, column in (
+            ("moved by x", "length", 0),
+            ("y", "length", 1),
+            ("turned by", "angle", 2),
+        ):
             unit = unit_for(kind, moved[:, column])
-            parts.append(f"{words} {round(unit.factor * moved[frame, column], 2) + 0.0:.2f} {unit.label}")  # no -0.00
+            parts.append(
+                f"{words} {round(unit.factor * moved[frame, column], 2) + 0.0:.2f} {unit.label}"
+            )  # no -0.00
         return ", ".join(parts)
 
 
@@ -243,11 +335,18 @@ def _places(contacts: int) -> tuple[tuple, list[tuple]]:
     """Return the places of the world and, for each contact, of its cells, their colours (or None) and its surface."""
     if contacts == 1:
         world = (0.072, 0.145, 0.5, 0.745)
-        return world, [((0.665, 0.6, 0.2, 0.355), (0.88, 0.6, 0.014, 0.355), (0.605, 0.03, 0.35, 0.48))]
+        return world, [
+            (
+                (0.665, 0.6, 0.2, 0.355),
+                (0.88, 0.6, 0.014, 0.355),
+                (0.605, 0.03, 0.35, 0.48),
+            )
+        ]
     height = 1.0 / contacts
     places: list[tuple] = []
     for number in range(contacts):
-        low, side = 1.0 - (number + 1) * height, height - 0.17
+        low = 1.0 - (number + 1) * height
+        side = height - 0.17
         cells = (0.57, low + 0.105, side * HEIGHT / WIDTH, side)
         places.append((cells, None, (0.775, low + 0.02, 0.21, height - 0.04)))
     return (0.072, 0.145, 0.43, 0.745), places
@@ -259,24 +358,37 @@ def _views(solution: pf.Solution, track: Track, follow: bool) -> np.ndarray:
     A window follows where the motion is much longer than the body; it stays within the limits of the whole.
     """
     own = np.concatenate(body_lines(solution))
-    of_body, of_world = [own], []
+    of_body = [own]
+    of_world = []
     for each in track.contacts:
         points = _rim(panels.cell_polygons(each.contact.model.patch).reshape(-1, 2))
         if each.contact.mounted_on == "body":
-            of_body.append(placed(points, np.array([*each.contact.position, each.contact.angle])))
+            of_body.append(
+                placed(points, np.array([*each.contact.position, each.contact.angle]))
+            )
         else:
             of_world += [placed(points, pose) for pose in np.unique(each.poses, axis=0)]
     carried = np.concatenate(of_body)
     radius = float(np.hypot(*carried.T).max()) or 1e-3
-    turned = geometry.rotate(carried[None], track.poses[:, None, 2]) + track.poses[:, None, :2]
+    turned = (
+        geometry.rotate(carried[None], track.poses[:, None, 2])
+        + track.poses[:, None, :2]
+    )
     everything = np.concatenate([turned.reshape(-1, 2), *of_world])
-    low, high = everything.min(axis=0), everything.max(axis=0)
+    low = everything.min(axis=0)
+    high = everything.max(axis=0)
     margin = 0.05 * max(float((high - low).max()), radius)
-    low, high, side = low - margin, high + margin, VIEW * radius
+    low = low - margin
+    high = high + margin
+    side = VIEW * radius
     if not follow or (high - low).max() <= ROAM * side:
-        return np.broadcast_to(1e3 * np.stack([low, high], -1), (len(track.times), 2, 2))
+        return np.broadcast_to(
+            1e3 * np.stack([low, high], -1), (len(track.times), 2, 2)
+        )
     half = np.minimum(0.5 * side, 0.5 * (high - low).max())
-    room = np.maximum(0.5 * (high - low) - half, 0.0)  # how far the middle may go from that of the whole
+    room = np.maximum(
+        0.5 * (high - low) - half, 0.0
+    )  # how far the middle may go from that of the whole
     whole = 0.5 * (low + high)
     middle = np.clip(track.poses[:, :2], whole - room, whole + room)
     return 1e3 * np.stack([middle - half, middle + half], -1)
@@ -285,11 +397,14 @@ def _views(solution: pf.Solution, track: Track, follow: bool) -> np.ndarray:
 def _rim(points: np.ndarray) -> np.ndarray:
     """Return the points that reach farthest in each of 16 directions: enough of them to see the limits of a drawing."""
     angles = 2.0 * np.pi * np.arange(16) / 16
-    return points[np.unique((points @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0))]
+    return points[
+        np.unique((points @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0))
+    ]
 
 
 def _filling(views: np.ndarray, ratio: float) -> np.ndarray:
     """Return the views widened to axes of such a width over height, so that both axes have one scale."""
-    middle, (width, height) = views.mean(axis=-1), np.diff(views[0], axis=-1)[:, 0]
+    middle = views.mean(axis=-1)
+    (width, height) = np.diff(views[0], axis=-1)[:, 0]
     sides = np.array([max(width, height * ratio), max(height, width / ratio)])
     return np.stack([middle - 0.5 * sides, middle + 0.5 * sides], -1)

@@ -50,7 +50,13 @@ PIXELS = 64.0
 """Dots per inch of the figures that writers see: sizes over it are exact numbers."""
 
 
-def write_frames(path: Path, file: io.BytesIO, frame: Callable[[int], np.ndarray], count: int, fps: float) -> None:
+def write_frames(
+    path: Path,
+    file: io.BytesIO,
+    frame: Callable[[int], np.ndarray],
+    count: int,
+    fps: float,
+) -> None:
     """Write `count` pictures `[height, width, 3]` (bytes) to a file of the kind that `path` says, `fps` a second."""
     kind = path.suffix.lower()
     if kind == ".gif":
@@ -63,13 +69,19 @@ def write_frames(path: Path, file: io.BytesIO, frame: Callable[[int], np.ndarray
             for number in range(count):
                 figure.picture = frame(number)
                 writer.grab_frame()
-        file.write(_self_contained(drawn.read_bytes()) if kind == ".html" else drawn.read_bytes())
+        file.write(
+            _self_contained(drawn.read_bytes())
+            if kind == ".html"
+            else drawn.read_bytes()
+        )
 
 
 def check_kind(path: Path) -> None:
     """Raise FileError unless `path` is a moving picture of a kind that can be written here."""
     if path.suffix.lower() not in KINDS:
-        raise FileError(f"cannot write {path}: animations are {', '.join(KINDS[:-1])} or {KINDS[-1]} files")
+        raise FileError(
+            f"cannot write {path}: animations are {', '.join(KINDS[:-1])} or {KINDS[-1]} files"
+        )
     if path.suffix.lower() == ".mp4":
         _ffmpeg(path)
 
@@ -77,8 +89,14 @@ def check_kind(path: Path) -> None:
 def _self_contained(page: bytes) -> bytes:
     """Return the page of a player that starts by itself, with signs on its buttons and no font from the network."""
     page = re.sub(rb"<link\b[^>]*>", b"", page)
-    page = re.sub(rb"(\w+) = new Animation\([^;]*;", rb"\g<0> \1.play_animation();", page)
-    return re.sub(rb'<i class="fa fa-([\w -]+)"></i>', lambda found: SIGNS.get(found[1].decode(), "?").encode(), page)
+    page = re.sub(
+        rb"(\w+) = new Animation\([^;]*;", rb"\g<0> \1.play_animation();", page
+    )
+    return re.sub(
+        rb'<i class="fa fa-([\w -]+)"></i>',
+        lambda found: SIGNS.get(found[1].decode(), "?").encode(),
+        page,
+    )
 
 
 def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
@@ -87,15 +105,25 @@ def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
 
     chosen = np.unique(np.linspace(0, count - 1, PALETTE_FRAMES).round().astype(int))
     pixels = np.concatenate([frame(int(each)).reshape(-1, 3) for each in chosen])
-    colours, counts = np.unique(pixels @ np.array([1 << 16, 1 << 8, 1]), return_counts=True)
-    often = np.repeat(colours, np.ceil(np.sqrt(counts)).astype(int))  # what is rare has its colours too
+    colours, counts = np.unique(
+        pixels @ np.array([1 << 16, 1 << 8, 1]), return_counts=True
+    )
+    often = np.repeat(
+        colours, np.ceil(np.sqrt(counts)).astype(int)
+    )  # what is rare has its colours too
     sheet = Image.fromarray(_colours(often)[None])
-    found = sheet.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    found = sheet.quantize(
+        256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
+    )
     table = np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)
     order = np.argsort(counts)
     each = _colours(colours[order])
-    nearest = np.asarray(Image.fromarray(each[None]).quantize(palette=found, dither=Image.Dither.NONE))[0]
-    table[nearest] = each  # the most frequent of those that it stands for comes last: means are colours of nothing
+    nearest = np.asarray(
+        Image.fromarray(each[None]).quantize(palette=found, dither=Image.Dither.NONE)
+    )[0]
+    table[nearest] = (
+        each  # the most frequent of those that it stands for comes last: means are colours of nothing
+    )
     table[table.min(axis=1) >= WHITE] = 255  # Pillow looks for the nearest coarsely
     found.putpalette(table.tobytes())
     return found
@@ -103,28 +131,46 @@ def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
 
 def _colours(packed: np.ndarray) -> np.ndarray:
     """Return the red, green and blue `[N, 3]`, each a byte, of colours in one number `[N]`."""
-    return np.stack([packed >> 16, packed >> 8 & 255, packed & 255], -1).astype(np.uint8)
+    return np.stack([packed >> 16, packed >> 8 & 255, packed & 255], -1).astype(
+        np.uint8
+    )
 
 
-def _write_gif(file: io.BytesIO, frame: Callable[[int], np.ndarray], count: int, fps: float) -> None:
+def _write_gif(
+    file: io.BytesIO, frame: Callable[[int], np.ndarray], count: int, fps: float
+) -> None:
     from PIL import Image
 
     palette = _palette(frame, count)
-    ends = np.round(100.0 * np.arange(1, count + 1) / fps)  # GIF counts hundredths of a second
+    ends = np.round(
+        100.0 * np.arange(1, count + 1) / fps
+    )  # GIF counts hundredths of a second
     durations = 10.0 * np.diff(ends, prepend=0.0)
     durations[-1] += 1e3 * LAST
     pictures = (Image.fromarray(frame(number)) for number in range(count))
-    first, *others = (each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures)
-    first.save(file, format="GIF", save_all=True, append_images=others, duration=durations.tolist(), loop=0)
+    first, *others = (
+        each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures
+    )
+    first.save(
+        file,
+        format="GIF",
+        save_all=True,
+        append_images=others,
+        duration=durations.tolist(),
+        loop=0,
+    )
 
 
 class _Shown(Figure):
     """A figure that is a picture already: for writers that save a figure frame by frame."""
 
     def __init__(self, picture: np.ndarray, palette: Image.Image | None):
-        height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2  # ffmpeg takes even sizes alone
+        height = picture.shape[0] // 2 * 2
+        width = picture.shape[1] // 2 * 2  # ffmpeg takes even sizes alone
         super().__init__(figsize=(width / PIXELS, height / PIXELS), dpi=PIXELS)
-        self.picture, self.palette, self.size = picture, palette, (height, width)
+        self.picture = picture
+        self.palette = palette
+        self.size = (height, width)
 
     def savefig(self, fname: Any, *, format: str, **options: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Write the picture: as a PNG in the colours of the palette, or as the bytes that ffmpeg reads."""
@@ -132,7 +178,9 @@ class _Shown(Figure):
 
         image = Image.fromarray(self.picture[: self.size[0], : self.size[1]])
         if format == "png":
-            image.quantize(palette=self.palette, dither=Image.Dither.NONE).save(fname, format="PNG")
+            image.quantize(palette=self.palette, dither=Image.Dither.NONE).save(
+                fname, format="PNG"
+            )
         else:
             fname.write(image.convert("RGBA").tobytes())
 
@@ -141,10 +189,14 @@ class _Shown(Figure):
 def _writing(path: Path, drawn: Path, figure: Any, fps: Any) -> Iterator[Any]:
     from matplotlib.animation import FFMpegWriter, HTMLWriter
 
-    settings: Any = {"animation.embed_limit": 4096.0}  # [MB]: all frames, for whoever asks for them
+    settings: Any = {
+        "animation.embed_limit": 4096.0
+    }  # [MB]: all frames, for whoever asks for them
     if drawn.suffix == ".mp4":
         settings["animation.ffmpeg_path"] = _ffmpeg(path)
-        writer: Any = FFMpegWriter(fps=fps, codec="h264", extra_args=["-crf", "20", "-pix_fmt", "yuv420p"])
+        writer: Any = FFMpegWriter(
+            fps=fps, codec="h264", extra_args=["-crf", "20", "-pix_fmt", "yuv420p"]
+        )
     else:
         writer = HTMLWriter(fps=fps, embed_frames=True)
     stopped = False
@@ -159,7 +211,9 @@ def _writing(path: Path, drawn: Path, figure: Any, fps: Any) -> Iterator[Any]:
         except (subprocess.CalledProcessError, BrokenPipeError):
             if stopped:  # ffmpeg was stopped too, and says so
                 raise KeyboardInterrupt from None
-            raise FileError(f"cannot write {path}: ffmpeg failed; write a .gif or .html file instead") from None
+            raise FileError(
+                f"cannot write {path}: ffmpeg failed; write a .gif or .html file instead"
+            ) from None
 
 
 def _ffmpeg(path: Path) -> str:
@@ -173,6 +227,10 @@ def _ffmpeg(path: Path) -> str:
         except (ImportError, RuntimeError):
             what = "ffmpeg is not installed: run pip install 'planarfriction[ffmpeg]', or write a .gif or an .html"
             raise FileError(f"cannot write {path}: {what}") from None
-        if not Path(found).is_file():  # the variable IMAGEIO_FFMPEG_EXE is not checked by imageio-ffmpeg
-            raise FileError(f"cannot write {path}: there is no ffmpeg at {found}, which imageio-ffmpeg names")
+        if not Path(
+            found
+        ).is_file():  # the variable IMAGEIO_FFMPEG_EXE is not checked by imageio-ffmpeg
+            raise FileError(
+                f"cannot write {path}: there is no ffmpeg at {found}, which imageio-ffmpeg names"
+            )
     return found

@@ -52,11 +52,15 @@ _PANELS = {
     "x": _Panel("x", "length", False, lambda data: data["x"]),
     "y": _Panel("y", "length", False, lambda data: data["y"]),
     "theta": _Panel("θ", "angle", False, lambda data: data["theta"]),
-    "speed": _Panel("speed", "speed", False, lambda data: np.hypot(data["vx"], data["vy"])),
+    "speed": _Panel(
+        "speed", "speed", False, lambda data: np.hypot(data["vx"], data["vy"])
+    ),
     "fx": _Panel("fx", "force", True, lambda data: data["fx"]),
     "fy": _Panel("fy", "force", True, lambda data: data["fy"]),
     "tau": _Panel("τ", "torque", True, lambda data: data["tau"]),
-    "normal_force": _Panel("normal force", "force", True, lambda data: data["normal_force"]),
+    "normal_force": _Panel(
+        "normal force", "force", True, lambda data: data["normal_force"]
+    ),
 }
 
 
@@ -81,15 +85,21 @@ def plot_histories(
     Raises InvalidValueError for what is not a solution, and for unknown panels, a wrong size or wrong axes.
     """
     known = as_runs(solutions)
-    chosen = validation.choices("panels", [*_PANELS] if panels is None else panels, _PANELS)
+    chosen = validation.choices(
+        "panels", [*_PANELS] if panels is None else panels, _PANELS
+    )
     if not chosen:
-        raise InvalidValueError("panels", f"name at least one of {', '.join(_PANELS)}", panels)
+        raise InvalidValueError(
+            "panels", f"name at least one of {', '.join(_PANELS)}", panels
+        )
     if axes is not None:
         drawn = list(np.ravel(np.asarray(axes, dtype=object)))
         for each in drawn:
             style.check_axes("axes", each, size)
         if len(drawn) != len(chosen):
-            raise InvalidValueError("axes", f"be one for each of {len(chosen)} panels", f"{len(drawn)}")
+            raise InvalidValueError(
+                "axes", f"be one for each of {len(chosen)} panels", f"{len(drawn)}"
+            )
         _draw_panels(drawn, chosen, known)
         return drawn[0].figure
     if panels is None:
@@ -103,10 +113,14 @@ def plot_histories(
     return figure
 
 
-def draw_histories(figure: Any, solutions: pf.Solution | Mapping[str, pf.Solution]) -> None:
+def draw_histories(
+    figure: Any, solutions: pf.Solution | Mapping[str, pf.Solution]
+) -> None:
     """Draw the eight panels of `plot_histories` into a figure or subfigure."""
-    known, panels = as_runs(solutions), figure.subplots(4, 2, sharex=True)
-    axes, chosen = list(panels.T.ravel()), list(_PANELS)
+    known = as_runs(solutions)
+    panels = figure.subplots(4, 2, sharex=True)
+    axes = list(panels.T.ravel())
+    chosen = list(_PANELS)
     _draw_panels(axes, chosen, known)
     for each in panels[:-1].ravel():
         each.set_xlabel("")
@@ -116,20 +130,33 @@ def draw_histories(figure: Any, solutions: pf.Solution | Mapping[str, pf.Solutio
     _finish(figure, axes, chosen, known)
 
 
-def _draw_panels(axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str, pf.Solution]) -> None:
+def _draw_panels(
+    axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str, pf.Solution]
+) -> None:
     """Draw each of the chosen panels into its axes; panels of the same kind and side share a unit."""
     runs = {label: each.data for label, each in known.items()}
-    colours, panels = _colours(list(known.values())), [_PANELS[name] for name in chosen]
+    colours = _colours(list(known.values()))
+    panels = [_PANELS[name] for name in chosen]
     clock = unit_for("time", *(data["time"] for data in runs.values()))
     lines = [_lines(runs, panel.get) for panel in panels]
     for place, panel, own in zip(axes, panels, lines, strict=True):
         sides = zip(panels, lines, strict=True)
-        alike = [line.shown for other, each in sides if (other.kind, other.of_contacts) == panel[1:3] for line in each]
+        alike = [
+            line.shown
+            for other, each in sides
+            if (other.kind, other.of_contacts) == panel[1:3]
+            for line in each
+        ]
         _draw_panel(place, panel.title, panel.kind, own, alike, clock, colours)
         place.set_xlabel(f"time [{clock.label}]")
 
 
-def _finish(figure: Any, axes: Sequence[Any], chosen: Sequence[str], known: Mapping[str, pf.Solution]) -> None:
+def _finish(
+    figure: Any,
+    axes: Sequence[Any],
+    chosen: Sequence[str],
+    known: Mapping[str, pf.Solution],
+) -> None:
     """Align labels, keep those of time in the last row, and add a legend."""
     if figure.bbox.height < LOW * figure.dpi * axes[0].get_gridspec().nrows:
         for each in axes:
@@ -137,18 +164,34 @@ def _finish(figure: Any, axes: Sequence[Any], chosen: Sequence[str], known: Mapp
     figure.align_ylabels(axes)
     for above in axes[:-1] if len(chosen) < len(_PANELS) else ():
         above.set_xlabel("")
-    named = next((each for each, name in zip(axes, chosen, strict=True) if _PANELS[name].of_contacts), None)
-    runs = {label: each.data if named else each.data.isel(contact=[0]) for label, each in known.items()}
+    named = next(
+        (
+            each
+            for each, name in zip(axes, chosen, strict=True)
+            if _PANELS[name].of_contacts
+        ),
+        None,
+    )
+    runs = {
+        label: each.data if named else each.data.isel(contact=[0])
+        for label, each in known.items()
+    }
     _legend(figure, named or axes[0], runs)
 
 
-def as_runs(solutions: pf.Solution | Mapping[str, pf.Solution]) -> dict[str, pf.Solution]:
+def as_runs(
+    solutions: pf.Solution | Mapping[str, pf.Solution],
+) -> dict[str, pf.Solution]:
     """Return the solutions by label; a single one is labelled with the name of its scene."""
     if not isinstance(solutions, Mapping):
-        solution = validation.instance("solutions", solutions, pf.Solution, "a Solution or a table of them by name")
+        solution = validation.instance(
+            "solutions", solutions, pf.Solution, "a Solution or a table of them by name"
+        )
         return {str(solution.scene.name): solution}
     for name, each in solutions.items():
-        validation.instance("solutions", each, pf.Solution, f"Solutions, under {shown(name)!r} too")
+        validation.instance(
+            "solutions", each, pf.Solution, f"Solutions, under {shown(name)!r} too"
+        )
     if not solutions:
         raise InvalidValueError("solutions", "hold at least one Solution", solutions)
     return {str(name): each for name, each in solutions.items()}
@@ -167,7 +210,11 @@ class _Line(NamedTuple):
         Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`), for microseconds.
         """
         rest = self.values[1:]
-        return rest if len(rest) > 1 and abs(self.values[0]) > KICK * np.abs(rest).max() > 0.0 else self.values
+        return (
+            rest
+            if len(rest) > 1 and abs(self.values[0]) > KICK * np.abs(rest).max() > 0.0
+            else self.values
+        )
 
 
 def _lines(runs: Mapping[str, xr.Dataset], get: Callable) -> list[_Line]:
@@ -175,17 +222,28 @@ def _lines(runs: Mapping[str, xr.Dataset], get: Callable) -> list[_Line]:
     lines = []
     for run, data in enumerate(runs.values()):
         values = np.asarray(get(data), dtype=float).reshape(data.sizes["time"], -1)
-        lines += [_Line(run, contact, np.asarray(data["time"]), each) for contact, each in enumerate(values.T)]
+        lines += [
+            _Line(run, contact, np.asarray(data["time"]), each)
+            for contact, each in enumerate(values.T)
+        ]
     return lines
 
 
 def _draw_panel(
-    axes: Any, title: str, kind: str, lines: list[_Line], alike: list[np.ndarray], clock: Unit, colours: list[Any]
+    axes: Any,
+    title: str,
+    kind: str,
+    lines: list[_Line],
+    alike: list[np.ndarray],
+    clock: Unit,
+    colours: list[Any],
 ) -> None:
     """Draw one panel; `alike` are the values of all panels of its kind in this column, which share their unit."""
     unit = unit_for(kind, *alike)
     for line in lines:
-        look = _look(line.run, line.contact, colours) | ({"marker": "o"} if len(line.time) == 1 else {})
+        look = _look(line.run, line.contact, colours) | (
+            {"marker": "o"} if len(line.time) == 1 else {}
+        )
         axes.plot(clock.factor * line.time, unit.factor * line.values, **look)
     low = unit.factor * min(line.shown.min() for line in lines)
     high = unit.factor * max(line.shown.max() for line in lines)
@@ -202,39 +260,65 @@ def _colours(solutions: Sequence[pf.Solution]) -> list[Any]:
     """Choose colours: one per model if all models differ, otherwise in order."""
     if len(solutions) > len(style.PALETTE):
         return list(style.TIME_COLOURS(np.linspace(0.0, 1.0, len(solutions))))
-    own = [each.scene and style.model_colour(each.scene.contacts[0].model) for each in solutions]
-    return own if None not in own and len(set(own)) == len(own) else list(style.PALETTE[: len(solutions)])
+    own = [
+        each.scene and style.model_colour(each.scene.contacts[0].model)
+        for each in solutions
+    ]
+    return (
+        own
+        if None not in own and len(set(own)) == len(own)
+        else list(style.PALETTE[: len(solutions)])
+    )
 
 
 def _look(run: int, contact: int, colours: list[Any]) -> dict[str, Any]:
     # Later runs are drawn dashed over the earlier ones, so that curves that coincide are both seen.
     many = len(colours) > len(style.PALETTE)
-    line_style = style.LINE_STYLES[(contact if many else run + contact) % len(style.LINE_STYLES)]
-    return {"color": colours[run], "linestyle": line_style, **({"linewidth": 0.9} if many else {})}
+    line_style = style.LINE_STYLES[
+        (contact if many else run + contact) % len(style.LINE_STYLES)
+    ]
+    return {
+        "color": colours[run],
+        "linestyle": line_style,
+        **({"linewidth": 0.9} if many else {}),
+    }
 
 
 def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
     """Add one entry for each line of a contact panel, a row for each run; none where there is a single line."""
     lines = iter(axes.get_lines())
     table = [
-        [(next(lines), label if data.sizes["contact"] == 1 else f"{label}, {name}") for name in data["contact"].values]
+        [
+            (next(lines), label if data.sizes["contact"] == 1 else f"{label}, {name}")
+            for name in data["contact"].values
+        ]
         for label, data in runs.items()
     ]
     title = None
     if len(table) > len(style.PALETTE):
         some = np.unique(np.linspace(0, len(table) - 1, NAMED).round().astype(int))
-        table, title = [table[each] for each in some], f"{len(some)} of {len(table)} runs, coloured in their order"
+        table, title = (
+            [table[each] for each in some],
+            f"{len(some)} of {len(table)} runs, coloured in their order",
+        )
     columns = max(len(row) for row in table)
     if columns == 1:
         entries = [row[0] for row in table]
     else:  # matplotlib fills a legend column by column: runs of the same contact stand below each other
-        entries = [row[column] for column in range(columns) for row in table if column < len(row)]
+        entries = [
+            row[column]
+            for column in range(columns)
+            for row in table
+            if column < len(row)
+        ]
     if len(entries) == 1:
         return
     entries = [(line, style.wrapped(words, LONGEST)) for line, words in entries]
     longest = max(len(line) for _, words in entries for line in words.splitlines())
     size = FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points() / 10.0
-    room = int(72.0 * figure.bbox.width / figure.dpi / (LETTER * longest + HANDLE) / size)
+    room = int(
+        72.0 * figure.bbox.width / figure.dpi / (LETTER * longest + HANDLE) / size
+    )
     ncols = max(1, min(4, room, len(entries) if columns == 1 else columns))
     figure.legend(
         *zip(*entries, strict=True), loc="outside upper center", ncols=ncols, frameon=False, title=title,

@@ -39,11 +39,15 @@ def plot_identification(result: pf.identify.Identification) -> style.PlotFigure:
     """
     with_speed = "speed" in result.histories[0]
     shown = [
-        i for i in range(len(result.channels)) if any(np.isfinite(h["measured"][:, i]).any() for h in result.histories)
+        i
+        for i in range(len(result.channels))
+        if any(np.isfinite(h["measured"][:, i]).any() for h in result.histories)
     ]
     rows = len(shown)
     figure = style.new_figure(9.6, 1.75 * rows + (5.8 if with_speed else 0.6))
-    grid = figure.add_gridspec(rows + 2 * with_speed, 2, height_ratios=[1.0] * rows + [1.5, 1.6] * with_speed)
+    grid = figure.add_gridspec(
+        rows + 2 * with_speed, 2, height_ratios=[1.0] * rows + [1.5, 1.6] * with_speed
+    )
     place = _places(result)
     left = right = None
     for row, i in enumerate(shown):
@@ -54,7 +58,9 @@ def plot_identification(result: pf.identify.Identification) -> style.PlotFigure:
     several = len(result.histories) > 1
     for axes in (left, right):
         axes.set_xlabel("time, one after another [s]" if several else "time [s]")
-    figure.axes[1].set_title("(measured \N{MINUS SIGN} fitted) / noise", fontsize="medium")
+    figure.axes[1].set_title(
+        "(measured \N{MINUS SIGN} fitted) / noise", fontsize="medium"
+    )
     if with_speed:
         _draw_speeds(figure.add_subplot(grid[rows, 0]), result)
         _draw_correlations(figure.add_subplot(grid[rows, 1]), result)
@@ -62,16 +68,30 @@ def plot_identification(result: pf.identify.Identification) -> style.PlotFigure:
         for column, i in enumerate(shown):
             _draw_held_out(figure.add_subplot(below[0, column]), result, i)
         if rows == 1:
-            _draw_loops(figure.add_subplot(below[0, 1]), figure.add_subplot(below[0, 2]), result, shown[0])
+            _draw_loops(
+                figure.add_subplot(below[0, 1]),
+                figure.add_subplot(below[0, 2]),
+                result,
+                shown[0],
+            )
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=2, frameon=False, fontsize="small")
+    figure.legend(
+        handles,
+        labels,
+        loc="outside upper left",
+        ncols=2,
+        frameon=False,
+        fontsize="small",
+    )
     return figure
 
 
 def _places(result: pf.identify.Identification) -> list[np.ndarray]:
     """Return the times of each log [s], shifted so that the logs follow each other with a gap."""
     total = sum(each["time"][-1] - each["time"][0] for each in result.histories)
-    gap, at, places = 0.01 * total, 0.0, []
+    gap = 0.01 * total
+    at = 0.0
+    places = []
     for each in result.histories:
         time = np.asarray(each["time"])
         places.append(time if len(result.histories) == 1 else time - time[0] + at)
@@ -79,19 +99,36 @@ def _places(result: pf.identify.Identification) -> list[np.ndarray]:
     return places
 
 
-def _draw_channel(left: Any, right: Any, result: pf.identify.Identification, i: int, places: list[np.ndarray]) -> None:
+def _draw_channel(
+    left: Any,
+    right: Any,
+    result: pf.identify.Identification,
+    i: int,
+    places: list[np.ndarray],
+) -> None:
     name, unit = result.channels[i]
-    shown = unit_for(KINDS[unit], *(np.nan_to_num(each["measured"][:, i]) for each in result.histories))
+    shown = unit_for(
+        KINDS[unit],
+        *(np.nan_to_num(each["measured"][:, i]) for each in result.histories),
+    )
     for number, (each, time) in enumerate(zip(result.histories, places, strict=True)):
         for key, words, colour, width in (
             ("measured", "measured", "0.6", 2.2),
             ("predicted", "fitted", style.PALETTE[0], 0.9),
         ):
             label = words if number == 0 else None
-            left.plot(time, shown.factor * each[key][:, i], color=colour, linewidth=width, label=label)
+            left.plot(
+                time,
+                shown.factor * each[key][:, i],
+                color=colour,
+                linewidth=width,
+                label=label,
+            )
         off = (each["measured"][:, i] - each["predicted"][:, i]) / result.noise[i]
         every = max(1, len(time) // MOST_POINTS)
-        right.plot(time[::every], off[::every], ".", color=style.PALETTE[0], markersize=1.5)
+        right.plot(
+            time[::every], off[::every], ".", color=style.PALETTE[0], markersize=1.5
+        )
         beyond = np.abs(off) > MOST_NOISE
         for sign, marker in ((1.0, "^"), (-1.0, "v")):
             there = time[beyond & (sign * off > 0.0)][::every]
@@ -109,14 +146,25 @@ def _draw_speeds(axes: Any, result: pf.identify.Identification) -> None:
     speed = np.concatenate([each["speed"] for each in result.histories])
     coefficient = np.concatenate([each["coefficient"] for each in result.histories])
     usable = (speed > STILL * speed.max()) & np.isfinite(coefficient)
-    speed, coefficient = speed[usable], coefficient[usable]
+    speed = speed[usable]
+    coefficient = coefficient[usable]
     if not len(speed):
         return
     every = max(1, len(speed) // MOST_POINTS)
-    axes.plot(1e3 * speed[::every], coefficient[::every], ".", color="0.6", markersize=2.0, label="measured")
-    law, grid = result.law, np.geomspace(max(speed.min(), 1e-4 * speed.max()), speed.max(), 200)
+    axes.plot(
+        1e3 * speed[::every],
+        coefficient[::every],
+        ".",
+        color="0.6",
+        markersize=2.0,
+        label="measured",
+    )
+    law = result.law
+    grid = np.geomspace(max(speed.min(), 1e-4 * speed.max()), speed.max(), 200)
     steady = formulas.stribeck(np, grid, law) + law.sigma_2 * grid
-    axes.plot(1e3 * grid, steady, color=style.PALETTE[1], label="fitted law, steady sliding")
+    axes.plot(
+        1e3 * grid, steady, color=style.PALETTE[1], label="fitted law, steady sliding"
+    )
     axes.set(xscale="log", xlabel="sliding speed [mm/s]", ylabel="friction / load [-]")
     axes.set_ylim(0.0, 1.1 * max(steady.max(), np.quantile(coefficient, 0.995)))
     axes.legend(frameon=False, fontsize="small", loc="lower right")
@@ -128,10 +176,17 @@ def _draw_correlations(axes: Any, result: pf.identify.Identification) -> None:
     values = result.residual_correlations()
     samples = sum(len(each["time"]) for each in result.histories)
     step = float(np.median(np.diff(result.histories[0]["time"])))
-    axes.axhspan(-2.0 / np.sqrt(samples), 2.0 / np.sqrt(samples), color="0.92", zorder=0)
+    axes.axhspan(
+        -2.0 / np.sqrt(samples), 2.0 / np.sqrt(samples), color="0.92", zorder=0
+    )
     for i, (name, _) in enumerate(result.channels):
         if values[:, i].any():
-            axes.plot(1e3 * step * np.arange(len(values)), values[:, i], color=style.PALETTE[i], label=name)
+            axes.plot(
+                1e3 * step * np.arange(len(values)),
+                values[:, i],
+                color=style.PALETTE[i],
+                label=name,
+            )
     axes.set(xlabel="lag [ms]", ylabel="correlation of residuals [-]")
     axes.legend(frameon=False, fontsize="small")
     style.tidy(axes)
@@ -140,41 +195,81 @@ def _draw_correlations(axes: Any, result: pf.identify.Identification) -> None:
 def _draw_held_out(axes: Any, result: pf.identify.Identification, i: int) -> None:
     """Draw predictions of samples that fits did not see over their measurements; a good fit keeps to the diagonal."""
     name, unit = result.channels[i]
-    both = ([each[key][:, i] for each in result.histories] for key in ("measured", "held_out"))
+    both = (
+        [each[key][:, i] for each in result.histories]
+        for key in ("measured", "held_out")
+    )
     measured, held_out = map(np.concatenate, both)
     seen = np.isfinite(measured) & np.isfinite(held_out)
-    measured, held_out = measured[seen], held_out[seen]
+    measured = measured[seen]
+    held_out = held_out[seen]
     shown = unit_for(KINDS[unit], measured)
     every = max(1, len(measured) // MOST_POINTS)
-    axes.plot(shown.factor * measured[::every], shown.factor * held_out[::every], ".", color="0.6", markersize=2.0)
+    axes.plot(
+        shown.factor * measured[::every],
+        shown.factor * held_out[::every],
+        ".",
+        color="0.6",
+        markersize=2.0,
+    )
     edges = shown.factor * np.array([measured.min(), measured.max()])
     axes.plot(edges, edges, color=style.PALETTE[1], linewidth=0.9, zorder=1)
-    axes.set(xlabel=f"measured {name} [{shown.label}]", ylabel=f"held-out prediction [{shown.label}]")
+    axes.set(
+        xlabel=f"measured {name} [{shown.label}]",
+        ylabel=f"held-out prediction [{shown.label}]",
+    )
     style.tidy(axes)
 
 
-def _draw_loops(over_speed: Any, over_way: Any, result: pf.identify.Identification, i: int) -> None:
+def _draw_loops(
+    over_speed: Any, over_way: Any, result: pf.identify.Identification, i: int
+) -> None:
     """Draw a channel over the velocity along it, and over the displacement since the last reversal."""
     name, unit = result.channels[i]
     turning = unit == "N m"
-    force = unit_for(KINDS[unit], *(np.nan_to_num(each["measured"][:, i]) for each in result.histories))
+    force = unit_for(
+        KINDS[unit],
+        *(np.nan_to_num(each["measured"][:, i]) for each in result.histories),
+    )
     size = float(result.model.patch.contact_radius()) if turning else 1.0
     longest = LOADED * result.law.mu_s / result.law.sigma_0 / size
     way = unit_for("angle" if turning else "length", np.array([longest]))
     for number, each in enumerate(result.histories):
-        speed, time = each["twist"][:, i], each["time"]
+        speed = each["twist"][:, i]
+        time = each["time"]
         step = np.concatenate([[0.0], 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)])
         since = np.cumsum(step)
         turned = np.concatenate([[True], np.sign(step[1:]) * np.sign(step[:-1]) < 0.0])
         last = np.maximum.accumulate(np.where(turned, np.arange(len(time)), 0))
         since = since - since[np.maximum(last - 1, 0)]
         near = np.where(np.abs(since) <= longest, since, np.nan)
-        for key, colour, style_of in (("measured", "0.6", "."), ("predicted", style.PALETTE[0], "-")):
+        for key, colour, style_of in (
+            ("measured", "0.6", "."),
+            ("predicted", style.PALETTE[0], "-"),
+        ):
             for axes, place in ((over_speed, speed), (over_way, way.factor * near)):
-                label = {"measured": "measured", "predicted": "fitted"}[key] if number == 0 else None
-                axes.plot(place, force.factor * each[key][:, i], style_of, color=colour, ms=2.0, lw=0.8, label=label)
-    over_speed.set(xlabel="velocity [rad/s]" if turning else "velocity [m/s]", ylabel=f"{name} [{force.label}]")
-    over_way.set(xlabel=f"displacement since reversal [{way.label}]", ylabel=f"{name} [{force.label}]")
+                label = (
+                    {"measured": "measured", "predicted": "fitted"}[key]
+                    if number == 0
+                    else None
+                )
+                axes.plot(
+                    place,
+                    force.factor * each[key][:, i],
+                    style_of,
+                    color=colour,
+                    ms=2.0,
+                    lw=0.8,
+                    label=label,
+                )
+    over_speed.set(
+        xlabel="velocity [rad/s]" if turning else "velocity [m/s]",
+        ylabel=f"{name} [{force.label}]",
+    )
+    over_way.set(
+        xlabel=f"displacement since reversal [{way.label}]",
+        ylabel=f"{name} [{force.label}]",
+    )
     for axes in (over_speed, over_way):
         style.tidy(axes)
 
@@ -196,14 +291,29 @@ def plot_joint(fit: Any) -> style.PlotFigure:
     figure = style.new_figure(9.6, 5.4)
     grid = figure.add_gridspec(2, 2, height_ratios=[1.4, 1.0], width_ratios=[1.6, 1.0])
     upper = figure.add_subplot(grid[0, 0])
-    lower, side = figure.add_subplot(grid[1, 0], sharex=upper), figure.add_subplot(grid[:, 1])
-    upper.plot(series.time, series.measured, color=style.EXACT, lw=1.0, label=f"measured, {series.name}")
-    runs = (series.baseline, style.MEASURED, "Coulomb + viscous"), (series.fitted, style.DISTRIBUTED, "fit")
+    lower = figure.add_subplot(grid[1, 0], sharex=upper)
+    side = figure.add_subplot(grid[:, 1])
+    upper.plot(
+        series.time,
+        series.measured,
+        color=style.EXACT,
+        lw=1.0,
+        label=f"measured, {series.name}",
+    )
+    runs = (
+        (series.baseline, style.MEASURED, "Coulomb + viscous"),
+        (series.fitted, style.DISTRIBUTED, "fit"),
+    )
     for run, colour, name in runs:
         upper.plot(series.time, run, color=colour, lw=1.2, label=name)
         lower.plot(series.time, run - series.measured, color=colour, lw=1.0)
     upper.set_ylabel(f"{what} [{fit.unit}]")
-    figure.legend(*upper.get_legend_handles_labels(), loc="outside upper left", ncols=3, frameon=False)
+    figure.legend(
+        *upper.get_legend_handles_labels(),
+        loc="outside upper left",
+        ncols=3,
+        frameon=False,
+    )
     lower.set(xlabel="time [s]", ylabel=f"error [{fit.unit}]")
     side.set(xlabel="speed [rad/s]", ylabel="friction [N m]")
     if fit.unclear:
@@ -219,14 +329,24 @@ def plot_joint(fit: Any) -> style.PlotFigure:
 def _plot_levels(fit: Any, axes: Any) -> None:
     """Draw friction over speed at the loads of the logs."""
     fastest = max(float(np.abs(each.speed).max()) for each in fit.logs)
-    speed, friction = np.geomspace(1e-3 * fastest, fastest, 200), fit.friction
+    speed = np.geomspace(1e-3 * fastest, fastest, 200)
+    friction = fit.friction
     level = friction.law.steady_friction(speed)
-    motor = (each.torque if fit.unit == "N m" else fit.torque_gain * each.volts for each in fit.logs)
+    motor = (
+        each.torque if fit.unit == "N m" else fit.torque_gain * each.volts
+        for each in fit.logs
+    )
     pushed = max(float(np.abs(each).max()) for each in motor)
     shares = SHARES if friction.load_motor or friction.load_external else SHARES[:1]
-    for share, colour, line in zip(shares, style.PALETTE, style.LINE_STYLES, strict=False):
+    for share, colour, line in zip(
+        shares, style.PALETTE, style.LINE_STYLES, strict=False
+    ):
         load = friction.load(share * pushed, -share * pushed)
-        look = {"color": colour, "ls": line, "label": f"held load {share * pushed:.2g} N m"}
+        look = {
+            "color": colour,
+            "ls": line,
+            "label": f"held load {share * pushed:.2g} N m",
+        }
         axes.semilogx(speed, level + load, **look)
     axes.set_ylim(0.0, None)
     axes.legend(frameon=False)

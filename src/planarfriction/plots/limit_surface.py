@@ -26,7 +26,9 @@ _UNDER_THE_POINTER = (
 _LIGHT = np.array([0.35, -0.6, 0.72])
 
 
-def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def sample_limit_surface(
+    surface: Any, polar: np.ndarray, azimuth: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return twists in the directions of a sphere and their wrenches for mu f_N = 1, about the contact frame's origin.
 
     The directions are the unit sphere of scaled twists at the centre of pressure,
@@ -37,7 +39,9 @@ def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -
     # sin(pi) is not quite 0, and a spin about a cell must be exact
     sine = np.where(np.abs(z) < 1.0, np.sin(polar), 0.0)
     x, y, z = np.broadcast_arrays(sine * np.cos(azimuth), sine * np.sin(azimuth), z)
-    twists = geometry.twist_at(np.stack([x, y, z / surface.contact_radius], -1), -surface.centre_of_pressure)
+    twists = geometry.twist_at(
+        np.stack([x, y, z / surface.contact_radius], -1), -surface.centre_of_pressure
+    )
     return twists, surface.wrench(twists)
 
 
@@ -57,9 +61,17 @@ def plot_limit_surface(
         style.check_axes("ax", ax, size, three=True)
         beside = None
     names, scaled, limit = _sampled(surface, beside)
-    figure = ax.figure if ax is not None else style.new_figure(4.4 * len(names), 4.3, size)
-    for column, (name, (directions, mesh)) in enumerate(zip(names, scaled, strict=True)):
-        axes = ax if ax is not None else figure.add_subplot(1, len(names), column + 1, projection="3d")
+    figure = (
+        ax.figure if ax is not None else style.new_figure(4.4 * len(names), 4.3, size)
+    )
+    for column, (name, (directions, mesh)) in enumerate(
+        zip(names, scaled, strict=True)
+    ):
+        axes = (
+            ax
+            if ax is not None
+            else figure.add_subplot(1, len(names), column + 1, projection="3d")
+        )
         draw_surface(axes, mesh, directions, limit)
         axes.set_title(style.wrapped(name, 30), fontsize="medium")
     return figure
@@ -77,13 +89,26 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
     with needing("plotly", "plotly"):
         from plotly import graph_objects as go
         from plotly.subplots import make_subplots
-    figure = make_subplots(cols=len(names), specs=[[{"type": "scene"}] * len(names)], subplot_titles=names)
+    figure = make_subplots(
+        cols=len(names), specs=[[{"type": "scene"}] * len(names)], subplot_titles=names
+    )
     for column, (directions, mesh) in enumerate(scaled):
         points = dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True))
-        points["customdata"] = np.round(directions, 6).tolist()  # the page reads arrays of two dimensions alone
-        look = {"hovertemplate": _UNDER_THE_POINTER, "colorscale": "Cividis", "showscale": False}
-        figure.add_trace(go.Surface(**points, **look, cmin=-limit, cmax=limit), row=1, col=column + 1)
-    scene: dict[str, Any] = {"aspectmode": "cube", "camera": {"eye": {"x": 1.5, "y": -2.2, "z": 1.0}}}
+        points["customdata"] = np.round(
+            directions, 6
+        ).tolist()  # the page reads arrays of two dimensions alone
+        look = {
+            "hovertemplate": _UNDER_THE_POINTER,
+            "colorscale": "Cividis",
+            "showscale": False,
+        }
+        figure.add_trace(
+            go.Surface(**points, **look, cmin=-limit, cmax=limit), row=1, col=column + 1
+        )
+    scene: dict[str, Any] = {
+        "aspectmode": "cube",
+        "camera": {"eye": {"x": 1.5, "y": -2.2, "z": 1.0}},
+    }
     for name, text in zip("xyz", _AXES, strict=True):
         scene[f"{name}axis"] = {"range": [-limit, limit], "title": {"text": text}}
     figure.update_scenes(scene)
@@ -92,14 +117,25 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
     return figure
 
 
-def _sampled(surface: Any, beside: Any) -> tuple[list[str], list[tuple[np.ndarray, np.ndarray]], float]:
+def _sampled(
+    surface: Any, beside: Any
+) -> tuple[list[str], list[tuple[np.ndarray, np.ndarray]], float]:
     """Return titles and `scaled_samples` of the surfaces to draw, and the limit of the axes."""
-    validation.instance("surface", surface, pf.limit_surface.LimitSurface, "a limit surface")
+    validation.instance(
+        "surface", surface, pf.limit_surface.LimitSurface, "a limit surface"
+    )
     shown = {f"{surface.patch.name}: {_kind(surface)}": surface}
     if beside is not None:
         if isinstance(beside, str) and beside == "ellipsoid":
-            beside = pf.LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
-        validation.instance("beside", beside, pf.limit_surface.LimitSurface, 'a limit surface, "ellipsoid" or None')
+            beside = pf.LimitSurfaceEllipsoid(
+                surface.patch, normal_force=surface.normal_force
+            )
+        validation.instance(
+            "beside",
+            beside,
+            pf.limit_surface.LimitSurface,
+            'a limit surface, "ellipsoid" or None',
+        )
         shown[_kind(beside)] = beside
     scaled = [scaled_samples(each, *even_mesh(each)) for each in shown.values()]
     return [*shown], scaled, 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
@@ -114,25 +150,39 @@ def even_mesh(surface: Any) -> tuple[np.ndarray, np.ndarray]:
     azimuth = np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)
     for _ in range(2):  # the second time with what lay between the points of the first
         _, points = scaled_samples(surface, polar[:, None], azimuth[None, :])
-        polar = _evened(polar, np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=1))
-        azimuth = _evened(azimuth, np.linalg.norm(np.diff(points, axis=1), axis=-1).max(axis=0))
+        polar = _evened(
+            polar, np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=1)
+        )
+        azimuth = _evened(
+            azimuth, np.linalg.norm(np.diff(points, axis=1), axis=-1).max(axis=0)
+        )
     return polar[:, None], azimuth[None, :]
 
 
 def _evened(angles: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return as many angles, by half spread evenly along the `steps` between them and by half as they are."""
-    place = np.concatenate([[0.0], np.cumsum(steps / steps.sum() + np.diff(angles) / (angles[-1] - angles[0]))])
+    place = np.concatenate(
+        [
+            [0.0],
+            np.cumsum(steps / steps.sum() + np.diff(angles) / (angles[-1] - angles[0])),
+        ]
+    )
     return np.interp(np.linspace(0.0, place[-1], len(angles)), place, angles)
 
 
-def scaled_samples(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def scaled_samples(
+    surface: Any, polar: np.ndarray, azimuth: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return directions `(vx, vy, r omega)` and points `(fx, fy, tau/r)` of a surface at the centre of pressure.
 
     Both are pure numbers of shape `[..., 3]`; the directions have length 1.
     """
     twists, wrenches = sample_limit_surface(surface, polar, azimuth)
-    scale, centre = np.array([1.0, 1.0, surface.contact_radius]), surface.centre_of_pressure
-    return geometry.twist_at(twists, centre) * scale, geometry.wrench_at(wrenches, centre) / scale
+    scale = np.array([1.0, 1.0, surface.contact_radius])
+    centre = surface.centre_of_pressure
+    return geometry.twist_at(twists, centre) * scale, geometry.wrench_at(
+        wrenches, centre
+    ) / scale
 
 
 def _kind(surface: Any) -> str:
@@ -140,26 +190,56 @@ def _kind(surface: Any) -> str:
     return (name and SURFACES.words(name)) or type(surface).__name__
 
 
-def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float, *, paler: float = 0.0) -> Any:
+def draw_surface(
+    axes: Any,
+    mesh: np.ndarray,
+    directions: np.ndarray,
+    limit: float,
+    *,
+    paler: float = 0.0,
+) -> Any:
     """Draw a limit surface, points `mesh` `[P, A, 3]` with their `directions`, into 3-D axes up to `limit`.
 
     `paler` is the share of white in its colours: facets that let light through would show every seam.
     """
     # The outward normal of a limit surface is the twist itself: shading needs no differences of the mesh.
-    normal = -0.25 * (directions[:-1, :-1] + directions[1:, :-1] + directions[:-1, 1:] + directions[1:, 1:])
-    lightness = 0.62 + 0.38 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), -0.6, 1.0)
-    height = 0.25 * (mesh[:-1, :-1, 2] + mesh[1:, :-1, 2] + mesh[:-1, 1:, 2] + mesh[1:, 1:, 2])
+    normal = -0.25 * (
+        directions[:-1, :-1]
+        + directions[1:, :-1]
+        + directions[:-1, 1:]
+        + directions[1:, 1:]
+    )
+    lightness = 0.62 + 0.38 * np.clip(
+        normal @ (_LIGHT / np.linalg.norm(_LIGHT)), -0.6, 1.0
+    )
+    height = 0.25 * (
+        mesh[:-1, :-1, 2] + mesh[1:, :-1, 2] + mesh[:-1, 1:, 2] + mesh[1:, 1:, 2]
+    )
     colours = colormaps["cividis"](0.6 + 0.4 * height / limit)
     colours[..., :3] *= lightness[..., None]
     colours[..., :3] += paler * (1.0 - colours[..., :3])
-    plain: dict[str, Any] = {"rstride": 1, "cstride": 1, "linewidth": 0, "antialiased": False, "shade": False}
+    plain: dict[str, Any] = {
+        "rstride": 1,
+        "cstride": 1,
+        "linewidth": 0,
+        "antialiased": False,
+        "shade": False,
+    }
     drawn = axes.plot_surface(*np.moveaxis(mesh, -1, 0), facecolors=colours, **plain)
     narrow = style.axes_width(axes) < 0.5 * style.NARROW
     ticks = [-1.0, 0.0, 1.0] if narrow else [-1.0, -0.5, 0.0, 0.5, 1.0]
     for name, label in (("x", "$f_x$"), ("y", "$f_y$"), ("z", "$\\tau/r$")):
-        axes.set(**{f"{name}lim": (-limit, limit), f"{name}ticks": ticks, f"{name}label": f"{label} [-]"})
+        axes.set(
+            **{
+                f"{name}lim": (-limit, limit),
+                f"{name}ticks": ticks,
+                f"{name}label": f"{label} [-]",
+            }
+        )
         getattr(axes, f"{name}axis").labelpad = -6.0 if narrow else 4.0
-    axes.tick_params(labelsize="x-small" if narrow else "small", **({"pad": 0} if narrow else {}))
+    axes.tick_params(
+        labelsize="x-small" if narrow else "small", **({"pad": 0} if narrow else {})
+    )
     axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.75 if narrow else 0.9)
     axes.view_init(elev=22, azim=-55)
     return drawn

@@ -36,7 +36,9 @@ ROUND, CORNERS = 0.02, 12
 """Share by which the radii of a round outline differ at most [-]; corners that it has at least."""
 
 
-def plot_motion(solution: pf.Solution, *, size: Any = None, ax: Any = None) -> style.PlotFigure:
+def plot_motion(
+    solution: pf.Solution, *, size: Any = None, ax: Any = None
+) -> style.PlotFigure:
     """Draw the outline of the body and the patches at 12 instants, evenly spaced in time and coloured by time.
 
     World axes, equal scales. Patches fixed to the world are drawn once; patches on the body, and pads that are driven,
@@ -49,7 +51,9 @@ def plot_motion(solution: pf.Solution, *, size: Any = None, ax: Any = None) -> s
     """
     strobe = _strobe(solution)
     width, height = np.diff(strobe.limits, axis=-1)[:, 0]
-    figure, axes = style.place(ax, 6.4, float(np.clip(1.0 + 4.6 * height / width, 2.6, 5.6)), size)
+    figure, axes = style.place(
+        ax, 6.4, float(np.clip(1.0 + 4.6 * height / width, 2.6, 5.6)), size
+    )
     _draw(axes, strobe)
     figure.draw_without_rendering()  # the aspect sets the ticks, which the layout has to know
     return figure
@@ -92,10 +96,14 @@ class _Strobe(NamedTuple):
 
 def _strobe(solution: pf.Solution) -> _Strobe:
     validation.instance("solution", solution, pf.Solution, "a Solution")
-    time, poses = np.asarray(solution.data["time"], dtype=float), body_poses(solution)
-    chosen = np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int))
+    time = np.asarray(solution.data["time"], dtype=float)
+    poses = body_poses(solution)
+    chosen = np.unique(
+        np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int)
+    )
     limits = _limits(solution, time[chosen], poses[chosen], 1.0)
-    side, size = 1e-3 * float(np.diff(limits, axis=-1).max()), 2.0 * _reach(solution)
+    side = 1e-3 * float(np.diff(limits, axis=-1).max())
+    size = 2.0 * _reach(solution)
     larger = 1.0
     if TINY * size < side:
         larger = float(f"{SEEN * side / size:.1g}")
@@ -104,14 +112,27 @@ def _strobe(solution: pf.Solution) -> _Strobe:
 
 
 def _draw(axes: Any, strobe: _Strobe) -> None:
-    solution, times = strobe.solution, strobe.times
+    solution = strobe.solution
+    times = strobe.times
     pads = [each for each in solution.scene.contacts if each.mounted_on == "world"]
     scale = Normalize(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
     for time, pose in zip(times, strobe.poses, strict=True):
         colour = style.TIME_COLOURS(scale(time))
-        shapes = [_on_mount(each) for each in solution.scene.contacts if each.mounted_on == "body"]
-        lines = [Line2D(*(1e3 * line.T), color=colour, linewidth=1.3, zorder=3) for line in body_lines(solution)]
-        move([_draw_shape(axes, each, colour) for each in shapes], axes, pose, strobe.larger)
+        shapes = [
+            _on_mount(each)
+            for each in solution.scene.contacts
+            if each.mounted_on == "body"
+        ]
+        lines = [
+            Line2D(*(1e3 * line.T), color=colour, linewidth=1.3, zorder=3)
+            for line in body_lines(solution)
+        ]
+        move(
+            [_draw_shape(axes, each, colour) for each in shapes],
+            axes,
+            pose,
+            strobe.larger,
+        )
         move([axes.add_artist(line) for line in lines], axes, pose, strobe.larger)
         for contact in (each for each in pads if each.support_velocity is not None):
             at = contact_poses(contact, np.array([time]), pose)[0]
@@ -126,7 +147,9 @@ def _draw(axes: Any, strobe: _Strobe) -> None:
     style.tidy(axes)
     axes.plot(*(1e3 * strobe.path[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
     dots = {"s": 14, "edgecolor": "white", "linewidth": 0.5, "zorder": 5}
-    axes.scatter(*(1e3 * strobe.poses[:, :2].T), color=style.TIME_COLOURS(scale(times)), **dots)
+    axes.scatter(
+        *(1e3 * strobe.poses[:, :2].T), color=style.TIME_COLOURS(scale(times)), **dots
+    )
     axes.set_title(_remark(strobe), fontsize="small", loc="left")
     if times[-1] > times[0]:
         style.show_times(axes, times)
@@ -137,12 +160,14 @@ def _remark(strobe: _Strobe) -> str:
     if strobe.larger > 1.0:
         return f"body drawn {strobe.larger:g} times as large"
     moved = strobe.path - strobe.path[0]
-    length, angle = float(np.hypot(moved[:, 0], moved[:, 1]).max()), float(np.abs(moved[:, 2]).max())
+    length = float(np.hypot(moved[:, 0], moved[:, 1]).max())
+    angle = float(np.abs(moved[:, 2]).max())
     if max(length, angle * _reach(strobe.solution)) > UNSEEN * _reach(strobe.solution):
         return ""
     if length == angle == 0.0:
         return "it does not move"
-    far, turn = unit_for("length", length), unit_for("angle", angle)
+    far = unit_for("length", length)
+    turn = unit_for("angle", angle)
     moves = f"moves by up to {far.factor * length:.2g} {far.label}"
     return f"{moves}, turns by up to {turn.factor * angle:.2g} {turn.label}"
 
@@ -160,18 +185,40 @@ def placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
 def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> Artist:
     """Draw boxes `[N, 4, 2]` or points `[N, 2]` [m] in the frame of the axes [mm]; return the artist."""
     shape = 1e3 * shape
-    if shape.ndim == 3:  # all boxes are one path, so that no seams show between neighbours
+    if (
+        shape.ndim == 3
+    ):  # all boxes are one path, so that no seams show between neighbours
         closed = np.concatenate([shape, shape[:, :1]], axis=1)
-        codes = [Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY]
+        codes = [
+            Outline.MOVETO,
+            Outline.LINETO,
+            Outline.LINETO,
+            Outline.LINETO,
+            Outline.CLOSEPOLY,
+        ]
         path = Outline(closed.reshape(-1, 2), np.tile(codes, len(shape)))
-        return axes.add_artist(PathPatch(path, facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2))
-    look = {"marker": "o", "markersize": 4.5, "markeredgewidth": 0.0, "linestyle": "none"}
+        return axes.add_artist(
+            PathPatch(
+                path, facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2
+            )
+        )
+    look = {
+        "marker": "o",
+        "markersize": 4.5,
+        "markeredgewidth": 0.0,
+        "linestyle": "none",
+    }
     return axes.add_artist(Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2))
 
 
-def move(artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0) -> None:
+def move(
+    artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0
+) -> None:
     """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes, `larger` times."""
-    transform = Affine2D().scale(larger).rotate(pose[2]).translate(*(1e3 * pose[:2])) + axes.transData
+    transform = (
+        Affine2D().scale(larger).rotate(pose[2]).translate(*(1e3 * pose[:2]))
+        + axes.transData
+    )
     for artist in artists:
         artist.set_transform(transform)
 
@@ -188,8 +235,14 @@ def body_lines(solution: pf.Solution) -> list[np.ndarray]:
         round_one = len(outline) >= CORNERS and np.ptp(radii) <= ROUND * radii.max()
         arm = [np.array([(0.0, 0.0), (radii.max(), 0.0)])] if round_one else []
         return [np.concatenate([outline, outline[:1]]), *arm]
-    arm = max(float(np.abs(_pad_shape(contact)).max()) for contact in solution.scene.contacts)
-    on_body = [_on_mount(each).reshape(-1, 2) for each in solution.scene.contacts if each.mounted_on == "body"]
+    arm = max(
+        float(np.abs(_pad_shape(contact)).max()) for contact in solution.scene.contacts
+    )
+    on_body = [
+        _on_mount(each).reshape(-1, 2)
+        for each in solution.scene.contacts
+        if each.mounted_on == "body"
+    ]
     return [*_rim(on_body), np.array([(0.0, 0.0), (arm, 0.0)])]
 
 
@@ -213,19 +266,31 @@ def _pad_shape(contact: pf.Contact) -> np.ndarray:
 
 def _on_mount(contact: pf.Contact) -> np.ndarray:
     """Return the patch of a contact in the frame that it is mounted on (world or body) [m]."""
-    return placed(_pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float))
+    return placed(
+        _pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float)
+    )
 
 
-def _limits(solution: pf.Solution, times: np.ndarray, poses: np.ndarray, larger: float) -> np.ndarray:
+def _limits(
+    solution: pf.Solution, times: np.ndarray, poses: np.ndarray, larger: float
+) -> np.ndarray:
     """Return the limits of both axes, `[2, 2]` [mm], that hold all drawn at `times` and `poses`, the body `larger`."""
-    points = [placed(larger * line, pose) for pose in poses for line in body_lines(solution)]
+    points = [
+        placed(larger * line, pose) for pose in poses for line in body_lines(solution)
+    ]
     for contact in solution.scene.contacts:
         if contact.mounted_on == "body":
-            points += [placed(larger * _on_mount(contact).reshape(-1, 2), pose) for pose in poses]
+            points += [
+                placed(larger * _on_mount(contact).reshape(-1, 2), pose)
+                for pose in poses
+            ]
         else:
             shape = _pad_shape(contact).reshape(-1, 2)
-            points += [placed(shape, pose) for pose in contact_poses(contact, times, poses)]
+            points += [
+                placed(shape, pose) for pose in contact_poses(contact, times, poses)
+            ]
     everything = 1e3 * np.concatenate(points)
-    low, high = everything.min(axis=0), everything.max(axis=0)
+    low = everything.min(axis=0)
+    high = everything.max(axis=0)
     margin = 0.04 * float((high - low).max())
     return np.stack([low - margin, high + margin], -1)

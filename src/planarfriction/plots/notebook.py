@@ -57,11 +57,17 @@ def surface_html(surface: pf.limit_surface.LimitSurface) -> str:
 def law_html(law: Any) -> str:
     """Return the friction of steady sliding over the speed, with the parameters of a law."""
     given = {each.name: getattr(law, each.name) for each in dataclasses.fields(law)}
-    rows = {name: _parameter(name, value) for name, value in given.items() if value is not None}
+    rows = {
+        name: _parameter(name, value)
+        for name, value in given.items()
+        if value is not None
+    }
     figure = style.new_figure(1.8, 1.2)
     axes = figure.add_subplot()
     speed = np.linspace(0.0, _SPEEDS * law.numbers.v_s, 200)
-    axes.plot(1e3 * speed, law.steady_friction(speed), color=style.PALETTE[0], linewidth=1.5)
+    axes.plot(
+        1e3 * speed, law.steady_friction(speed), color=style.PALETTE[0], linewidth=1.5
+    )
     axes.set(xlabel="mm/s", ylabel="f/f_N", ylim=(0.0, None))
     return _beside(figure, type(law).__name__, rows)
 
@@ -83,7 +89,10 @@ def scene_html(scene: pf.Scene) -> str:
         "duration": f"{scene.t_end:g} s, from {scene.start}",
         "body": f"{scene.body.mass:g} kg, {scene.body.inertia:.3g} kg m²",
     }
-    rows |= {f"contact {each.name!r}": repr(each).partition(": ")[2].rstrip(")") for each in scene.contacts}
+    rows |= {
+        f"contact {each.name!r}": repr(each).partition(": ")[2].rstrip(")")
+        for each in scene.contacts
+    }
     patch = scene.contacts[0].model.patch
     figure = None if patch.depends_on_load else _pressure(patch, None)
     return _beside(figure, f"Scene {scene.name!r}", rows)
@@ -92,7 +101,10 @@ def scene_html(scene: pf.Scene) -> str:
 def solution_html(solution: pf.Solution) -> str:
     """Return a drawing of the motion of the body, with the end and the cost of the run."""
     time = np.asarray(solution.histories["time"].values)
-    x, y, theta = (float(np.asarray(solution.histories[name].values)[-1]) for name in ("x", "y", "theta"))
+    x, y, theta = (
+        float(np.asarray(solution.histories[name].values)[-1])
+        for name in ("x", "y", "theta")
+    )
     cost = solution.statistics
     rows = {
         "status": f"{solution.status}: {solution.message}",
@@ -100,7 +112,8 @@ def solution_html(solution: pf.Solution) -> str:
         "end": f"{_point((x, y))}, turned by {np.degrees(theta):.2f} deg",
         "cost": f"{cost.steps} steps, {1e3 * cost.wall_time:.3g} ms",
     }
-    figure, title = None, "Solution"
+    figure = None
+    title = "Solution"
     if solution.scene is not None:
         title = f"Solution {solution.scene.name!r}"
         figure = style.new_figure(4.0, 3.0)
@@ -116,15 +129,28 @@ def _pressure(patch: pf.ContactPatch, load: float | None) -> style.PlotFigure | 
     figure = style.new_figure(1.5, 1.5)
     axes = figure.add_subplot()
     if patch.grid is None:
-        axes.scatter(*patch.positions.T, s=60 * weights / weights.max(), c=weights, cmap=style.PRESSURE_MAP)
+        axes.scatter(
+            *patch.positions.T,
+            s=60 * weights / weights.max(),
+            c=weights,
+            cmap=style.PRESSURE_MAP,
+        )
         axes.margins(0.3)
     else:
         grid = patch.grid
         pixels = np.full((grid.rows, grid.columns), np.nan)
         shares = 1.0 if patch.point_shares is None else patch.point_shares
         pixels[grid.locate(patch.positions)] = weights / (patch.areas * shares)
-        box = np.array([0.0, grid.columns * grid.cell_width, 0.0, grid.rows * grid.cell_height])
-        axes.imshow(pixels, cmap=style.PRESSURE_MAP, vmin=0.0, extent=tuple(box), interpolation="nearest")
+        box = np.array(
+            [0.0, grid.columns * grid.cell_width, 0.0, grid.rows * grid.cell_height]
+        )
+        axes.imshow(
+            pixels,
+            cmap=style.PRESSURE_MAP,
+            vmin=0.0,
+            extent=tuple(box),
+            interpolation="nearest",
+        )
     axes.set(aspect="equal")
     axes.set_axis_off()
     return figure
@@ -132,12 +158,19 @@ def _pressure(patch: pf.ContactPatch, load: float | None) -> style.PlotFigure | 
 
 def _section(surface: pf.limit_surface.LimitSurface) -> style.PlotFigure:
     angle = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1)
-    radius, centre = surface.contact_radius, surface.centre_of_pressure
-    about_centre = np.stack([np.cos(angle), np.zeros_like(angle), np.sin(angle) / radius], -1)
-    wrenches = geometry.wrench_at(surface.wrench(geometry.twist_at(about_centre, -centre)), centre)
+    radius = surface.contact_radius
+    centre = surface.centre_of_pressure
+    about_centre = np.stack(
+        [np.cos(angle), np.zeros_like(angle), np.sin(angle) / radius], -1
+    )
+    wrenches = geometry.wrench_at(
+        surface.wrench(geometry.twist_at(about_centre, -centre)), centre
+    )
     figure = style.new_figure(1.5, 1.5)
     axes = figure.add_subplot()
-    axes.plot(wrenches[:, 0], wrenches[:, 2] / radius, color=style.PALETTE[0], linewidth=1.5)
+    axes.plot(
+        wrenches[:, 0], wrenches[:, 2] / radius, color=style.PALETTE[0], linewidth=1.5
+    )
     axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)
     axes.axvline(0.0, color="0.8", linewidth=0.6, zorder=0)
     axes.set(aspect="equal")
@@ -146,17 +179,26 @@ def _section(surface: pf.limit_surface.LimitSurface) -> style.PlotFigure:
 
 
 def _size(patch: pf.ContactPatch) -> str:
-    if patch.grid is None or patch.cell_size is None or min(patch.cell_size) == 0.0:  # points, lines
-        width, height = np.ptp(patch.positions, axis=0) + (0.0 if patch.cell_size is None else patch.cell_size)
+    if (
+        patch.grid is None or patch.cell_size is None or min(patch.cell_size) == 0.0
+    ):  # points, lines
+        width, height = np.ptp(patch.positions, axis=0) + (
+            0.0 if patch.cell_size is None else patch.cell_size
+        )
     else:
-        width, height = patch.grid.columns * patch.grid.cell_width, patch.grid.rows * patch.grid.cell_height
+        width = patch.grid.columns * patch.grid.cell_width
+        height = patch.grid.rows * patch.grid.cell_height
     unit = unit_for("length", max(width, height))
     return f"{unit.factor * width:.3g} x {unit.factor * height:.3g} {unit.label}"
 
 
 def _parameter(name: str, value: Any) -> str:
     unit = LAW[name].unit if name in LAW else ""
-    return f"{value:g} {unit}".removesuffix(" -") if isinstance(value, (int, float)) else f"{value}"
+    return (
+        f"{value:g} {unit}".removesuffix(" -")
+        if isinstance(value, (int, float))
+        else f"{value}"
+    )
 
 
 def _length(value: float) -> str:
@@ -165,7 +207,9 @@ def _length(value: float) -> str:
 
 
 def _point(point: Any) -> str:
-    return f"({1e3 * float(point[0]):.2f}, {1e3 * float(point[1]):.2f}) mm".replace("-0.00", "0.00")
+    return f"({1e3 * float(point[0]):.2f}, {1e3 * float(point[1]):.2f}) mm".replace(
+        "-0.00", "0.00"
+    )
 
 
 def _beside(figure: style.PlotFigure | None, title: str, rows: dict[str, str]) -> str:
@@ -176,8 +220,13 @@ def _beside(figure: style.PlotFigure | None, title: str, rows: dict[str, str]) -
         figure.savefig(buffer, format="png", dpi=96, bbox_inches="tight")
         data = base64.b64encode(buffer.getvalue()).decode()
         picture = f'<img alt="" src="data:image/png;base64,{data}">'
-    cells = ([f'<td style="text-align:left">{html.escape(each)}</td>' for each in row] for row in rows.items())
+    cells = (
+        [f'<td style="text-align:left">{html.escape(each)}</td>' for each in row]
+        for row in rows.items()
+    )
     lines = "".join(f"<tr>{''.join(each)}</tr>" for each in cells)
     look = 'style="color:inherit;font:inherit"'
     table = f"<div><b>{html.escape(title)}</b><table {look}>{lines}</table></div>"
-    return f'<div style="display:flex;align-items:center;gap:1em">{picture}{table}</div>'
+    return (
+        f'<div style="display:flex;align-items:center;gap:1em">{picture}{table}</div>'
+    )

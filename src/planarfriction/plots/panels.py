@@ -42,7 +42,9 @@ LONGEST = 24
 STILL, ARM = 1e-3, 1e-2
 """Share of the largest speed below which a body stands, and turns about no point [-]; lever of its spin in it [m]."""
 
-_PALE = LinearSegmentedColormap.from_list("stick", ["#EAF1F7", STICK])(np.linspace(0.0, 1.0, 230))
+_PALE = LinearSegmentedColormap.from_list("stick", ["#EAF1F7", STICK])(
+    np.linspace(0.0, 1.0, 230)
+)
 CELLS = ListedColormap([*_PALE, *[SLIP] * 26])
 """Colours of cells: up to 0.9 those of bristles that stick, above it of those that slip."""
 
@@ -53,14 +55,20 @@ def cell_polygons(patch: Any) -> np.ndarray:
         return cell_boxes(patch, patch.grid)
     extent = float(np.ptp(patch.positions, axis=0).max()) or 1e-2
     around = np.pi / 3.0 * np.arange(6)
-    hexagon = min(0.05, 0.5 / math.sqrt(len(patch.positions))) * extent * np.stack([np.cos(around), np.sin(around)], -1)
+    hexagon = (
+        min(0.05, 0.5 / math.sqrt(len(patch.positions)))
+        * extent
+        * np.stack([np.cos(around), np.sin(around)], -1)
+    )
     return patch.positions[:, None, :] + hexagon
 
 
 def cells_of(track: ContactTrack, *, edge: str) -> PolyCollection:
     """Return the cells of a contact [mm], to be coloured frame by frame; `edge` is the colour of their edges."""
     boxes = list(1e3 * cell_polygons(track.contact.model.patch))
-    cells = PolyCollection(boxes, edgecolor=edge, linewidth=0.3, antialiased=edge != "face")  # seams would show
+    cells = PolyCollection(
+        boxes, edgecolor=edge, linewidth=0.3, antialiased=edge != "face"
+    )  # seams would show
     if track.slip is not None:
         cells.set(cmap=CELLS, clim=(0.0, 1.0))
     return cells
@@ -73,7 +81,8 @@ def colour_cells(cells: PolyCollection, track: ContactTrack, frame: int) -> None
     if track.slip is None:
         cells.set_facecolor([PLAIN if each else "none" for each in loaded])
         return
-    bent, slips = track.slip.bent[frame], track.slip.slips[frame]
+    bent = track.slip.bent[frame]
+    slips = track.slip.slips[frame]
     shade = np.where(slips, 1.0, 0.89 * np.minimum(bent, 1.0))
     cells.set_array(np.ma.masked_array(shade, ~loaded))
 
@@ -82,25 +91,45 @@ class CellPanel:
     """The cells of a contact in its own frame, and the point about which the body turns on it."""
 
     def __init__(self, axes: Any, track: ContactTrack, *, bar: Any):
-        self.axes, self.track = axes, track
+        self.axes = axes
+        self.track = track
         points = 1e3 * cell_polygons(track.contact.model.patch).reshape(-1, 2)
-        low, high = points.min(axis=0), points.max(axis=0)
+        low = points.min(axis=0)
+        high = points.max(axis=0)
         half = 0.56 * float((high - low).max())
-        for set_limits, middle in zip((axes.set_xlim, axes.set_ylim), 0.5 * (low + high), strict=True):
+        for set_limits, middle in zip(
+            (axes.set_xlim, axes.set_ylim), 0.5 * (low + high), strict=True
+        ):
             set_limits(middle - half, middle + half)
         axes.set_xlabel("", fontsize="small", labelpad=1)
         axes.set_ylabel("", fontsize="small", labelpad=1)
-        style.show_lengths(axes, 1e-3 * float(np.abs([axes.get_xlim(), axes.get_ylim()]).max()))
+        style.show_lengths(
+            axes, 1e-3 * float(np.abs([axes.get_xlim(), axes.get_ylim()]).max())
+        )
         axes.set_aspect("equal")
         axes.tick_params(labelsize="small")
         axes.locator_params(nbins=4)
         style.tidy(axes)
         self.cells = axes.add_collection(cells_of(track, edge="white"))
         self.centre = centre_mark(axes)
-        self.words = axes.text(0.5, 1.02, "", transform=axes.transAxes, ha="center", va="bottom", fontsize="small")
+        self.words = axes.text(
+            0.5,
+            1.02,
+            "",
+            transform=axes.transAxes,
+            ha="center",
+            va="bottom",
+            fontsize="small",
+        )
         if bar is not None:
-            shown = axes.figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), CELLS), cax=bar)
-            shown.set_ticks([0.0, 0.45, 0.95], labels=["unbent", "sticks", "slips"], fontsize="small")
+            shown = axes.figure.colorbar(
+                ScalarMappable(Normalize(0.0, 1.0), CELLS), cax=bar
+            )
+            shown.set_ticks(
+                [0.0, 0.45, 0.95],
+                labels=["unbent", "sticks", "slips"],
+                fontsize="small",
+            )
             shown.ax.tick_params(length=0)
         for artist in self.artists():
             artist.set_animated(True)
@@ -113,7 +142,12 @@ class CellPanel:
         """Show a frame."""
         track = self.track
         colour_cells(self.cells, track, frame)
-        put_centre(self.centre, track.twists[frame], np.zeros(2), still=still_speed(track.twists))
+        put_centre(
+            self.centre,
+            track.twists[frame],
+            np.zeros(2),
+            still=still_speed(track.twists),
+        )
         name = textwrap.shorten(str(track.contact.name), LONGEST, placeholder="...")
         if track.slip is not None:
             weights, _ = track.shape(frame)
@@ -125,12 +159,19 @@ class SurfacePanel:
     """The limit surface of a contact at its load, and the friction wrench in it, both for mu_c f_N = 1."""
 
     def __init__(self, axes: Any, track: ContactTrack, *, beside: int = 0):
-        self.axes, self.track = axes, track  # `beside` is the number of other contacts that are shown
+        self.axes = axes
+        self.track = track  # `beside` is the number of other contacts that are shown
         self.levels = _levels(track)
-        self.surfaces = {level: surface_at(track.contact.model.patch, load) for level, load in self.levels.items()}
+        self.surfaces = {
+            level: surface_at(track.contact.model.patch, load)
+            for level, load in self.levels.items()
+        }
         polar = np.linspace(0.0, np.pi, POLAR + 1)[:, None]
         azimuth = np.linspace(0.0, 2.0 * np.pi, AZIMUTH + 1)[None, :]
-        meshes = {level: scaled_samples(each, polar, azimuth) for level, each in self.surfaces.items()}
+        meshes = {
+            level: scaled_samples(each, polar, azimuth)
+            for level, each in self.surfaces.items()
+        }
         self.points = self._points()
         reach = max(float(np.abs(mesh).max()) for _, mesh in meshes.values())
         limit = 1.05 * max(reach, min(FARTHEST, float(np.abs(self.points).max())))
@@ -139,7 +180,9 @@ class SurfacePanel:
             for level, (directions, mesh) in meshes.items()
         }
         axes.tick_params(labelsize="x-small", pad=-2)
-        axes.set(xticks=[-0.5, 0.0, 0.5], yticks=[-0.5, 0.0, 0.5])  # those at the corner would meet
+        axes.set(
+            xticks=[-0.5, 0.0, 0.5], yticks=[-0.5, 0.0, 0.5]
+        )  # those at the corner would meet
         if beside:
             axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.85 if beside == 1 else 0.72)
             for axis in (axes.xaxis, axes.yaxis, axes.zaxis):  # no room for numbers
@@ -148,13 +191,27 @@ class SurfacePanel:
                 axis.label.set_fontsize("x-small")
         axes.set_title("limit surface, $\\mu_c f_N = 1$", fontsize="small", y=0.98)
         self.floor = -limit
-        (self.shadow,) = axes.plot([], [], [], color="0.45", linewidth=1.2, marker="o", markersize=3)
-        (self.tail,) = axes.plot([], [], [], color=style.PALETTE[1], linewidth=1.0, alpha=0.6)
+        (self.shadow,) = axes.plot(
+            [], [], [], color="0.45", linewidth=1.2, marker="o", markersize=3
+        )
+        (self.tail,) = axes.plot(
+            [], [], [], color=style.PALETTE[1], linewidth=1.0, alpha=0.6
+        )
         (self.arm,) = axes.plot([], [], [], color="black", linewidth=1.6)
-        (self.head,) = axes.plot([], [], [], color=style.PALETTE[1], marker="o", markersize=6, markeredgecolor="white")
+        (self.head,) = axes.plot(
+            [],
+            [],
+            [],
+            color=style.PALETTE[1],
+            marker="o",
+            markersize=6,
+            markeredgecolor="white",
+        )
         for artist in self.artists():
             artist.set_animated(True)
-            artist.set_clip_box(axes.bbox)  # viscous friction may be many times mu_c f_N
+            artist.set_clip_box(
+                axes.bbox
+            )  # viscous friction may be many times mu_c f_N
             artist.set_clip_on(True)
 
     def artists(self) -> list[Artist]:
@@ -177,20 +234,27 @@ class SurfacePanel:
 
     def _points(self) -> np.ndarray:
         """Return the wrenches `(fx, fy, tau/r)` about the centre of pressure over `mu_c f_N` `[F, 3]` [-], or zeros."""
-        track, mu = self.track, float(self.track.contact.model.law.numbers.mu_c)
+        track = self.track
+        mu = float(self.track.contact.model.law.numbers.mu_c)
         points = np.zeros((len(track.loads), 3))
         for frame, load in enumerate(track.loads):
             if load > 0.0:
                 surface = self.surfaces[level_of(track, frame)]
-                wrench = geometry.wrench_at(track.wrenches[frame], track.shape(frame)[1])
-                points[frame] = wrench / np.array([1.0, 1.0, surface.contact_radius]) / (mu * load)
+                wrench = geometry.wrench_at(
+                    track.wrenches[frame], track.shape(frame)[1]
+                )
+                points[frame] = (
+                    wrench / np.array([1.0, 1.0, surface.contact_radius]) / (mu * load)
+                )
         return points
 
 
 def surface_at(patch: Any, load: float | None) -> Any:
     """Return the exact limit surface of a patch at a load; a table of it where the cells differ in their friction."""
     each_its_own = patch.root is not None and patch.root.ndim == 3
-    return (pf.LimitSurfaceTable if each_its_own else pf.LimitSurfaceExact)(patch, normal_force=load)
+    return (pf.LimitSurfaceTable if each_its_own else pf.LimitSurfaceExact)(
+        patch, normal_force=load
+    )
 
 
 def has_surface(track: ContactTrack) -> bool:
@@ -210,7 +274,9 @@ def _levels(track: ContactTrack) -> dict[Any, float | None]:
     """Return the load [N] of each level at which its surface is drawn; None if the shape does not depend on it."""
     if not track.contact.model.patch.depends_on_load:
         return {None: None}
-    found = sorted({level_of(track, frame) for frame, load in enumerate(track.loads) if load > 0.0})
+    found = sorted(
+        {level_of(track, frame) for frame, load in enumerate(track.loads) if load > 0.0}
+    )
     return {level: LOAD_STEP**level for level in found}
 
 
@@ -226,8 +292,16 @@ def level_of(track: ContactTrack, frame: int) -> Any:
 
 def centre_mark(axes: Any) -> Any:
     """Return the mark of a centre of rotation."""
-    look = {"marker": "o", "markersize": 8, "markerfacecolor": "none", "markeredgewidth": 1.8, "linestyle": "none"}
-    return axes.plot([], [], color="#111111", zorder=8, label="centre of rotation", **look)[0]
+    look = {
+        "marker": "o",
+        "markersize": 8,
+        "markerfacecolor": "none",
+        "markeredgewidth": 1.8,
+        "linestyle": "none",
+    }
+    return axes.plot(
+        [], [], color="#111111", zorder=8, label="centre of rotation", **look
+    )[0]
 
 
 def put_centre(mark: Any, twist: np.ndarray, at: np.ndarray, *, still: float) -> None:
@@ -241,4 +315,6 @@ def put_centre(mark: Any, twist: np.ndarray, at: np.ndarray, *, still: float) ->
 
 def still_speed(twists: np.ndarray) -> float:
     """Return the speed [m/s] below which a body that has the twists `[F, 3]` stands."""
-    return STILL * float((np.hypot(*twists[:, :2].T) + ARM * np.abs(twists[:, 2])).max())
+    return STILL * float(
+        (np.hypot(*twists[:, :2].T) + ARM * np.abs(twists[:, 2])).max()
+    )

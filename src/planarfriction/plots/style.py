@@ -67,11 +67,14 @@ class PlotFigure(Figure):
 
         if pyplot.get_backend().lower() in WITHOUT_WINDOW:
             if warn:
-                warnings.warn(f"no window can open here ({pyplot.get_backend()}): use savefig", stacklevel=2)
+                warnings.warn(
+                    f"no window can open here ({pyplot.get_backend()}): use savefig",
+                    stacklevel=2,
+                )
             return
         manager = self.canvas.manager
         if manager is None or not pyplot.fignum_exists(manager.num):
-            adopt: Any = lambda *_, **__: self  # noqa: E731
+            adopt: Any = lambda *_, **__: self
             pyplot.figure(FigureClass=adopt)  # the figure that pyplot makes is this one
         pyplot.show()
 
@@ -93,11 +96,15 @@ def new_figure(width: float, height: float, size: Any = None) -> PlotFigure:
     Raises InvalidValueError unless `size` is two numbers > 0 and at most `LARGEST_SIDE`.
     """
     if size is None:
-        width, height = (max(1.0, rcParams["font.size"] / 10.0) * each for each in (width, height))
+        width, height = (
+            max(1.0, rcParams["font.size"] / 10.0) * each for each in (width, height)
+        )
     else:
         width, height = validation.positive_array("size", size, (2,))
         if max(width, height) > LARGEST_SIDE:
-            raise InvalidValueError("size", f"be in inches, each side at most {LARGEST_SIDE:g}", size)
+            raise InvalidValueError(
+                "size", f"be in inches, each side at most {LARGEST_SIDE:g}", size
+            )
     return PlotFigure(figsize=(width, height), layout="constrained", dpi=120)
 
 
@@ -121,10 +128,16 @@ def check_axes(name: str, ax: Any, size: Any, *, three: bool = False) -> None:
     if not isinstance(ax, Axes):
         raise InvalidValueError(name, "be axes of matplotlib", ax)
     if (ax.name == "3d") != three:
-        rule = 'have three dimensions (projection="3d")' if three else "be those of a plane"
+        rule = (
+            'have three dimensions (projection="3d")'
+            if three
+            else "be those of a plane"
+        )
         raise InvalidValueError(name, rule, ax)
     if size is not None:
-        raise InvalidValueError("size", f"be left out with {name}: the figure has a size", size)
+        raise InvalidValueError(
+            "size", f"be left out with {name}: the figure has a size", size
+        )
 
 
 def axes_width(axes: Any) -> float:
@@ -148,13 +161,19 @@ def show_lengths(axes: Any, largest: float) -> None:
     unit = unit_for("length", largest)
     for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
         axis.set_label_text(f"{name} [{unit.label}]")
-        axis.set_major_formatter(lambda value, _: f"{1e-3 * unit.factor * value:.10g}".replace("-", "\N{MINUS SIGN}"))
+        axis.set_major_formatter(
+            lambda value, _: f"{1e-3 * unit.factor * value:.10g}".replace(
+                "-", "\N{MINUS SIGN}"
+            )
+        )
 
 
 def show_times(axes: Any, times: Any) -> None:
     """Add the colour bar of `TIME_COLOURS` from the first to the last of `times` [s]."""
     clock = unit_for("time", times)
-    shown = ScalarMappable(Normalize(clock.factor * times[0], clock.factor * times[-1]), TIME_COLOURS)
+    shown = ScalarMappable(
+        Normalize(clock.factor * times[0], clock.factor * times[-1]), TIME_COLOURS
+    )
     axes.figure.colorbar(shown, ax=axes, label=f"time [{clock.label}]", aspect=30)
 
 

@@ -38,11 +38,14 @@ class ContactTrack:
     @functools.cached_property
     def forces(self) -> np.ndarray:
         """Friction force of all identical contacts on the body, world axes `[F, 2]` [N]."""
-        return self.contact.count * geometry.rotate(self.wrenches[:, :2], self.poses[:, 2])
+        return self.contact.count * geometry.rotate(
+            self.wrenches[:, :2], self.poses[:, 2]
+        )
 
     def shape(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the share of the load on each cell `[N]` [-], and the centre of pressure `[2]` [m], at a frame."""
-        patch, load = self.contact.model.patch, float(self.loads[frame])
+        patch = self.contact.model.patch
+        load = float(self.loads[frame])
         if patch.depends_on_load and not load > 0.0:
             return np.zeros(len(patch.positions)), np.zeros(2)
         at = load if patch.depends_on_load else None
@@ -64,25 +67,46 @@ class Track(NamedTuple):
 def track_of(solution: pf.Solution, times: np.ndarray) -> Track:
     """Return the solution at `times` `[F]` [s]: poses without overshoot, all else along straight lines."""
     sampled = np.asarray(solution.histories["time"].values, dtype=float)
-    every = np.unique(np.linspace(0, len(sampled) - 1, min(len(sampled), MOST_STEPS)).round().astype(int))
+    every = np.unique(
+        np.linspace(0, len(sampled) - 1, min(len(sampled), MOST_STEPS))
+        .round()
+        .astype(int)
+    )
     steps = np.unique(np.concatenate([sampled[every], times]))
     frames = np.searchsorted(steps, times)
     poses = _poses(solution, sampled, steps)
-    twists = np.stack([_values(solution, name, sampled, times) for name in ("vx", "vy", "omega")], -1)
+    twists = np.stack(
+        [_values(solution, name, sampled, times) for name in ("vx", "vy", "omega")], -1
+    )
     if solution.scene.velocity is not None:  # in axes of the body
         twists = geometry.rotate(twists, poses[frames, 2])
     contacts = []
-    for index, (contact, first) in enumerate(zip(solution.scene.contacts, _first(solution), strict=True)):
+    for index, (contact, first) in enumerate(
+        zip(solution.scene.contacts, _first(solution), strict=True)
+    ):
         at = contact_poses(contact, steps, poses)
         loads = _values(solution, "normal_force", sampled, steps, index)
         against = _between(times, sampled, solution.contact_twist(contact.name))
-        slip = first and slip_field(*first, steps, _displacements(contact, steps, poses, at), loads, frames, against[0])
+        slip = first and slip_field(
+            *first,
+            steps,
+            _displacements(contact, steps, poses, at),
+            loads,
+            frames,
+            against[0],
+        )
         wrenches = _between(times, sampled, _without_kick(solution, index))
-        contacts.append(ContactTrack(contact, index, at[frames], against, wrenches, loads[frames], slip))
+        contacts.append(
+            ContactTrack(
+                contact, index, at[frames], against, wrenches, loads[frames], slip
+            )
+        )
     return Track(times, poses[frames], twists, contacts)
 
 
-def _first(solution: pf.Solution) -> list[tuple[pf.DistributedModel, np.ndarray] | None]:
+def _first(
+    solution: pf.Solution,
+) -> list[tuple[pf.DistributedModel, np.ndarray] | None]:
     """Return the distributed model of each contact and its first state; None for one without bristles."""
     from planarfriction.scenes.start import first_states
 
@@ -91,13 +115,18 @@ def _first(solution: pf.Solution) -> list[tuple[pf.DistributedModel, np.ndarray]
     known = [each for each in models if each is not None]
     if scene.start == "rest" or len(known) < len(models):
         return [each and (each, each.rest()) for each in models]
-    contacts = [replace(each, model=model) for each, model in zip(scene.contacts, known, strict=True)]
+    contacts = [
+        replace(each, model=model)
+        for each, model in zip(scene.contacts, known, strict=True)
+    ]
     loads = np.asarray(solution.histories["normal_force"].values, dtype=float)[0]
     states = first_states(replace(scene, contacts=contacts), loads)
     return list(zip(known, states, strict=True))
 
 
-def contact_poses(contact: pf.Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
+def contact_poses(
+    contact: pf.Contact, times: np.ndarray, poses: np.ndarray
+) -> np.ndarray:
     """Return the poses `[T, 3]` [m, m, rad] of a contact's frame at `times`, where the body has `poses` `[T, 3]`."""
     fixed = np.array([*contact.position, contact.angle], dtype=float)
     if contact.mounted_on == "body":
@@ -113,21 +142,38 @@ def _carried(contact: pf.Contact, times: np.ndarray) -> np.ndarray:
     return np.zeros((len(times), 3)) if moves is None else displacement(moves, times)
 
 
-def _displacements(contact: pf.Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:
+def _displacements(
+    contact: pf.Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray
+) -> np.ndarray:
     """Return the displacement of the body on a contact between instants, in the frame of the contact `[T - 1, 3]`.
 
     That of the material of the body at the origin of the frame, half-way: of second order in the turn of a step.
     """
-    body, middle = np.diff(poses, axis=0), 0.5 * (at[1:] + at[:-1])
-    moved = geometry.twist_at(body, middle[:, :2] - 0.5 * (poses[1:, :2] + poses[:-1, :2]))
-    ground = np.diff(_carried(contact, times), axis=0)  # of a pad at its frame, of the ground at the world's origin
-    moved = moved - (geometry.twist_at(ground, middle[:, :2]) if contact.mounted_on == "body" else ground)
+    body = np.diff(poses, axis=0)
+    middle = 0.5 * (at[1:] + at[:-1])
+    moved = geometry.twist_at(
+        body, middle[:, :2] - 0.5 * (poses[1:, :2] + poses[:-1, :2])
+    )
+    ground = np.diff(
+        _carried(contact, times), axis=0
+    )  # of a pad at its frame, of the ground at the world's origin
+    moved = moved - (
+        geometry.twist_at(ground, middle[:, :2])
+        if contact.mounted_on == "body"
+        else ground
+    )
     return geometry.rotate(moved, -middle[:, 2])
 
 
 def body_poses(solution: pf.Solution) -> np.ndarray:
     """Return the pose (x, y, theta) of the body at all samples, `[T, 3]` [m, m, rad]."""
-    return np.stack([np.asarray(solution.histories[name].values, dtype=float) for name in ("x", "y", "theta")], -1)
+    return np.stack(
+        [
+            np.asarray(solution.histories[name].values, dtype=float)
+            for name in ("x", "y", "theta")
+        ],
+        -1,
+    )
 
 
 def _poses(solution: pf.Solution, sampled: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -136,10 +182,18 @@ def _poses(solution: pf.Solution, sampled: np.ndarray, times: np.ndarray) -> np.
     poses = body_poses(solution)
     if len(sampled) == 1:
         return np.broadcast_to(poses, (len(times), 3))
-    return PchipInterpolator(sampled, poses, axis=0)(np.clip(times, sampled[0], sampled[-1]))
+    return PchipInterpolator(sampled, poses, axis=0)(
+        np.clip(times, sampled[0], sampled[-1])
+    )
 
 
-def _values(run: pf.Solution, name: str, sampled: np.ndarray, times: np.ndarray, contact: Any = None) -> np.ndarray:
+def _values(
+    run: pf.Solution,
+    name: str,
+    sampled: np.ndarray,
+    times: np.ndarray,
+    contact: Any = None,
+) -> np.ndarray:
     values = np.asarray(run.histories[name].values, dtype=float)
     return np.interp(times, sampled, values if contact is None else values[:, contact])
 
@@ -150,7 +204,13 @@ def _without_kick(solution: pf.Solution, contact: int) -> np.ndarray:
     Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`).
     """
     names = ("fx", "fy", "tau")
-    wrenches = np.stack([np.asarray(solution.histories[name].values, dtype=float)[:, contact] for name in names], -1)
+    wrenches = np.stack(
+        [
+            np.asarray(solution.histories[name].values, dtype=float)[:, contact]
+            for name in names
+        ],
+        -1,
+    )
     for column in wrenches.T:
         if len(column) > 1 and abs(column[0]) > KICK * np.abs(column[1:]).max():
             column[0] = column[1]

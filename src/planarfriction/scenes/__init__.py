@@ -55,5 +55,7 @@ __all__ = [
 register = SCENES.register
 
 # it brings the compiled solver with it
-__getattr__, _, _ = lazy_loader.attach(__name__, submod_attrs={"simulation": ["simulate"]})
+__getattr__, _, _ = lazy_loader.attach(
+    __name__, submod_attrs={"simulation": ["simulate"]}
+)
 __dir__ = __all__.copy

@@ -18,7 +18,9 @@ from planarfriction.scenes.signal import Signal, as_signal
 def floats(name: str, value: Any, size: int) -> tuple[float, ...]:
     """Return `value` as a tuple of `size` finite numbers, or raise."""
     fits = type(value) is tuple and len(value) == size
-    if fits and all(type(each) is float and abs(each) <= validation.LARGEST for each in value):
+    if fits and all(
+        type(each) is float and abs(each) <= validation.LARGEST for each in value
+    ):
         return value
     return tuple(validation.vector(name, value, size).tolist())
 
@@ -43,15 +45,23 @@ class Body(ByValue):
     """Mass [kg]."""
     inertia: float = checked(validation.positive)
     """Moment of inertia about the centre of mass [kg m^2]."""
-    position: Kept[ArrayLike, tuple[float, float]] = checked(floats, 2, default=(0.0, 0.0))
+    position: Kept[ArrayLike, tuple[float, float]] = checked(
+        floats, 2, default=(0.0, 0.0)
+    )
     """Initial position of the centre of mass in the world [m]."""
     angle: float = checked(validation.number, default=0.0)
     """Initial angle of the body's axes in the world [rad]."""
-    velocity: Kept[ArrayLike, tuple[float, float, float]] = checked(floats, 3, default=(0.0, 0.0, 0.0))
+    velocity: Kept[ArrayLike, tuple[float, float, float]] = checked(
+        floats, 3, default=(0.0, 0.0, 0.0)
+    )
     """Initial twist `(vx, vy, omega)` of the centre of mass, world axes [m/s, m/s, rad/s]."""
-    gravity: Kept[ArrayLike, tuple[float, float]] = checked(floats, 2, default=(0.0, -9.81))
+    gravity: Kept[ArrayLike, tuple[float, float]] = checked(
+        floats, 2, default=(0.0, -9.81)
+    )
     """Gravity in the plane of motion, world axes [m/s^2]."""
-    outline: Kept[ArrayLike | None, np.ndarray | None] = checked(_polygon, default=None, repr=False)
+    outline: Kept[ArrayLike | None, np.ndarray | None] = checked(
+        _polygon, default=None, repr=False
+    )
     """Polygon in body axes with the centre of mass at the origin, shape `[M, 2]` [m], or None.
 
     It is for drawings, and for contacts with an `edge`.
@@ -99,12 +109,17 @@ class Spring(ByValue):
 
         Raises InvalidValueError for times or poses that are not finite, or do not belong together.
         """
-        pose, time = validation.finite_numbers("pose", pose), validation.finite_numbers("time", time)
+        pose = validation.finite_numbers("pose", pose)
+        time = validation.finite_numbers("time", time)
         if pose.shape[-1:] != (3,) or time.shape not in ((), pose.shape[:-1]):
             rule = f"have the shape (..., 3) with one for each of {time.shape} times"
             raise InvalidValueError("pose", rule, pose.shape)
         arm = rotate(self.at, pose[..., 2])
-        stretch = self.anchor(time) - pose - np.concatenate([arm, np.zeros_like(arm[..., :1])], -1)
+        stretch = (
+            self.anchor(time)
+            - pose
+            - np.concatenate([arm, np.zeros_like(arm[..., :1])], -1)
+        )
         wrench = stretch * [self.stiffness, self.stiffness, self.torsion]
         wrench[..., 2] += arm[..., 0] * wrench[..., 1] - arm[..., 1] * wrench[..., 0]
         return wrench
@@ -112,12 +127,20 @@ class Spring(ByValue):
     @property
     def numbers(self) -> tuple[float, ...]:
         """Constants in the order of `body.springs`."""
-        return self.stiffness, self.damping, self.torsion, self.torsion_damping, *self.at
+        return (
+            self.stiffness,
+            self.damping,
+            self.torsion,
+            self.torsion_damping,
+            *self.at,
+        )
 
 
 def pull_on(scene: Any, body: Any, time: float) -> np.ndarray:
     """Return the load `[3]` [N, N, N m] on a body of a scene at rest: applied force, weight, and pull of springs."""
-    pull = np.array([*body.gravity, 0.0]) * body.mass + (0.0 if scene.force is None else scene.force(time))
+    pull = np.array([*body.gravity, 0.0]) * body.mass + (
+        0.0 if scene.force is None else scene.force(time)
+    )
     for spring in scene.springs:
         pull = pull + spring.pull(time, [*body.position, body.angle])
     return pull

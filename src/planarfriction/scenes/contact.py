@@ -22,14 +22,19 @@ MOST_CONTACTS = 1_000_000
 
 def between(signal: Signal) -> str:
     """Return the lowest and the highest value of a scalar signal in words; one number where it is constant."""
-    low, high = float(signal.values.min()), float(signal.values.max())
+    low = float(signal.values.min())
+    high = float(signal.values.max())
     return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
 
 
 def checked_model(name: str, value: Any) -> Any:
     """Return `value` if it is a friction model, or one that looks like it."""
-    if isinstance(value, type) or not (hasattr(value, "patch") and hasattr(value, "law")):
-        raise InvalidValueError(name, f"be a friction model ({MODELS.classes()})", value)
+    if isinstance(value, type) or not (
+        hasattr(value, "patch") and hasattr(value, "law")
+    ):
+        raise InvalidValueError(
+            name, f"be a friction model ({MODELS.classes()})", value
+        )
     return value
 
 
@@ -87,37 +92,67 @@ class Contact(ByValue):
         load = as_signal(f"normal_force {of_contact}", self.normal_force, None)
         load.check_non_negative(f"normal_force {of_contact}")
         self._set(normal_force=load)
-        validation.choice(f"mounted_on {of_contact}", self.mounted_on, ("world", "body"))
-        position, angle = floats(f"position {of_contact}", self.position, 2), f"angle {of_contact}"
-        count = validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS)
-        self._set(position=position, angle=validation.number(angle, self.angle), count=count)
+        validation.choice(
+            f"mounted_on {of_contact}", self.mounted_on, ("world", "body")
+        )
+        position = floats(f"position {of_contact}", self.position, 2)
+        angle = f"angle {of_contact}"
+        count = validation.count(
+            f"count {of_contact}", self.count, at_most=MOST_CONTACTS
+        )
+        self._set(
+            position=position, angle=validation.number(angle, self.angle), count=count
+        )
         if self.support_velocity is not None:
-            self._set(support_velocity=as_signal(f"support_velocity {of_contact}", self.support_velocity, 3))
+            self._set(
+                support_velocity=as_signal(
+                    f"support_velocity {of_contact}", self.support_velocity, 3
+                )
+            )
         validation.choice(f"pressure {of_contact}", self.pressure, ("fixed", "follows"))
         self._set(height=validation.non_negative(f"height {of_contact}", self.height))
         if self.pressure == "follows":
             rule = "'fixed' on the world: only a patch of the body follows its load"
             self._check_cells(of_contact, "pressure", "body", rule)
         elif self.height > 0.0:
-            raise InvalidValueError(f"height {of_contact}", "be 0 where the pressure is 'fixed'", self.height)
+            raise InvalidValueError(
+                f"height {of_contact}",
+                "be 0 where the pressure is 'fixed'",
+                self.height,
+            )
         if validation.instance(f"edge {of_contact}", self.edge, bool, "True or False"):
-            self._check_cells(of_contact, "edge", "world", "False on the body: only a pad of the world leaves the body")
+            self._check_cells(
+                of_contact,
+                "edge",
+                "world",
+                "False on the body: only a pad of the world leaves the body",
+            )
 
-    def _check_cells(self, of_contact: str, name: str, mount: str, otherwise: str) -> None:
+    def _check_cells(
+        self, of_contact: str, name: str, mount: str, otherwise: str
+    ) -> None:
         """Check that the contact is fixed to its mount, and that its model has bristles on cells."""
         from planarfriction.models import DistributedModel
 
         if self.mounted_on != mount:
-            raise InvalidValueError(f"{name} {of_contact}", f"be {otherwise}", getattr(self, name))
+            raise InvalidValueError(
+                f"{name} {of_contact}", f"be {otherwise}", getattr(self, name)
+            )
         if not isinstance(getattr(self.model, "reduction", None), DistributedModel):
-            where = "the pressure follows" if name == "pressure" else "the body has an edge"
-            rule = f"have bristles on cells where {where} (DistributedModel, ReducedModel)"
+            where = (
+                "the pressure follows" if name == "pressure" else "the body has an edge"
+            )
+            rule = (
+                f"have bristles on cells where {where} (DistributedModel, ReducedModel)"
+            )
             raise InvalidValueError(f"model {of_contact}", rule, self.model)
 
     @property
     def centre_of_mass(self) -> tuple[float, float]:
         """Place of the body's centre of mass in the frame of a contact fixed to the body [m]."""
-        (x, y), cos, sin = self.position, math.cos(self.angle), math.sin(self.angle)
+        (x, y) = self.position
+        cos = math.cos(self.angle)
+        sin = math.sin(self.angle)
         return -cos * x - sin * y, sin * x - cos * y
 
     def __repr__(self) -> str:
@@ -129,10 +164,19 @@ class Contact(ByValue):
 
 def with_friction(contact: Contact, factor: float) -> Contact:
     """Return the contact with `factor` times the friction coefficients mu_c and mu_s that its law has."""
-    law, model = contact.model.law, contact.model
-    scaled = {name: factor * getattr(law, name) for name in ("mu_c", "mu_s") if hasattr(law, name)}
+    law = contact.model.law
+    model = contact.model
+    scaled = {
+        name: factor * getattr(law, name)
+        for name in ("mu_c", "mu_s")
+        if hasattr(law, name)
+    }
     if factor == 1.0 or not scaled:
         return contact
     law = dataclasses.replace(law, **scaled)
-    changed = model.with_law(law) if hasattr(model, "with_law") else dataclasses.replace(model, law=law)
+    changed = (
+        model.with_law(law)
+        if hasattr(model, "with_law")
+        else dataclasses.replace(model, law=law)
+    )
     return dataclasses.replace(contact, model=changed)

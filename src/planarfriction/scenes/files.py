@@ -33,10 +33,21 @@ _MOST_NAMES = 100
 """Names of a dotted key that are read: the time of the reader grows with their square."""
 
 # names are taken whole, from their beginning: of a long one each letter would be tried as the first and the last
-_LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_MOST_NAMES}}}""")
+_LONG_KEY = re.compile(
+    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_MOST_NAMES}}}"""
+)
 
 _OPTIONS = ("save_every", "stop_speed", "rtol", "atol", "name", "start")
-BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
+BODY_KEYS = (
+    "mass",
+    "inertia",
+    "position",
+    "angle",
+    "velocity",
+    "gravity",
+    "outline",
+    "size",
+)
 CONTACT_KEYS = (
     *("name", "mounted_on", "position", "angle", "count", "pressure", "height", "edge"),
     *("normal_force", "support_velocity", "model", "patch", "law"),
@@ -46,13 +57,18 @@ SPRING_KEYS = ("stiffness", "damping", "at", "torsion", "torsion_damping", "anch
 
 def rectangle_outline(size: Sequence[float]) -> np.ndarray:
     """Return the corners `[4, 2]` [m] of a rectangle of `size` (width, height) about the origin."""
-    half = [0.5 * validation.positive("size", side) for side in validation.vector("size", size, 2)]
+    half = [
+        0.5 * validation.positive("size", side)
+        for side in validation.vector("size", size, 2)
+    ]
     return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half
 
 
 def rectangle_inertia(mass: float, size: Sequence[float]) -> float:
     """Return the moment of inertia of a uniform rectangle about its centre, `m (w^2 + h^2) / 12` [kg m^2]."""
-    width, height = (validation.positive("size", side) for side in validation.vector("size", size, 2))
+    width, height = (
+        validation.positive("size", side) for side in validation.vector("size", size, 2)
+    )
     return validation.positive("mass", mass) / 12.0 * (width**2 + height**2)
 
 
@@ -61,7 +77,9 @@ def part_to_dict(part: Any) -> dict[str, Any]:
     return part.to_dict() if isinstance(part, Signal) else model_to_dict(part)
 
 
-def scene_to_dict(scene: Any, of_part: Callable[[Any], dict[str, Any]] = part_to_dict) -> dict[str, Any]:
+def scene_to_dict(
+    scene: Any, of_part: Callable[[Any], dict[str, Any]] = part_to_dict
+) -> dict[str, Any]:
     """Return the scene as numbers, texts, lists and tables, without parts that it does not have.
 
     `of_part` makes the tables of signals and the entries of a contact's model.
@@ -70,27 +88,50 @@ def scene_to_dict(scene: Any, of_part: Callable[[Any], dict[str, Any]] = part_to
     def table(record: Any, *keys: str) -> dict[str, Any]:
         """Return the values of a record that are not None."""
         found = {key: getattr(record, key) for key in keys}
-        return {key: _plain(value, of_part) for key, value in found.items() if value is not None}
+        return {
+            key: _plain(value, of_part)
+            for key, value in found.items()
+            if value is not None
+        }
 
     start = ("start",) if scene.start != "rest" else ()
-    data = table(scene, "name", "t_end", "save_every", "rtol", "atol", "stop_speed", *start)
+    data = table(
+        scene, "name", "t_end", "save_every", "rtol", "atol", "stop_speed", *start
+    )
     data["body"] = table(scene.body, *BODY_KEYS[:-1])
     data |= table(scene, "force", "velocity")
-    data |= {"spring": [table(each, *SPRING_KEYS) for each in scene.springs]} if scene.springs else {}
-    data["contact"] = [{**table(each, *_keys_of(each)), **of_part(each.model)} for each in scene.contacts]
+    data |= (
+        {"spring": [table(each, *SPRING_KEYS) for each in scene.springs]}
+        if scene.springs
+        else {}
+    )
+    data["contact"] = [
+        {**table(each, *_keys_of(each)), **of_part(each.model)}
+        for each in scene.contacts
+    ]
     return data
 
 
 def _keys_of(contact: Contact) -> tuple[str, ...]:
     """Return the keys of a contact but for its model; a fixed pressure and no edge go without saying."""
     left_out = ("pressure", "height") if contact.pressure == "fixed" else ()
-    return tuple(each for each in CONTACT_KEYS[:10] if each not in (*left_out, *([] if contact.edge else ["edge"])))
+    return tuple(
+        each
+        for each in CONTACT_KEYS[:10]
+        if each not in (*left_out, *([] if contact.edge else ["edge"]))
+    )
 
 
 def _plain(value: Any, of_part: Callable[[Any], dict[str, Any]]) -> Any:
     if isinstance(value, Signal):
         return of_part(value)
-    return value.tolist() if isinstance(value, np.ndarray) else list(value) if isinstance(value, tuple) else value
+    return (
+        value.tolist()
+        if isinstance(value, np.ndarray)
+        else list(value)
+        if isinstance(value, tuple)
+        else value
+    )
 
 
 def parts_of_scene(
@@ -104,12 +145,20 @@ def parts_of_scene(
     table = Section(data, "", source, place).only(SCENE_KEYS)
     contacts = _contacts(table)
     options = {key: table.get(key) for key in _OPTIONS if key in table}
-    signals = {key: read_signal(table, key) for key in ("force", "velocity") if key in table}
+    signals = {
+        key: read_signal(table, key) for key in ("force", "velocity") if key in table
+    }
     if "spring" in table:
         options["springs"] = [_spring(each) for each in _tables(table, "spring")]
     prescribed = "velocity" in table and "body" not in table
     body = None if prescribed else _body(table.section("body"))
-    return table, {"body": body, "contacts": contacts, "t_end": table.get("t_end"), **signals, **options}
+    return table, {
+        "body": body,
+        "contacts": contacts,
+        "t_end": table.get("t_end"),
+        **signals,
+        **options,
+    }
 
 
 def _body(table: Section) -> Body:
@@ -121,7 +170,9 @@ def _body(table: Section) -> Body:
             given.setdefault("inertia", rectangle_inertia(given["mass"], size))
             given.setdefault("outline", rectangle_outline(size))
         elif "inertia" not in given:
-            table.fail("missing key 'inertia' (or size = [width, height] of a uniform rectangle)")
+            table.fail(
+                "missing key 'inertia' (or size = [width, height] of a uniform rectangle)"
+            )
         return Body(**given)
 
 
@@ -132,14 +183,23 @@ def _tables(scene: Section, name: str) -> list[Section]:
         tables = [tables]
     if not isinstance(tables, list) or not tables:
         scene.fail(f"{name} must be one or more tables [[{name}]]")
-    names = [name] if len(tables) == 1 else [f"{name}.{number}" for number in range(1, len(tables) + 1)]
-    return [Section(data, each, scene.source, scene.folder) for data, each in zip(tables, names, strict=True)]
+    names = (
+        [name]
+        if len(tables) == 1
+        else [f"{name}.{number}" for number in range(1, len(tables) + 1)]
+    )
+    return [
+        Section(data, each, scene.source, scene.folder)
+        for data, each in zip(tables, names, strict=True)
+    ]
 
 
 def _spring(table: Section) -> Spring:
     """Return the spring of a table."""
     given: dict[str, Any] = {
-        key: table.only(SPRING_KEYS).get(key) for key in SPRING_KEYS if key == "stiffness" or key in table
+        key: table.only(SPRING_KEYS).get(key)
+        for key in SPRING_KEYS
+        if key == "stiffness" or key in table
     }
     with table.located():
         if "anchor" in table:
@@ -155,7 +215,8 @@ def _contacts(scene: Section) -> list[Contact]:
         options = {key: table.get(key) for key in CONTACT_KEYS[:8] if key in table}
         if "name" not in table and len(tables) > 1:
             options["name"] = f"contact {number}"
-        load, model = read_signal(table, "normal_force"), model_from_dict(table)
+        load = read_signal(table, "normal_force")
+        model = model_from_dict(table)
         if "support_velocity" in table:
             options["support_velocity"] = read_signal(table, "support_velocity")
         with table.located():
@@ -171,11 +232,22 @@ def read_table(path: Path) -> dict[str, Any]:
         raise FileError(f"{path}: a scene file ends in .toml or .json{missing}")
     text = read_text(path, "a scene file")
     if kind == ".toml" and _LONG_KEY.search(text):
-        raise FileError(f"{path}: not valid TOML: a key of more than {_MOST_NAMES} names")
+        raise FileError(
+            f"{path}: not valid TOML: a key of more than {_MOST_NAMES} names"
+        )
     try:
-        return tomllib.loads(text) if kind == ".toml" else json.loads(text, object_pairs_hook=_table)
-    except (ValueError, RecursionError) as error:  # ValueError: also a number of more digits than Python converts
-        raise FileError(f"{path}: not valid {kind[1:].upper()}: {shown(str(error).partition(';')[0])}") from None
+        return (
+            tomllib.loads(text)
+            if kind == ".toml"
+            else json.loads(text, object_pairs_hook=_table)
+        )
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # ValueError: also a number of more digits than Python converts
+        raise FileError(
+            f"{path}: not valid {kind[1:].upper()}: {shown(str(error).partition(';')[0])}"
+        ) from None
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -193,8 +265,14 @@ def write_table(data: dict[str, Any], path: str | Path) -> None:
     path = validation.path("path", path)
     kind = path.suffix.lower()
     if kind not in (".toml", ".json"):
-        raise InvalidValueError("path of a scene file", "end in .toml or .json", str(path))
-    text = to_toml(data) if kind == ".toml" else json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        raise InvalidValueError(
+            "path of a scene file", "end in .toml or .json", str(path)
+        )
+    text = (
+        to_toml(data)
+        if kind == ".toml"
+        else json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    )
     write_text(path, text)
 
 
@@ -222,7 +300,9 @@ def _lines(table: dict[str, Any], path: tuple[str, ...]) -> list[str]:
 
 def _is_table(value: Any) -> bool:
     return isinstance(value, dict) or (
-        isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
+        isinstance(value, list)
+        and bool(value)
+        and all(isinstance(item, dict) for item in value)
     )
 
 
@@ -241,7 +321,11 @@ def _value(value: Any) -> str:
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
+        return (
+            "{"
+            + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
+            + "}"
+        )
     if isinstance(value, list):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     return repr(value)

@@ -25,7 +25,9 @@ _GIVEN = ("patch", "law")
 _MISSING = object()
 
 
-def model_to_dict(model: Any, of_patch: Callable[[Any], Any] = lambda patch: patch.to_dict()) -> dict[str, Any]:
+def model_to_dict(
+    model: Any, of_patch: Callable[[Any], Any] = lambda patch: patch.to_dict()
+) -> dict[str, Any]:
     """Return `{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables.
 
     `of_patch` makes the tables of patches.
@@ -33,14 +35,22 @@ def model_to_dict(model: Any, of_patch: Callable[[Any], Any] = lambda patch: pat
     table = _described(MODELS, model)
     if "surface" in table:
         table["surface"] = _surface_to_dict(model.surface, model.patch, of_patch)
-    return {"model": table, "patch": of_patch(model.patch), "law": _described(LAWS, model.law)}
+    return {
+        "model": table,
+        "patch": of_patch(model.patch),
+        "law": _described(LAWS, model.law),
+    }
 
 
-def _surface_to_dict(surface: Any, patch: Any, of_patch: Callable[[Any], Any]) -> dict[str, Any]:
+def _surface_to_dict(
+    surface: Any, patch: Any, of_patch: Callable[[Any], Any]
+) -> dict[str, Any]:
     table = _described(SURFACES, surface)
     if "surface" in table:
         table["surface"] = _surface_to_dict(surface.surface, surface.patch, of_patch)
-    return table if surface.patch is patch else {**table, "patch": of_patch(surface.patch)}
+    return (
+        table if surface.patch is patch else {**table, "patch": of_patch(surface.patch)}
+    )
 
 
 def model_from_dict(contact: Section) -> Any:
@@ -66,7 +76,9 @@ def patch_from_dict(table: Section) -> Any:
     Every shape takes `metric` and `asymmetry` as `ContactPatch.with_friction_metric` does; `metric` may also be a table
     with the parameters of `friction_metric`: `along`, `across` and `angle` [rad], 0 if left out.
     """
-    directions = {key: table.get(key) for key in ("metric", "asymmetry") if key in table}
+    directions = {
+        key: table.get(key) for key in ("metric", "asymmetry") if key in table
+    }
     rest = {key: value for key, value in table.data.items() if key not in directions}
     patch = _shape_from_dict(Section(rest, table.where, table.source, table.folder))
     if not directions:
@@ -76,9 +88,13 @@ def patch_from_dict(table: Section) -> Any:
 
         metric = table.section("metric").only(["angle", "along", "across"])
         with metric.located():
-            directions["metric"] = friction_metric(metric.get("angle", 0.0), metric.get("along"), metric.get("across"))
+            directions["metric"] = friction_metric(
+                metric.get("angle", 0.0), metric.get("along"), metric.get("across")
+            )
     with table.located():
-        return patch.with_friction_metric(directions.get("metric"), directions.get("asymmetry"))
+        return patch.with_friction_metric(
+            directions.get("metric"), directions.get("asymmetry")
+        )
 
 
 def _shape_from_dict(table: Section) -> Any:
@@ -101,7 +117,9 @@ def pressure_from_dict(patch: Section) -> Any:
     value = patch.get("pressure")
     if isinstance(value, list):
         return value
-    table = patch.section("pressure", {"law": value} if isinstance(value, str) else value)
+    table = patch.section(
+        "pressure", {"law": value} if isinstance(value, str) else value
+    )
     with table.located():
         return Pressure.from_dict(table.data)
 
@@ -120,10 +138,15 @@ def _described(family: Family, member: Any) -> dict[str, Any]:
     """Return the kind and parameters of a member; a limit surface stays as it is."""
     kind = family.name_of(member)
     if kind is None:
-        rule = f"be one of {', '.join(family)}, or be registered, to be written to a file"
+        rule = (
+            f"be one of {', '.join(family)}, or be registered, to be written to a file"
+        )
         raise InvalidValueError(family.what, rule, type(member).__name__)
     values = {name: _plain(member, name) for name in _parameters(family[kind])}
-    return {"kind": kind, **{name: value for name, value in values.items() if value is not None}}
+    return {
+        "kind": kind,
+        **{name: value for name, value in values.items() if value is not None},
+    }
 
 
 def _plain(member: Any, name: str) -> Any:
@@ -132,20 +155,30 @@ def _plain(member: Any, name: str) -> Any:
         return dataclasses.asdict(value)
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    if name == "surface" or value is None or isinstance(value, bool | int | float | str | list | tuple | dict):
+    if (
+        name == "surface"
+        or value is None
+        or isinstance(value, bool | int | float | str | list | tuple | dict)
+    ):
         return value
     rule = f"be an attribute of {type(member).__name__} and plain data to be written to a file"
-    raise InvalidValueError(name, rule, "no attribute" if value is _MISSING else type(value).__name__)
+    raise InvalidValueError(
+        name, rule, "no attribute" if value is _MISSING else type(value).__name__
+    )
 
 
-def _member(family: Family, parent: Section, key: str, default: Any = None) -> tuple[Section, Callable[..., Any]]:
+def _member(
+    family: Family, parent: Section, key: str, default: Any = None
+) -> tuple[Section, Callable[..., Any]]:
     """Return the table of a member under `key`, where its name alone will do too, and what makes it."""
     value = parent.get(key) if default is None else parent.get(key, default)
     table = parent.section(key, {"kind": value} if isinstance(value, str) else value)
     return table, family[table.choice("kind", family)]
 
 
-def _made(table: Section, make: Callable[..., Any], given: tuple[Any, ...], *others: str) -> Any:
+def _made(
+    table: Section, make: Callable[..., Any], given: tuple[Any, ...], *others: str
+) -> Any:
     """Return the member of a table, with the keys `others` beside its own; `given` begins with its patch."""
     options = _arguments(table, make, "kind", *others)
     if "surface" in options:
@@ -160,11 +193,18 @@ def _surface_from_dict(parent: Section, patch: Any) -> Any:
     return _made(table, make, (patch,), "patch")
 
 
-def _arguments(table: Section, make: Callable[..., Any], *others: str) -> dict[str, Any]:
+def _arguments(
+    table: Section, make: Callable[..., Any], *others: str
+) -> dict[str, Any]:
     """Return the values of a table for the parameters of `make`, checked to be neither unknown nor missing."""
-    parameters, replaced = _parameters(make), getattr(make, "REPLACED", ())  # the member itself refuses the latter
+    parameters = _parameters(make)
+    replaced = getattr(make, "REPLACED", ())  # the member itself refuses the latter
     table.only([*others, *parameters, *replaced])
     for name, parameter in parameters.items():
         if parameter.default is parameter.empty:
             table.get(name)
-    return {name: value for name, value in table.data.items() if name in (*parameters, *replaced)}
+    return {
+        name: value
+        for name, value in table.data.items()
+        if name in (*parameters, *replaced)
+    }

@@ -50,17 +50,23 @@ def packed_contact(
     if contact.pressure == "fixed":
         return packed
     refuse_fixed_stiffness(contact.model.law, "a pressure that follows the load")
-    return following(contact.model.compiled, packed, contact.centre_of_mass, contact.height)
+    return following(
+        contact.model.compiled, packed, contact.centre_of_mass, contact.height
+    )
 
 
-def centres_of_pressure(contact: Contact, beside: np.ndarray, load: np.ndarray) -> np.ndarray:
+def centres_of_pressure(
+    contact: Contact, beside: np.ndarray, load: np.ndarray
+) -> np.ndarray:
     """Return the centres of pressure `[M, 2]` [m] that were asked for `beside` the centre of mass `[M, 2]`, by loads.
 
     They lie within the patch; without load, in its middle.
     """
-    patch, (x, y) = contact.model.reduction.patch, np.transpose(contact.centre_of_mass + beside)
+    patch = contact.model.reduction.patch
+    (x, y) = np.transpose(contact.centre_of_mass + beside)
     moments = load[:, None] * np.stack([y, -x], axis=1)
-    found, most = np.empty((len(load), 2)), max(1, ROOM // patch.cells)
+    found = np.empty((len(load), 2))
+    most = max(1, ROOM // patch.cells)
     for first in range(0, len(load), most):
         some = slice(first, first + most)
         found[some] = patch.weights(load[some], moments[some]) @ patch.positions
@@ -76,16 +82,31 @@ class Segments:
 
     def __init__(self, scene, t_end: float, marks=()) -> None:
         own = scene.breaks(t_end)
-        self._breaks = breaks_between(np.concatenate([own[1:-1], marks]), t_end) if len(marks) else own
+        self._breaks = (
+            breaks_between(np.concatenate([own[1:-1], marks]), t_end)
+            if len(marks)
+            else own
+        )
         """Breaks of the signals and `marks` [s], [S + 1]."""
-        self._load = [contact.normal_force.pieces(self._breaks) for contact in scene.contacts]
+        self._load = [
+            contact.normal_force.pieces(self._breaks) for contact in scene.contacts
+        ]
         self._force = None if scene.force is None else scene.force.pieces(self._breaks)
-        self._velocity = None if scene.velocity is None else scene.velocity.pieces(self._breaks)
+        self._velocity = (
+            None if scene.velocity is None else scene.velocity.pieces(self._breaks)
+        )
         moves = any(contact.support_velocity is not None for contact in scene.contacts)
-        movers = [_mover(contact.support_velocity, self._breaks) for contact in scene.contacts if moves]
-        self._mover = np.stack(movers, axis=1) if moves else np.empty((0, len(scene.contacts), 9))
+        movers = [
+            _mover(contact.support_velocity, self._breaks)
+            for contact in scene.contacts
+            if moves
+        ]
+        self._mover = (
+            np.stack(movers, axis=1) if moves else np.empty((0, len(scene.contacts), 9))
+        )
         self._anchors = [spring.anchor.pieces(self._breaks) for spring in scene.springs]
-        lengths, parts = np.diff(self._breaks), np.ones(len(self._breaks) - 1)
+        lengths = np.diff(self._breaks)
+        parts = np.ones(len(self._breaks) - 1)
         for contact, (_, slope) in zip(scene.contacts, self._load, strict=True):
             if contact.model.patch.depends_on_load:
                 fine = np.ceil(lengths / SHAPE_INTERVAL - 1e-9)
@@ -149,23 +170,34 @@ class Segments:
         if not self._mover.any():
             return self._mover[:0]
         here = self._behind(pieces)
-        since, found = (self.breaks(pieces) - self._breaks[here])[:, None, None], self._mover[here]
-        by, velocity, slope = found[..., :3], found[..., 3:6], found[..., 6:]
+        since = (self.breaks(pieces) - self._breaks[here])[:, None, None]
+        found = self._mover[here]
+        by = found[..., :3]
+        velocity = found[..., 3:6]
+        slope = found[..., 6:]
         by = by + since * (velocity + 0.5 * since * slope)
         return np.concatenate([by, velocity + since * slope, slope], axis=-1)
 
     def anchors(self, pieces: np.ndarray) -> np.ndarray:
         """Return pose and velocity of the anchor of each spring as pieces begin, [S, K, 6]."""
-        each = [np.concatenate(self._linear(anchor, pieces), axis=1) for anchor in self._anchors]
+        each = [
+            np.concatenate(self._linear(anchor, pieces), axis=1)
+            for anchor in self._anchors
+        ]
         return np.stack(each, axis=1) if each else np.empty((len(pieces), 0, 6))
 
     def _behind(self, pieces: np.ndarray) -> np.ndarray:
         """Return the break of the signals that pieces lie behind."""
-        return np.minimum(np.searchsorted(self._first, pieces, side="right") - 1, len(self._step) - 1)
+        return np.minimum(
+            np.searchsorted(self._first, pieces, side="right") - 1, len(self._step) - 1
+        )
 
-    def _linear(self, signal: tuple[np.ndarray, np.ndarray], pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _linear(
+        self, signal: tuple[np.ndarray, np.ndarray], pieces: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         here = self._behind(pieces)
-        start, slope = signal[0][here], signal[1][here]
+        start = signal[0][here]
+        slope = signal[1][here]
         since = self.breaks(pieces) - self._breaks[here]
         return start + slope * (since[:, None] if slope.ndim == 2 else since), slope
 
@@ -179,27 +211,49 @@ class SegmentBatches:
     """
 
     def __init__(
-        self, scene, t_end: float, *, times=None, sensitivities=False, marks=(), most: int | None = None
+        self,
+        scene,
+        t_end: float,
+        *,
+        times=None,
+        sensitivities=False,
+        marks=(),
+        most: int | None = None,
     ) -> None:
-        self._scene, self._times, self._most = scene, times, BATCH if most is None else most
+        self._scene = scene
+        self._times = times
+        self._most = BATCH if most is None else most
         self._ahead = self._most
-        self._pieces, self._done = Segments(scene, t_end, marks), 0
+        self._pieces = Segments(scene, t_end, marks)
+        self._done = 0
         contacts = scene.contacts
         follows = [contact.model.patch.depends_on_load for contact in contacts]
-        self._between = [self._pieces.between(c) if follows[c] else None for c in range(len(contacts))]
+        self._between = [
+            self._pieces.between(c) if follows[c] else None
+            for c in range(len(contacts))
+        ]
         self.models: list[PackedModel] = []
         """The model of each contact, as packed last."""
         records, row, pieces = self._pack()
         begin = time.perf_counter()
-        calls = np.array([calls_of(model.functions, change=sensitivities) for model in self.models])
+        calls = np.array(
+            [calls_of(model.functions, change=sensitivities) for model in self.models]
+        )
         self.loading = time.perf_counter() - begin
         """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
-        mounts = [WORLD if contact.mounted_on == "world" else BODY for contact in contacts]
+        mounts = [
+            WORLD if contact.mounted_on == "world" else BODY for contact in contacts
+        ]
         self._contacts = Contacts(
             calls=calls,
             record=records,
-            mount=np.array(mounts if scene.velocity is None else [BODY_AXES] * len(mounts)),
-            place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in contacts], dtype=float),
+            mount=np.array(
+                mounts if scene.velocity is None else [BODY_AXES] * len(mounts)
+            ),
+            place=np.array(
+                [[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in contacts],
+                dtype=float,
+            ),
             count=np.array([contact.count for contact in contacts], dtype=float),
             state=_starts([model.states for model in self.models]),
             linear=_starts([model.workspace for model in self.models]),
@@ -207,20 +261,38 @@ class SegmentBatches:
             bristle=np.array([model.bristle for model in self.models]),
         )
         peaks = [max(self._pieces.largest(c), 0.0) for c in range(len(contacts))]
-        factors = [float(each.model.law.stiffness_factor(f)) for each, f in zip(contacts, peaks, strict=True)]
-        self._bends = [1.0 / factor if f > 0.0 else 1.0 for factor, f in zip(factors, peaks, strict=True)]
+        factors = [
+            float(each.model.law.stiffness_factor(f))
+            for each, f in zip(contacts, peaks, strict=True)
+        ]
+        self._bends = [
+            1.0 / factor if f > 0.0 else 1.0
+            for factor, f in zip(factors, peaks, strict=True)
+        ]
         """Deflections at the largest loads, as multiples of those that the laws name: 1 but for a fixed stiffness."""
-        self._length = min(b * each.model.law.largest_deflection for b, each in zip(self._bends, contacts, strict=True))
+        self._length = min(
+            b * each.model.law.largest_deflection
+            for b, each in zip(self._bends, contacts, strict=True)
+        )
         self._laws = [contact.model.law.numbers for contact in contacts]
-        speed = min(model.velocity_scale * law.v_s for model, law in zip(self.models, self._laws, strict=True))
+        speed = min(
+            model.velocity_scale * law.v_s
+            for model, law in zip(self.models, self._laws, strict=True)
+        )
         # a single point has no lever arm: its spin is measured in rad/s
         self._radius = max(model.radius for model in self.models) or 1.0
-        arm, body = np.array([1.0, 1.0, 1.0 / self._radius]), scene.body
-        self.state = np.concatenate([self._first(), body.velocity, body.position, [body.angle]])
+        arm = np.array([1.0, 1.0, 1.0 / self._radius])
+        body = scene.body
+        self.state = np.concatenate(
+            [self._first(), body.velocity, body.position, [body.angle]]
+        )
         """Bristles as the scene starts, body velocity, pose."""
         self.state_scale = np.concatenate(
             [
-                *(b * m.state_scale for b, m in zip(self._bends, self.models, strict=True)),
+                *(
+                    b * m.state_scale
+                    for b, m in zip(self._bends, self.models, strict=True)
+                ),
                 speed * arm,
                 self._length * arm,
             ]
@@ -241,7 +313,9 @@ class SegmentBatches:
         """Return the bristles with which the scene starts, those that the solver has."""
         if self._scene.start == "rest":
             return np.zeros(self._contacts.state[-1])
-        return self._flat([state[None] for state in first_states(self._scene, self._shaped)])[0]
+        return self._flat(
+            [state[None] for state in first_states(self._scene, self._shaped)]
+        )[0]
 
     def first_slopes(self, d_loads: np.ndarray, d_pull: np.ndarray) -> np.ndarray:
         """Return changes `[K, n]` of the bristles of an equilibrium (see `start.first_slopes`)."""
@@ -250,14 +324,27 @@ class SegmentBatches:
     @property
     def _shaped(self) -> np.ndarray:
         """Loads whose shapes the contacts have at first [N]."""
-        return np.array([self._pieces.held(c, np.zeros(1, np.int64))[0] for c in range(len(self.models))])
+        return np.array(
+            [
+                self._pieces.held(c, np.zeros(1, np.int64))[0]
+                for c in range(len(self.models))
+            ]
+        )
 
     def _flat(self, states: list[np.ndarray]) -> np.ndarray:
         """Return states `[K, *state_shape]` of the contacts as the solver has them, `[K, n]`."""
-        chosen = [each if m.cells is None else each[..., m.cells] for each, m in zip(states, self.models, strict=True)]
+        chosen = [
+            each if m.cells is None else each[..., m.cells]
+            for each, m in zip(states, self.models, strict=True)
+        ]
         flat = [each.reshape(len(each), -1) for each in chosen]
-        more = [np.zeros((len(each), m.states - each.shape[1])) for each, m in zip(flat, self.models, strict=True)]
-        return np.hstack([part for pair in zip(flat, more, strict=True) for part in pair])
+        more = [
+            np.zeros((len(each), m.states - each.shape[1]))
+            for each, m in zip(flat, self.models, strict=True)
+        ]
+        return np.hstack(
+            [part for pair in zip(flat, more, strict=True) for part in pair]
+        )
 
     def __iter__(self) -> Iterator[System]:
         while self._ready is not None or self._done < self._pieces.count:
@@ -265,7 +352,8 @@ class SegmentBatches:
 
     def _taken(self) -> System:
         """Return the next batch, which nobody but the caller holds."""
-        ready, self._ready = self._ready, None
+        ready = self._ready
+        self._ready = None
         if ready is None:
             records, row, pieces = self._pack()
             self._contacts = self._contacts._replace(record=records)
@@ -274,17 +362,32 @@ class SegmentBatches:
 
     def _pack(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pack the next pieces: addresses of records, which of them each contact has on each piece, the pieces."""
-        pieces = np.arange(self._done, min(self._done + self._ahead, self._pieces.count))
-        old = [model for model, between in zip(self.models, self._between, strict=False) if between is None]
-        rows, count, self.models, outline = [], len(pieces), [], self._scene.body.outline
+        pieces = np.arange(
+            self._done, min(self._done + self._ahead, self._pieces.count)
+        )
+        old = [
+            model
+            for model, between in zip(self.models, self._between, strict=False)
+            if between is None
+        ]
+        rows = []
+        count = len(pieces)
+        self.models = []
+        outline = self._scene.body.outline
         for c, contact in enumerate(self._scene.contacts):
             between = self._between[c]
             if between is None:
-                self.models.append(old.pop(0) if old else packed_contact(contact, [None], None, outline))
+                self.models.append(
+                    old.pop(0)
+                    if old
+                    else packed_contact(contact, [None], None, outline)
+                )
                 rows.append(np.zeros(len(pieces), np.int64))
                 continue
             held = self._pieces.held(c, pieces[:count])
-            loads, row = _in_order(np.where(held > 0.0, held, between[0]))  # any, where there is no load
+            loads, row = _in_order(
+                np.where(held > 0.0, held, between[0])
+            )  # any, where there is no load
             between = between if self._most < MOST_PIECES else None
             self.models.append(packed_contact(contact, loads, between, outline))
             rows.append(row)
@@ -292,21 +395,34 @@ class SegmentBatches:
             count = count if packed == len(loads) else int(np.argmax(row == packed))
         first = _starts([len(model.records) for model in self.models])
         self._done += count
-        self._ahead = min(self._most, 2 * count)  # one contact does not pack much more than another has room for
+        self._ahead = min(
+            self._most, 2 * count
+        )  # one contact does not pack much more than another has room for
         addresses = [places_of(model.records) for model in self.models]
         row = np.stack([row[:count] for row in rows], axis=1) + first[:-1]
         return np.concatenate(addresses), row, pieces[:count]
 
     def _system(self, row: np.ndarray, pieces: np.ndarray) -> System:
-        scene, inputs, models = self._scene, self._pieces, self.models
+        scene = self._scene
+        inputs = self._pieces
+        models = self.models
         breaks = inputs.breaks(np.append(pieces, pieces[-1] + 1))
-        load = np.array([inputs.load(c, pieces) for c in range(len(models))]).transpose(2, 1, 0).copy()
-        driven, body = inputs.velocity(pieces), scene.body
+        load = (
+            np.array([inputs.load(c, pieces) for c in range(len(models))])
+            .transpose(2, 1, 0)
+            .copy()
+        )
+        driven = inputs.velocity(pieces)
+        body = scene.body
         if driven is None:
             driven = np.empty((0, 3)), np.full((len(pieces), 3), [*body.gravity, 0.0])
         free = scene.velocity is None
         motion = Motion(
-            inverse_mass=np.array([1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia]) if free else np.zeros(3),
+            inverse_mass=np.array(
+                [1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia]
+            )
+            if free
+            else np.zeros(3),
             body_axes=not free,
             breaks=breaks,
             load=load,
@@ -315,18 +431,27 @@ class SegmentBatches:
             acceleration=driven[1],
             row=row,
             mover=inputs.mover(pieces),
-            spring=np.array([spring.numbers for spring in scene.springs]).reshape(-1, 6),
+            spring=np.array([spring.numbers for spring in scene.springs]).reshape(
+                -1, 6
+            ),
             anchor=inputs.anchors(pieces),
             stop_speed=float(scene.stop_speed or 0.0),
             stop_radius=self._radius,
-            stop_time=max(b * law.sigma_1 / law.sigma_0 for b, law in zip(self._bends, self._laws, strict=True)),
+            stop_time=max(
+                b * law.sigma_1 / law.sigma_0
+                for b, law in zip(self._bends, self._laws, strict=True)
+            ),
             stop_length=self._length,
             settled=inputs.settled,
         )
         if self._times is not None:
             _meet(self._times, breaks)
-        kept = tuple(array for model in models for array in (model.records, *model.keepalive))
-        pressures = sum(STATES for contact in scene.contacts if contact.pressure == "follows")
+        kept = tuple(
+            array for model in models for array in (model.records, *model.keepalive)
+        )
+        pressures = sum(
+            STATES for contact in scene.contacts if contact.pressure == "follows"
+        )
         return System(self._contacts, motion, kept, pressures)
 
 
@@ -341,9 +466,13 @@ def _in_order(loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _meet(times: np.ndarray, breaks: np.ndarray) -> None:
     """Put ascending times that equal a break up to rounding onto it."""
-    first, last = np.searchsorted(times, [breaks[0] - SAME_TIME, breaks[-1] + SAME_TIME])
+    first, last = np.searchsorted(
+        times, [breaks[0] - SAME_TIME, breaks[-1] + SAME_TIME]
+    )
     some = times[first : last + 1]
-    near = breaks[np.minimum(np.searchsorted(breaks, some - SAME_TIME), len(breaks) - 1)]
+    near = breaks[
+        np.minimum(np.searchsorted(breaks, some - SAME_TIME), len(breaks) - 1)
+    ]
     some[:] = np.where(np.abs(near - some) <= SAME_TIME, near, some)
 
 
@@ -355,4 +484,6 @@ def _mover(velocity: Signal | None, breaks: np.ndarray) -> np.ndarray:
     """Return displacement, velocity and acceleration of a support at the start of each piece, [S, 9]."""
     if velocity is None:
         return np.zeros((len(breaks) - 1, 9))
-    return np.concatenate([displacement(velocity, breaks[:-1]), *velocity.pieces(breaks)], axis=1)
+    return np.concatenate(
+        [displacement(velocity, breaks[:-1]), *velocity.pieces(breaks)], axis=1
+    )

@@ -36,7 +36,9 @@ FINE: dict[str, Any] = {"rtol": 1e-6, "atol": 3e-6}
 """Tolerances of scenes that look at small things: wrenches to 1e-5 of the load, motions of nanometres."""
 
 
-def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: float = 2.0) -> Signal:
+def in_hand_load(
+    load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: float = 2.0
+) -> Signal:
     """Return the normal force of one finger in the published in-hand runs [N], held over every 0.01 s.
 
     Load 1 is a sine at 2 Hz, load 2 is constant with one drop. `placement` 1 is the centre of mass at (0.002, 0) m, 2
@@ -53,7 +55,9 @@ def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: fl
         offset, amplitude = IN_HAND_LOADS[load, placement]
         return Signal.sine(offset, amplitude, 2.0, t_end=t_end, dt=SAMPLE_TIME)
     force, dropped, first, after = IN_HAND_DROPS[load, placement]
-    return Signal.sampled([0.0, first * SAMPLE_TIME, after * SAMPLE_TIME], [force, dropped, force])
+    return Signal.sampled(
+        [0.0, first * SAMPLE_TIME, after * SAMPLE_TIME], [force, dropped, force]
+    )
 
 
 def in_hand(
@@ -78,10 +82,18 @@ def in_hand(
 
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
-    inertia, centre = rectangle_inertia(mass, size), validation.vector("centre_of_mass", centre_of_mass, 2)
-    body = Body(mass, inertia, centre, gravity=(0.0, -GRAVITY), outline=rectangle_outline(size))
+    inertia = rectangle_inertia(mass, size)
+    centre = validation.vector("centre_of_mass", centre_of_mass, 2)
+    body = Body(
+        mass, inertia, centre, gravity=(0.0, -GRAVITY), outline=rectangle_outline(size)
+    )
     load = in_hand_load(1, t_end=t_end) if normal_force is None else normal_force
-    return Scene(body, [Contact(model, load, count=fingers, name="fingers", edge=edge)], t_end, name="in-hand")
+    return Scene(
+        body,
+        [Contact(model, load, count=fingers, name="fingers", edge=edge)],
+        t_end,
+        name="in-hand",
+    )
 
 
 def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) -> Signal:
@@ -91,14 +103,22 @@ def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) ->
     force = np.zeros((len(t), 3))
     if load == "tangential":
         force[:, 0] = np.where(t > 1.0, 1.0 + 0.4 * wave, np.minimum(t / 0.2, 1.0))
-        force[:, 2] = np.where(t > 3.0, 0.03 + 0.01 * wave, 0.03 * np.clip((t - 2.8) / 0.2, 0.0, 1.0))
+        force[:, 2] = np.where(
+            t > 3.0, 0.03 + 0.01 * wave, 0.03 * np.clip((t - 2.8) / 0.2, 0.0, 1.0)
+        )
     else:
         ramp = np.minimum(t / 0.2, 1.0)
-        force[:, 0], force[:, 2] = ramp, 0.03 * ramp
+        force[:, 0] = ramp
+        force[:, 2] = 0.03 * ramp
     return Signal.sampled(t, force)
 
 
-def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t_end: float = 5.0) -> Scene:
+def drift(
+    model: Any,
+    *,
+    load: Literal["tangential", "normal"] = "tangential",
+    t_end: float = 5.0,
+) -> Scene:
     """Make the scene of a disc on a table, 1 kg, radius 0.05 m, pushed with less than friction can hold: does it creep?
 
     `load="tangential"`: the force oscillates, and from 2.8 s a torque does too; `load="normal"`: force and torque are
@@ -112,12 +132,23 @@ def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t
     normal_force: Any = GRAVITY
     if load == "normal":
         t = sample_times(t_end, SAMPLE_TIME)
-        normal_force = Signal.sampled(t, GRAVITY + np.where(t > 1.0, np.sin(6.0 * np.pi * t), 0.0))
+        normal_force = Signal.sampled(
+            t, GRAVITY + np.where(t > 1.0, np.sin(6.0 * np.pi * t), 0.0)
+        )
     around = 2.0 * np.pi * np.arange(64) / 64
     outline = 0.05 * np.stack([np.cos(around), np.sin(around)], axis=1)
-    body = Body(1.0, 1.25e-3, gravity=(0.0, 0.0), outline=outline)  # inertia of a disc, m R^2 / 2
+    body = Body(
+        1.0, 1.25e-3, gravity=(0.0, 0.0), outline=outline
+    )  # inertia of a disc, m R^2 / 2
     contact = Contact(model, normal_force, name="table")
-    return Scene(body, [contact], t_end, force=drift_force(load, t_end=t_end), **FINE, name=f"drift, {load}")
+    return Scene(
+        body,
+        [contact],
+        t_end,
+        force=drift_force(load, t_end=t_end),
+        **FINE,
+        name=f"drift, {load}",
+    )
 
 
 def free_slide(
@@ -143,13 +174,23 @@ def free_slide(
     Raises InvalidValueError for a parameter that breaks its rule.
     """
     if inertia is None:
-        mass, patch = validation.positive("mass", mass), checked_model("model", model).patch
+        mass = validation.positive("mass", mass)
+        patch = checked_model("model", model).patch
         inertia = mass * float(patch.second_moment(GRAVITY * mass))
     velocity = validation.vector("twist", twist, 3)
-    body = Body(mass, inertia, position, angle, velocity, gravity=(0.0, 0.0), outline=outline)
+    body = Body(
+        mass, inertia, position, angle, velocity, gravity=(0.0, 0.0), outline=outline
+    )
     load: Any = GRAVITY * body.mass if normal_force is None else normal_force
     contact = Contact(model, load, mounted_on="body", name="table")
-    return Scene(body, [contact], t_end, stop_speed=STOP_SPEED, save_every=save_every, name="free slide")
+    return Scene(
+        body,
+        [contact],
+        t_end,
+        stop_speed=STOP_SPEED,
+        save_every=save_every,
+        name="free slide",
+    )
 
 
 def published_velocity(*, speed: float = 0.015, spin: float = 1.0) -> Signal:
@@ -162,7 +203,8 @@ def published_velocity(*, speed: float = 0.015, spin: float = 1.0) -> Signal:
 
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
-    speed, spin = validation.number("speed", speed), validation.number("spin", spin)
+    speed = validation.number("speed", speed)
+    spin = validation.number("spin", spin)
     t = sample_times(5.0, SAMPLE_TIME)
     vx = speed * np.interp(t, [0.8, 1.4, 1.6, 2.2], [0.0, 1.0, 1.0, 0.0])
     vy = 0.4 * speed * np.interp(t, [2.4, 2.7, 4.3, 4.6], [0.0, 1.0, 1.0, 0.0])
@@ -189,9 +231,13 @@ def driven(
     validation.choice("at", at, ("origin", "centre_of_pressure"))
     contact = Contact(model, normal_force, mounted_on="body", name="patch")
     if at == "centre_of_pressure":
-        centre = np.asarray(model.patch.centre_of_pressure(float(contact.normal_force(0.0))))
+        centre = np.asarray(
+            model.patch.centre_of_pressure(float(contact.normal_force(0.0)))
+        )
         contact = dataclasses.replace(contact, position=-centre)
-    body = Body(1.0, 1.0, gravity=(0.0, 0.0))  # moved as prescribed: mass and inertia play no part
+    body = Body(
+        1.0, 1.0, gravity=(0.0, 0.0)
+    )  # moved as prescribed: mass and inertia play no part
     velocity = published_velocity() if twist is None else as_signal("twist", twist, 3)
     return Scene(body, [contact], t_end, velocity=velocity, **FINE, name="driven")
 
@@ -223,13 +269,29 @@ def pushed(
     t_end = validation.positive("t_end", t_end)
     if velocity is None:
         times = t_end * np.array([0.0, 0.1, 0.9, 1.0])
-        velocity = Signal.sampled(times, [[0.0] * 3, [0.05, 0.0, 0.0], [0.05, 0.0, 0.0], [0.0] * 3], "linear")
-    body = Body(mass, rectangle_inertia(mass, size), gravity=(0.0, 0.0), outline=rectangle_outline(size))
+        velocity = Signal.sampled(
+            times, [[0.0] * 3, [0.05, 0.0, 0.0], [0.05, 0.0, 0.0], [0.0] * 3], "linear"
+        )
+    body = Body(
+        mass,
+        rectangle_inertia(mass, size),
+        gravity=(0.0, 0.0),
+        outline=rectangle_outline(size),
+    )
     weight: Any = GRAVITY * body.mass
     table = Contact(model, weight, mounted_on="body", name="table")
     pad = model if pad is None else pad
-    moved: dict[str, Any] = {"position": position, "count": fingers, "support_velocity": velocity}
-    return Scene(body, [table, Contact(pad, normal_force, name="fingers", **moved)], t_end, name="pushed")
+    moved: dict[str, Any] = {
+        "position": position,
+        "count": fingers,
+        "support_velocity": velocity,
+    }
+    return Scene(
+        body,
+        [table, Contact(pad, normal_force, name="fingers", **moved)],
+        t_end,
+        name="pushed",
+    )
 
 
 GRIP = ([0.0, 0.2, 0.24, 0.36, 0.4], [4.0, 4.0, 1.0, 1.0, 6.0])
@@ -270,10 +332,21 @@ def pivot(
     Raises InvalidValueError for a parameter that breaks its rule.
     """
     arm = validation.positive("arm", arm)
-    inertia, outline = rectangle_inertia(mass, size), rectangle_outline(size)
+    inertia = rectangle_inertia(mass, size)
+    outline = rectangle_outline(size)
     body = Body(mass, inertia, (arm, 0.0), gravity=(0.0, -GRAVITY), outline=outline)
-    load = Signal.sampled(*GRIP, hold="linear").held(SAMPLE_TIME) if normal_force is None else normal_force
-    return Scene(body, [Contact(model, load, count=fingers, name="fingers")], t_end, start=start, name="pivot")
+    load = (
+        Signal.sampled(*GRIP, hold="linear").held(SAMPLE_TIME)
+        if normal_force is None
+        else normal_force
+    )
+    return Scene(
+        body,
+        [Contact(model, load, count=fingers, name="fingers")],
+        t_end,
+        start=start,
+        name="pivot",
+    )
 
 
 def foot(
@@ -297,19 +370,33 @@ def foot(
     Raises InvalidValueError for a parameter that breaks its rule.
     """
     half = 0.5 * validation.positive("length", length)
-    ahead = Signal.sampled(*SWAY, hold="linear") if share is None else as_signal("share", share, None)
+    ahead = (
+        Signal.sampled(*SWAY, hold="linear")
+        if share is None
+        else as_signal("share", share, None)
+    )
     if ahead.values.min() < 0.0 or ahead.values.max() > 1.0:
-        raise InvalidValueError("share", "be in [0, 1]", f"{ahead.values.min():g} to {ahead.values.max():g}")
-    turning = Signal.sampled(*TURNS) if torque is None else as_signal("torque", torque, None)
-    wrench = Signal.sampled(turning.times, turning.values[:, None] * [0.0, 0.0, 1.0], turning.hold)
-    body = Body(mass, inertia, gravity=(0.0, 0.0), outline=_around(half, 0.5 * SOLE_WIDTH))
+        raise InvalidValueError(
+            "share", "be in [0, 1]", f"{ahead.values.min():g} to {ahead.values.max():g}"
+        )
+    turning = (
+        Signal.sampled(*TURNS) if torque is None else as_signal("torque", torque, None)
+    )
+    wrench = Signal.sampled(
+        turning.times, turning.values[:, None] * [0.0, 0.0, 1.0], turning.hold
+    )
+    body = Body(
+        mass, inertia, gravity=(0.0, 0.0), outline=_around(half, 0.5 * SOLE_WIDTH)
+    )
     contacts = []
     for name, patch, part, x in (
         ("heel", model, 1.0 - ahead.values, -half),
         ("forefoot", model if forefoot is None else forefoot, ahead.values, half),
     ):
         load = Signal(ahead.times, GRAVITY * body.mass * part, ahead.hold)
-        contacts.append(Contact(patch, load, mounted_on="body", position=(x, 0.0), name=name))
+        contacts.append(
+            Contact(patch, load, mounted_on="body", position=(x, 0.0), name=name)
+        )
     return Scene(body, contacts, t_end, force=wrench, name="foot")
 
 
@@ -335,14 +422,31 @@ def curling(
     if inertia is None:
         inertia = 0.5 * validation.positive("mass", mass) * STONE_RADIUS**2
     velocity = validation.vector("twist", twist, 3)
-    body = Body(mass, inertia, velocity=velocity, gravity=(0.0, 0.0), outline=_around(0.0, STONE_RADIUS))
+    body = Body(
+        mass,
+        inertia,
+        velocity=velocity,
+        gravity=(0.0, 0.0),
+        outline=_around(0.0, STONE_RADIUS),
+    )
     weight: Any = GRAVITY * body.mass
     ice = Contact(model, weight, mounted_on="body", name="ice")
-    return Scene(body, [ice], t_end, None, None, STOP_SPEED, save_every, start=start, name="curling")
+    return Scene(
+        body,
+        [ice],
+        t_end,
+        None,
+        None,
+        STOP_SPEED,
+        save_every,
+        start=start,
+        name="curling",
+    )
 
 
 def _around(half: float, radius: float) -> np.ndarray:
     """Return the outline `[M, 2]` [m] at the distance `radius` from the line between (-half, 0) and (half, 0)."""
     angle = 2.0 * np.pi * (np.arange(64) + 0.5) / 64
-    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    x = radius * np.cos(angle)
+    y = radius * np.sin(angle)
     return np.stack([x + np.copysign(half, x), y], axis=1)

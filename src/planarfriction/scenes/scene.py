@@ -18,7 +18,14 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
 from planarfriction.scenes.body import Body, Spring
 from planarfriction.scenes.contact import Contact
-from planarfriction.scenes.signal import MOST_SAMPLES, SAME_TIME, Signal, as_signal, breaks_between, sample_count
+from planarfriction.scenes.signal import (
+    MOST_SAMPLES,
+    SAME_TIME,
+    Signal,
+    as_signal,
+    breaks_between,
+    sample_count,
+)
 
 STARTS = ("rest", "equilibrium", "sliding")
 """Ways in which bristles may start."""
@@ -31,7 +38,9 @@ RTOL, ATOL = 1e-5, 2e-4
 def _listed(name: str, value: Any, kind: type) -> tuple[Any, ...]:
     """Return one part of a kind or a list of them as a tuple, or raise."""
     parts = (value,) if isinstance(value, kind) else value
-    if not isinstance(parts, (list, tuple)) or not all(isinstance(part, kind) for part in parts):
+    if not isinstance(parts, (list, tuple)) or not all(
+        isinstance(part, kind) for part in parts
+    ):
         raise InvalidValueError(name, f"be a list of {kind.__name__}", value)
     return tuple(parts)
 
@@ -44,7 +53,9 @@ def _contacts(name: str, value: Any) -> tuple[Contact, ...]:
     names = [contact.name for contact in contacts]
     for each in names:
         if names.count(each) > 1:
-            raise InvalidValueError(name, "have different names", f"{each!r} {names.count(each)} times")
+            raise InvalidValueError(
+                name, "have different names", f"{each!r} {names.count(each)} times"
+            )
     return contacts
 
 
@@ -61,9 +72,13 @@ class Scene(ByValue):
     """The contacts it slides on, at least one."""
     t_end: float = checked(validation.positive)
     """Duration [s]."""
-    force: Kept[Signal | ArrayLike | None, Signal | None] = checked(as_signal, 3, default=None)
+    force: Kept[Signal | ArrayLike | None, Signal | None] = checked(
+        as_signal, 3, default=None
+    )
     """Applied wrench `(fx, fy, tau)` at the centre of mass, world axes, `[T, 3]` [N, N, N m], or None."""
-    velocity: Kept[Signal | ArrayLike | None, Signal | None] = checked(as_signal, 3, default=None)
+    velocity: Kept[Signal | ArrayLike | None, Signal | None] = checked(
+        as_signal, 3, default=None
+    )
     """Prescribed twist `(vx, vy, omega)` in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
 
     It is the velocity of the origin of the body's axes. Mass, inertia, gravity and initial velocity then have no
@@ -83,7 +98,9 @@ class Scene(ByValue):
     """State of the bristles at the start: "rest", relaxed; "equilibrium", carrying the load of a body at rest (with the
     least elastic energy, which determines how contacts share it); "sliding", in the steady state of the initial
     velocity."""
-    springs: Kept[Spring | Sequence[Spring], Sequence[Spring]] = checked(_listed, Spring, default=())
+    springs: Kept[Spring | Sequence[Spring], Sequence[Spring]] = checked(
+        _listed, Spring, default=()
+    )
     """Springs that tie the body to anchors; one, several or none."""
 
     def __post_init__(self) -> None:
@@ -92,10 +109,18 @@ class Scene(ByValue):
         super().__post_init__()
         if self.velocity is not None:
             if self.springs:
-                raise InvalidValueError("springs", "be none if the velocity is prescribed", f"{len(self.springs)}")
+                raise InvalidValueError(
+                    "springs",
+                    "be none if the velocity is prescribed",
+                    f"{len(self.springs)}",
+                )
             for name in ("force", "stop_speed"):
                 if getattr(self, name) is not None:
-                    raise InvalidValueError(name, "be None if the velocity is prescribed", getattr(self, name))
+                    raise InvalidValueError(
+                        name,
+                        "be None if the velocity is prescribed",
+                        getattr(self, name),
+                    )
             for contact in self.contacts:
                 if contact.support_velocity is not None:
                     name = f"support_velocity of contact {contact.name!r}"
@@ -104,8 +129,12 @@ class Scene(ByValue):
         for contact in self.contacts:
             if contact.pressure == "follows" and len(self.contacts) > 1:
                 rule = "be 'fixed' beside other contacts, which share the load in a way that statics leaves open"
-                raise InvalidValueError(f"pressure of contact {contact.name!r}", rule, contact.pressure)
-            if contact.edge and (self.body.outline is None or self.velocity is not None):
+                raise InvalidValueError(
+                    f"pressure of contact {contact.name!r}", rule, contact.pressure
+                )
+            if contact.edge and (
+                self.body.outline is None or self.velocity is not None
+            ):
                 rule = "be False unless the body moves freely and has an outline"
                 raise InvalidValueError(f"edge of contact {contact.name!r}", rule, True)
         sample_count(self.t_end, self.save_every, "save_every")
@@ -114,29 +143,61 @@ class Scene(ByValue):
 
     def _check_start(self) -> None:
         validation.choice("start", self.start, STARTS)
-        driven = {"the body": self.body.velocity if self.velocity is None else self.velocity(0.0).tolist()}
+        driven = {
+            "the body": self.body.velocity
+            if self.velocity is None
+            else self.velocity(0.0).tolist()
+        }
         for contact in self.contacts:
             if contact.support_velocity is not None:
-                driven[f"contact {contact.name!r}"] = contact.support_velocity(0.0).tolist()
+                driven[f"contact {contact.name!r}"] = contact.support_velocity(
+                    0.0
+                ).tolist()
         moves = [name for name, velocity in driven.items() if any(velocity)]
-        if self.start == "equilibrium" and any(contact.pressure == "follows" for contact in self.contacts):
-            raise InvalidValueError("start", "be 'rest' or 'sliding' if the pressure follows the load", self.start)
-        if self.start == "equilibrium" and any(contact.edge for contact in self.contacts):
-            raise InvalidValueError("start", "be 'rest' or 'sliding' if a contact has an edge", self.start)
+        if self.start == "equilibrium" and any(
+            contact.pressure == "follows" for contact in self.contacts
+        ):
+            raise InvalidValueError(
+                "start",
+                "be 'rest' or 'sliding' if the pressure follows the load",
+                self.start,
+            )
+        if self.start == "equilibrium" and any(
+            contact.edge for contact in self.contacts
+        ):
+            raise InvalidValueError(
+                "start", "be 'rest' or 'sliding' if a contact has an edge", self.start
+            )
         if self.start == "equilibrium" and self.velocity is not None:
-            raise InvalidValueError("start", "be 'rest' or 'sliding' if the velocity is prescribed", self.start)
+            raise InvalidValueError(
+                "start",
+                "be 'rest' or 'sliding' if the velocity is prescribed",
+                self.start,
+            )
         if self.start == "equilibrium" and moves:
             rule = "start at zero if start is 'equilibrium'"
             what = "velocity" if moves[0] == "the body" else "support_velocity"
             raise InvalidValueError(f"{what} of {moves[0]}", rule, driven[moves[0]])
         if self.start == "sliding" and not moves:
-            raise InvalidValueError("initial velocity", "not be zero if start is 'sliding'", driven["the body"])
+            raise InvalidValueError(
+                "initial velocity",
+                "not be zero if start is 'sliding'",
+                driven["the body"],
+            )
 
     def __repr__(self) -> str:
         contacts = "; ".join(repr(contact) for contact in self.contacts[:2])
         more = f"; {len(self.contacts) - 2} more" if len(self.contacts) > 2 else ""
-        driven = ", force given" if self.force is not None else ", velocity given" if self.velocity is not None else ""
-        tied = {0: "", 1: ", on a spring"}.get(len(self.springs), f", on {len(self.springs)} springs")
+        driven = (
+            ", force given"
+            if self.force is not None
+            else ", velocity given"
+            if self.velocity is not None
+            else ""
+        )
+        tied = {0: "", 1: ", on a spring"}.get(
+            len(self.springs), f", on {len(self.springs)} springs"
+        )
         body = f"{self.body.mass:g} kg, {self.body.inertia:.3g} kg m^2"
         return f"Scene({self.name!r}: {self.t_end:g} s, body of {body}{driven}{tied}; {contacts}{more})"
 
@@ -152,10 +213,18 @@ class Scene(ByValue):
         """
         t_end = self.t_end if t_end is None else validation.positive("t_end", t_end)
         signals = [contact.normal_force for contact in self.contacts]
-        signals += [contact.support_velocity for contact in self.contacts if contact.support_velocity is not None]
+        signals += [
+            contact.support_velocity
+            for contact in self.contacts
+            if contact.support_velocity is not None
+        ]
         signals += [spring.anchor for spring in self.springs]
-        signals += [signal for signal in (self.force, self.velocity) if signal is not None]
-        return breaks_between(np.concatenate([signal.breaks for signal in signals]), t_end)
+        signals += [
+            signal for signal in (self.force, self.velocity) if signal is not None
+        ]
+        return breaks_between(
+            np.concatenate([signal.breaks for signal in signals]), t_end
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the scene as plain numbers, texts, lists and tables; `from_dict` restores it to the last bit."""
@@ -164,7 +233,12 @@ class Scene(ByValue):
         return scene_to_dict(self)
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], folder: str | Path | None = None, source: str = "scene") -> Scene:
+    def from_dict(
+        cls,
+        data: dict[str, Any],
+        folder: str | Path | None = None,
+        source: str = "scene",
+    ) -> Scene:
         """Make a scene from a table as in scene files; relative paths in it start from `folder`.
 
         Raises FileError in one line that begins with `source` and names the table and the key.
@@ -191,7 +265,13 @@ class Scene(ByValue):
 
     def to_json(self) -> str:
         """Return the scene as one line of JSON, the same for equal scenes."""
-        return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+        return json.dumps(
+            self.to_dict(),
+            sort_keys=True,
+            separators=(",", ":"),
+            ensure_ascii=False,
+            allow_nan=False,
+        )
 
     def digest(self) -> str:
         """Return the SHA-256 of the content, in hexadecimal: equal scenes have equal digests."""
@@ -242,12 +322,16 @@ class SolverOptions(Checked):
         """
         end = scene.t_end if self.t_end is None else self.t_end
         if end > scene.t_end:
-            raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
+            raise InvalidValueError(
+                "t_end", f"be at most the scene's {scene.t_end:g} s", end
+            )
         least, default = (scene.atol, scene.rtol) if rtol is None else (rtol, rtol)
         relative = default if self.rtol is None else self.rtol
         absolute = least * (relative / default) if self.atol is None else self.atol
         every = scene.save_every if self.save_every is None else self.save_every
-        return Plan(end, recording_times(end, every), relative, absolute, self.max_steps)
+        return Plan(
+            end, recording_times(end, every), relative, absolute, self.max_steps
+        )
 
 
 def recording_times(end: float, every: float) -> np.ndarray:

@@ -38,7 +38,9 @@ def breaks_between(times: np.ndarray, t_end: float) -> np.ndarray:
 
 def sample_count(span: float, step: float, name: str) -> int:
     """Return the number of steps of `step` [s] in `span` [s]; raise if they would need too much memory."""
-    count = span / step * (1.0 + 1e-12)  # so that the end itself is kept in spite of rounding
+    count = (
+        span / step * (1.0 + 1e-12)
+    )  # so that the end itself is kept in spite of rounding
     if count > MOST_SAMPLES:
         rule = f"be at least {span / MOST_SAMPLES:.3g} s (at most {MOST_SAMPLES} samples up to t_end, {span:g} s)"
         raise InvalidValueError(name, rule, step)
@@ -47,8 +49,11 @@ def sample_count(span: float, step: float, name: str) -> int:
 
 def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
     """Return the times `i * dt` [s] from 0 to the last one not after `t_end`; no rounding accumulates."""
-    t_end, dt = validation.non_negative("t_end", t_end), validation.positive("dt", dt)
-    return np.arange(sample_count(t_end + 1e-9 * dt, dt, "dt") + 1) * dt  # 1e-9 keeps t_end itself despite rounding
+    t_end = validation.non_negative("t_end", t_end)
+    dt = validation.positive("dt", dt)
+    return (
+        np.arange(sample_count(t_end + 1e-9 * dt, dt, "dt") + 1) * dt
+    )  # 1e-9 keeps t_end itself despite rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,11 +76,19 @@ class Signal(ByValue):
     def __post_init__(self) -> None:
         times = validation.array("times", self.times, (None,))
         values = validation.numbers("values", self.values)
-        values = validation.array("values", values, (None,) * (2 if values.ndim == 2 else 1), largest=np.inf)
+        values = validation.array(
+            "values", values, (None,) * (2 if values.ndim == 2 else 1), largest=np.inf
+        )
         if times.size == 0:
-            raise InvalidValueError("times", "have at least one sample", "an empty array")
+            raise InvalidValueError(
+                "times", "have at least one sample", "an empty array"
+            )
         if len(values) != len(times):
-            raise InvalidValueError("values", f"have one row per time ({len(times)})", f"shape {list(values.shape)}")
+            raise InvalidValueError(
+                "values",
+                f"have one row per time ({len(times)})",
+                f"shape {list(values.shape)}",
+            )
         steps = np.diff(times)
         if (steps <= 0.0).any():
             i = int(np.argmax(steps <= 0.0))
@@ -88,7 +101,9 @@ class Signal(ByValue):
         self._set(times=times, values=values)
 
     @classmethod
-    def sampled(cls, times: ArrayLike, values: ArrayLike, hold: Hold = "previous") -> Signal:
+    def sampled(
+        cls, times: ArrayLike, values: ArrayLike, hold: Hold = "previous"
+    ) -> Signal:
         """Return a signal from samples: `times` [s] of shape `[T]`, `values` of shape `[T]` or `[T, k]`."""
         return cls(times, values, hold)
 
@@ -100,12 +115,21 @@ class Signal(ByValue):
         """
         value = validation.finite_numbers("value", value, largest=np.inf)
         if value.ndim > 1:
-            raise InvalidValueError("value", "be a number or a vector", f"shape {list(value.shape)}")
+            raise InvalidValueError(
+                "value", "be a number or a vector", f"shape {list(value.shape)}"
+            )
         return cls(np.zeros(1), value[None])
 
     @classmethod
     def sine(
-        cls, offset: float, amplitude: float, frequency: float, *, t_end: float, dt: float = 0.01, phase: float = 0.0
+        cls,
+        offset: float,
+        amplitude: float,
+        frequency: float,
+        *,
+        t_end: float,
+        dt: float = 0.01,
+        phase: float = 0.0,
     ) -> Signal:
         """Return the signal `offset + amplitude sin(2 pi frequency t + phase)`, held over every `dt` [s] up to `t_end`.
 
@@ -113,14 +137,23 @@ class Signal(ByValue):
 
         Raises InvalidValueError for a parameter that breaks its rule.
         """
-        offset, amplitude = validation.number("offset", offset), validation.number("amplitude", amplitude)
-        frequency, phase = validation.non_negative("frequency", frequency), validation.number("phase", phase)
+        offset = validation.number("offset", offset)
+        amplitude = validation.number("amplitude", amplitude)
+        frequency = validation.non_negative("frequency", frequency)
+        phase = validation.number("phase", phase)
         times = sample_times(t_end, dt)
-        return cls(times, offset + amplitude * np.sin(2.0 * np.pi * frequency * times + phase))
+        return cls(
+            times, offset + amplitude * np.sin(2.0 * np.pi * frequency * times + phase)
+        )
 
     @classmethod
     def from_csv(
-        cls, path: str | Path, *, time: str = "time", value: str | Sequence[str] = "value", hold: Hold = "previous"
+        cls,
+        path: str | Path,
+        *,
+        time: str = "time",
+        value: str | Sequence[str] = "value",
+        hold: Hold = "previous",
     ) -> Signal:
         """Return a signal from a CSV file with a header: `time` names the column of times, `value` one or several.
 
@@ -130,13 +163,21 @@ class Signal(ByValue):
         validation.path("path", path)
         validation.text("time", time)
         if not isinstance(value, str) and not _is_texts(value):
-            raise InvalidValueError("value", "be the name of a column, or a list of names", value)
+            raise InvalidValueError(
+                "value", "be the name of a column, or a list of names", value
+            )
         names = [value] if isinstance(value, str) else list(value)
         table = Table(path).numbers([time, *names])
         try:
-            return cls(table[:, 0], table[:, 1] if isinstance(value, str) else table[:, 1:], hold)
+            return cls(
+                table[:, 0],
+                table[:, 1] if isinstance(value, str) else table[:, 1:],
+                hold,
+            )
         except InvalidValueError as error:
-            raise InvalidValueError(f"{path}: {error.name}", error.rule, error.value) from None
+            raise InvalidValueError(
+                f"{path}: {error.name}", error.rule, error.value
+            ) from None
 
     def held(self, dt: float) -> Signal:
         """Return the signal as a digital controller sees it: sampled every `dt` [s] from the first time on, and held.
@@ -184,20 +225,31 @@ class Signal(ByValue):
         """
         breaks = validation.array("breaks", breaks, (None,))
         if len(breaks) < 2 or (np.diff(breaks) <= 0.0).any():
-            raise InvalidValueError("breaks", "be at least two increasing times", f"{breaks}")
+            raise InvalidValueError(
+                "breaks", "be at least two increasing times", f"{breaks}"
+            )
         if len(self.times) == 1:
             start = np.repeat(self.values, len(breaks) - 1, axis=0)
             return start, np.zeros_like(start)
         own = self.breaks
         piece = np.searchsorted(breaks, own, side="right") - 1
         inside = (piece >= 0) & (piece < len(breaks) - 1)
-        begin, end = breaks[piece[inside]], breaks[piece[inside] + 1]
+        begin = breaks[piece[inside]]
+        end = breaks[piece[inside] + 1]
         inside[inside] = np.minimum(own[inside] - begin, end - own[inside]) > SAME_TIME
         if inside.any():
-            raise InvalidValueError("breaks", "contain the breaks of the signal", f"none at t = {own[inside][0]:g} s")
+            raise InvalidValueError(
+                "breaks",
+                "contain the breaks of the signal",
+                f"none at t = {own[inside][0]:g} s",
+            )
         # The middle of a piece finds its interval whatever rounding does to the ends.
-        i = np.searchsorted(self.times, 0.5 * (breaks[:-1] + breaks[1:]), side="right") - 1
-        begun, i = i >= 0, np.maximum(i, 0)
+        i = (
+            np.searchsorted(self.times, 0.5 * (breaks[:-1] + breaks[1:]), side="right")
+            - 1
+        )
+        begun = i >= 0
+        i = np.maximum(i, 0)
         slope = np.where(self._spread(begun), self._slopes[i], 0.0)
         return self.values[i] + slope * self._spread(breaks[:-1] - self.times[i]), slope
 
@@ -207,11 +259,17 @@ class Signal(ByValue):
         if len(below):
             i = int(below[0][0])
             value = float(self.values[tuple(below[0])])
-            raise InvalidValueError(name, "be >= 0", f"{value!r} at t = {self.times[i]:g} s")
+            raise InvalidValueError(
+                name, "be >= 0", f"{value!r} at t = {self.times[i]:g} s"
+            )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the signal as plain numbers, lists and strings."""
-        return {"times": self.times.tolist(), "values": self.values.tolist(), "hold": self.hold}
+        return {
+            "times": self.times.tolist(),
+            "values": self.values.tolist(),
+            "hold": self.hold,
+        }
 
     @classmethod
     def from_dict(cls, data: Any, folder: str | Path | None = None) -> Signal:
@@ -219,7 +277,10 @@ class Signal(ByValue):
 
         Raises FileError if the table is not a signal, InvalidValueError if `folder` is not a path.
         """
-        where = Section({"signal": data}, folder=None if folder is None else validation.path("folder", folder))
+        where = Section(
+            {"signal": data},
+            folder=None if folder is None else validation.path("folder", folder),
+        )
         return read_signal(where, "signal")
 
     def __repr__(self) -> str:
@@ -238,8 +299,12 @@ class Signal(ByValue):
             slopes = np.diff(self.values, axis=0) / self._spread(np.diff(self.times))
         steep = np.argwhere(~np.isfinite(slopes))[:, 0]
         if steep.size:
-            between = " s, then ".join(f"{time:g}" for time in self.times[steep[0] : steep[0] + 2])
-            raise InvalidValueError("times", "be far enough apart for a finite slope", f"{between} s")
+            between = " s, then ".join(
+                f"{time:g}" for time in self.times[steep[0] : steep[0] + 2]
+            )
+            raise InvalidValueError(
+                "times", "be far enough apart for a finite slope", f"{between} s"
+            )
         return np.concatenate([slopes, np.zeros_like(self.values[:1])])
 
     def _spread(self, array: np.ndarray) -> np.ndarray:
@@ -248,10 +313,13 @@ class Signal(ByValue):
 
     def _value(self, t, side: Literal["left", "right"]) -> np.ndarray:
         t = validation.finite_numbers("t", t)
-        if self.hold == "linear":  # continuous: both limits agree, and at a sample the sample itself is exact
+        if (
+            self.hold == "linear"
+        ):  # continuous: both limits agree, and at a sample the sample itself is exact
             side = "right"
         i = np.searchsorted(self.times, t, side=side) - 1
-        begun, i = i >= 0, np.maximum(i, 0)
+        begun = i >= 0
+        i = np.maximum(i, 0)
         slope = np.where(self._spread(begun), self._slopes[i], 0.0)
         return self.values[i] + slope * self._spread(t - self.times[i])
 
@@ -266,9 +334,15 @@ def as_signal(name: str, value: Any, columns: int | None) -> Signal:
         rule = wanted if "array of numbers" in error.rule else error.rule
         raise InvalidValueError(name, rule, error.value) from None
     if signal.columns != columns:
-        given = "numbers" if signal.columns is None else f"rows of {signal.columns} numbers"
-        raise InvalidValueError(name, wanted, f"a Signal of {given}" if signal is value else value)
-    validation.finite_numbers(name, signal.values)  # alone it may have any, in a scene it moves something
+        given = (
+            "numbers" if signal.columns is None else f"rows of {signal.columns} numbers"
+        )
+        raise InvalidValueError(
+            name, wanted, f"a Signal of {given}" if signal is value else value
+        )
+    validation.finite_numbers(
+        name, signal.values
+    )  # alone it may have any, in a scene it moves something
     return signal
 
 
@@ -282,7 +356,9 @@ def read_signal(parent: Section, key: str) -> Signal:
     if not isinstance(data, dict):
         here = Section({}, parent.name_of(key), parent.source, parent.folder)
         if isinstance(data, (str, bool)):
-            here.fail(f"must be a number, a list of numbers or a table, got {shown(validation.quoted(data))}")
+            here.fail(
+                f"must be a number, a list of numbers or a table, got {shown(validation.quoted(data))}"
+            )
         with here.located():
             return Signal.constant(data)
     here = parent.section(key)
@@ -295,19 +371,35 @@ def read_signal(parent: Section, key: str) -> Signal:
                 return Signal.sine(**{**sine.data, **required})
         if "csv" in here:
             here.only(["csv", "time", "value", "hold", "dt"])
-            time, value = here.get("time", "time"), here.get("value", "value")
-            if not isinstance(time, str) or not (isinstance(value, str) or _is_texts(value)):
-                here.fail("time must be the name of a column, value a name or a list of names")
-            signal = Signal.from_csv(here.path("csv"), time=time, value=value, hold=here.get("hold", "previous"))
+            time = here.get("time", "time")
+            value = here.get("value", "value")
+            if not isinstance(time, str) or not (
+                isinstance(value, str) or _is_texts(value)
+            ):
+                here.fail(
+                    "time must be the name of a column, value a name or a list of names"
+                )
+            signal = Signal.from_csv(
+                here.path("csv"),
+                time=time,
+                value=value,
+                hold=here.get("hold", "previous"),
+            )
         else:
             others = () if "times" in here or "values" in here else ("csv", "sine")
             here.only(["times", "values", "hold", "dt", *others])
-            signal = Signal.sampled(here.get("times"), here.get("values"), here.get("hold", "previous"))
+            signal = Signal.sampled(
+                here.get("times"), here.get("values"), here.get("hold", "previous")
+            )
         return signal.held(here.get("dt")) if "dt" in here else signal
 
 
 def _is_texts(value: Any) -> bool:
-    return isinstance(value, (list, tuple)) and bool(value) and all(isinstance(item, str) for item in value)
+    return (
+        isinstance(value, (list, tuple))
+        and bool(value)
+        and all(isinstance(item, str) for item in value)
+    )
 
 
 def displacement(velocity: Signal, times) -> np.ndarray:
@@ -317,6 +409,11 @@ def displacement(velocity: Signal, times) -> np.ndarray:
     breaks = breaks[breaks >= 0.0]
     if len(breaks) == 1:
         return np.zeros((len(times), velocity.columns or 1))
-    middle, lengths = 0.5 * (breaks[1:] + breaks[:-1]), np.diff(breaks)  # linear in between: the middle is the mean
-    way = np.cumsum(velocity(middle).reshape(len(middle), -1) * lengths[:, None], axis=0)
-    return np.concatenate([np.zeros((1, way.shape[1])), way])[np.searchsorted(breaks, times)]
+    middle = 0.5 * (breaks[1:] + breaks[:-1])
+    lengths = np.diff(breaks)  # linear in between: the middle is the mean
+    way = np.cumsum(
+        velocity(middle).reshape(len(middle), -1) * lengths[:, None], axis=0
+    )
+    return np.concatenate([np.zeros((1, way.shape[1])), way])[
+        np.searchsorted(breaks, times)
+    ]

@@ -22,7 +22,10 @@ BRISTLES = ("none", "all")
 MOST_NUMBERS = 10**9
 """Numbers of bristles that a run records at most: 8 GB."""
 
-_BODY, _CONTACT = ("vx", "vy", "omega", "x", "y", "theta"), ("fx", "fy", "tau", "normal_force")
+_BODY, _CONTACT = (
+    ("vx", "vy", "omega", "x", "y", "theta"),
+    ("fx", "fy", "tau", "normal_force"),
+)
 
 _QUANTITIES = {
     "time": ("s", "time"),
@@ -32,13 +35,25 @@ _QUANTITIES = {
     "x": ("m", "position of the centre of mass, world x"),
     "y": ("m", "position of the centre of mass, world y"),
     "theta": ("rad", "orientation, counter-clockwise"),
-    "fx": ("N", "friction on the body along x of the contact frame, one of the identical contacts"),
-    "fy": ("N", "friction on the body along y of the contact frame, one of the identical contacts"),
-    "tau": ("N m", "friction torque on the body about the contact frame's origin, one of the identical contacts"),
+    "fx": (
+        "N",
+        "friction on the body along x of the contact frame, one of the identical contacts",
+    ),
+    "fy": (
+        "N",
+        "friction on the body along y of the contact frame, one of the identical contacts",
+    ),
+    "tau": (
+        "N m",
+        "friction torque on the body about the contact frame's origin, one of the identical contacts",
+    ),
     "normal_force": ("N", "normal force of one of the identical contacts"),
     "pressure_x": ("m", "centre of pressure along x of the contact frame"),
     "pressure_y": ("m", "centre of pressure along y of the contact frame"),
-    "ended": ("s", "time since which the contact is beyond the edge of the body; NaN while it touches"),
+    "ended": (
+        "s",
+        "time since which the contact is beyond the edge of the body; NaN while it touches",
+    ),
 }
 """Unit and description of what is recorded."""
 
@@ -81,15 +96,23 @@ def simulate(
     if not isinstance(method, Method):
         raise InvalidValueError("method", "be solvers.RODAS4 or solvers.RODAS3", method)
     if not (progress is None or callable(progress)):
-        raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
+        raise InvalidValueError(
+            "progress", "be a function of the simulated time, or None", progress
+        )
     with compiled_together():
         batches = SegmentBatches(scene, plan.end, times=plan.times)
         output = _output(scene, plan.times, batches, bristles)
         scales = plan.atol * batches.state_scale
         limits = {"rtol": plan.rtol, "atol": scales, "max_steps": plan.max_steps}
-        run = integrate(batches, output, batches.state, method=method, progress=progress, **limits)
-    cost = replace(run.statistics, compile_time=run.statistics.compile_time + batches.loading)
-    solution = Solution(_histories(scene, batches, run.output), cost, run.status, run.message, scene)
+        run = integrate(
+            batches, output, batches.state, method=method, progress=progress, **limits
+        )
+    cost = replace(
+        run.statistics, compile_time=run.statistics.compile_time + batches.loading
+    )
+    solution = Solution(
+        _histories(scene, batches, run.output), cost, run.status, run.message, scene
+    )
     if run.status == "interrupted":
         raise SimulationInterrupted(solution)
     if run.status not in ("success", "at rest", "left its contacts"):
@@ -97,51 +120,82 @@ def simulate(
     return solution
 
 
-def _output(scene: Scene, times: np.ndarray, batches: SegmentBatches, bristles: str) -> Output:
-    count, contacts, states = len(times), len(batches.models), int(batches.bristles[-1])
+def _output(
+    scene: Scene, times: np.ndarray, batches: SegmentBatches, bristles: str
+) -> Output:
+    count = len(times)
+    contacts = len(batches.models)
+    states = int(batches.bristles[-1])
     if bristles == "all" and count * states > MOST_NUMBERS:
         shown = f"{count} samples of {states} numbers"
-        raise InvalidValueError("bristles", f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)", shown)
+        raise InvalidValueError(
+            "bristles",
+            f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)",
+            shown,
+        )
     recorded = np.empty((count, states) if bristles == "all" else (0, 0))
     follows = sum(contact.pressure == "follows" for contact in scene.contacts)
-    body, wrench, load = map(np.empty, ((count, 6), (count, contacts, 3), (count, contacts)))
-    ended = np.full(contacts if any(contact.edge for contact in scene.contacts) else 0, np.nan)
-    return Output(times, body, wrench, load, recorded, np.empty((follows * count, 2)), ended)
+    body, wrench, load = map(
+        np.empty, ((count, 6), (count, contacts, 3), (count, contacts))
+    )
+    ended = np.full(
+        contacts if any(contact.edge for contact in scene.contacts) else 0, np.nan
+    )
+    return Output(
+        times, body, wrench, load, recorded, np.empty((follows * count, 2)), ended
+    )
 
 
-def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[str, History]:
+def _histories(
+    scene: Scene, batches: SegmentBatches, output: Output
+) -> dict[str, History]:
     """Return what was recorded, by name, with units."""
 
     def history(name: str, values: np.ndarray) -> History:
         unit, long_name = _QUANTITIES[name]
         if scene.velocity is not None and name in ("vx", "vy"):
-            long_name = long_name.replace("centre of mass, world", "origin of the body's axes, body")
+            long_name = long_name.replace(
+                "centre of mass, world", "origin of the body's axes, body"
+            )
         dims = ("time", "contact")[: values.ndim]
         return History(dims, values, {"units": unit, "long_name": long_name})
 
     histories = {name: history(name, output.body[:, i]) for i, name in enumerate(_BODY)}
-    for name, values in zip(_CONTACT, (*np.moveaxis(output.wrench, -1, 0), output.load), strict=True):
+    for name, values in zip(
+        _CONTACT, (*np.moveaxis(output.wrench, -1, 0), output.load), strict=True
+    ):
         histories[name] = history(name, values)
     if scene.contacts[0].pressure == "follows":
-        centres = centres_of_pressure(scene.contacts[0], output.pressure, output.load[:, 0])
+        centres = centres_of_pressure(
+            scene.contacts[0], output.pressure, output.load[:, 0]
+        )
         for i, name in enumerate(("pressure_x", "pressure_y")):
             histories[name] = history(name, centres[:, i : i + 1])
     if len(output.ended):
         histories["ended"] = history("ended", output.ended)._replace(dims=("contact",))
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
-            first, cells = batches.bristles, batches.cells[c]
+            first = batches.bristles
+            cells = batches.cells[c]
             part = output.bristles[:, first[c] : first[c + 1]]
             name = f"bristles_{contact.name}"
             if cells is not None:
                 size = contact.model.state_shape[0]
                 full = np.zeros((len(part), size, len(cells)))
-                bent = part[:, : size * cells.sum()]  # without the place of the pressure
+                bent = part[
+                    :, : size * cells.sum()
+                ]  # without the place of the pressure
                 full[:, :, cells] = bent.reshape(len(part), size, -1)
                 axis = "axis" if size == 2 else "component"
-                histories[name] = History(("time", axis, f"cell_{contact.name}"), full, {"units": "m"})
+                histories[name] = History(
+                    ("time", axis, f"cell_{contact.name}"), full, {"units": "m"}
+                )
             else:
-                histories[name] = History(("time", "component"), part, {"units": contact.model.state_units})
+                histories[name] = History(
+                    ("time", "component"), part, {"units": contact.model.state_units}
+                )
     histories["time"] = history("time", output.time)
-    histories["contact"] = History(("contact",), np.array([contact.name for contact in scene.contacts]), {})
+    histories["contact"] = History(
+        ("contact",), np.array([contact.name for contact in scene.contacts]), {}
+    )
     return histories

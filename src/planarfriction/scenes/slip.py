@@ -60,24 +60,42 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
 
     recorded = solution.histories.get(f"bristles_{contact.name}")
     if recorded is None:
-        raise InvalidValueError("bristles", "be recorded for slip events: simulate(scene, bristles='all')", "none")
+        raise InvalidValueError(
+            "bristles",
+            "be recorded for slip events: simulate(scene, bristles='all')",
+            "none",
+        )
     time = np.asarray(solution.histories["time"].values)
-    loads = np.asarray(solution.histories["normal_force"].values)[:, solution.contact_index(contact.name)]
-    twists, states = solution.contact_twist(contact.name), np.asarray(recorded.values)
+    loads = np.asarray(solution.histories["normal_force"].values)[
+        :, solution.contact_index(contact.name)
+    ]
+    twists = solution.contact_twist(contact.name)
+    states = np.asarray(recorded.values)
     share = slip_fraction(contact.model, states, twists, loads)
     points = centres(contact.model.patch, loads)
-    speed = np.hypot(twists[:, 0] - twists[:, 2] * points[:, 1], twists[:, 1] + twists[:, 2] * points[:, 0])
-    distance, turn = (cumulative_trapezoid(each, time, initial=0.0) for each in (speed, twists[:, 2]))
-    radius, least = reach(contact.model.patch), contact.model.law.largest_deflection
+    speed = np.hypot(
+        twists[:, 0] - twists[:, 2] * points[:, 1],
+        twists[:, 1] + twists[:, 2] * points[:, 0],
+    )
+    distance, turn = (
+        cumulative_trapezoid(each, time, initial=0.0) for each in (speed, twists[:, 2])
+    )
+    radius = reach(contact.model.patch)
+    least = contact.model.law.largest_deflection
     events = []
     for onset, end in _stretches(time, share - SLIPS):
-        path, angle = (float(np.diff(np.interp([onset, end], time, each))[0]) for each in (distance, turn))
+        path, angle = (
+            float(np.diff(np.interp([onset, end], time, each))[0])
+            for each in (distance, turn)
+        )
         if path + radius * abs(angle) > least:  # less than bristles give way by is none
             events.append(SlipEvent(contact.name, onset, end, path, angle))
     return events
 
 
-def slip_fraction(model: Any, states: np.ndarray, twists: np.ndarray, loads: np.ndarray) -> np.ndarray:
+def slip_fraction(
+    model: Any, states: np.ndarray, twists: np.ndarray, loads: np.ndarray
+) -> np.ndarray:
     """Compute the share `|u - zdot|/|u|` of the motion u of a contact that its bristles do not take up `[T]`.
 
     The norms are root mean squares over the bristles. The share lies in [0, 1]: 0 without motion, 1 without load.
@@ -90,21 +108,33 @@ def slip_fraction(model: Any, states: np.ndarray, twists: np.ndarray, loads: np.
     motion = model.rate(np.zeros_like(states[loaded]), *args)
     left = motion - model.rate(states[loaded], *args)
     weights = _weights(model, loads[loaded])
-    size, slipped = (np.sqrt((weights * each**2).reshape(len(each), -1).sum(axis=1)) for each in (motion, left))
-    share[loaded] = np.minimum(np.where(size > 0.0, slipped / np.where(size > 0.0, size, 1.0), 0.0), 1.0)
+    size, slipped = (
+        np.sqrt((weights * each**2).reshape(len(each), -1).sum(axis=1))
+        for each in (motion, left)
+    )
+    share[loaded] = np.minimum(
+        np.where(size > 0.0, slipped / np.where(size > 0.0, size, 1.0), 0.0), 1.0
+    )
     return share
 
 
 def _weights(model: Any, loads: np.ndarray) -> np.ndarray:
     """Return the weight of each state in the mean square: that of its cell, or one over the square of its scale."""
-    shape, patch = tuple(model.state_shape), getattr(model, "reduction", model).patch
+    shape = tuple(model.state_shape)
+    patch = getattr(model, "reduction", model).patch
     if shape == (2, patch.cells):
-        weights = np.array([patch.weights(load) for load in loads]) if patch.depends_on_load else patch.weights()[None]
+        weights = (
+            np.array([patch.weights(load) for load in loads])
+            if patch.depends_on_load
+            else patch.weights()[None]
+        )
         return weights[:, None, :]
     if "m^2" in getattr(model, "state_units", "m"):
         radius = np.array([float(model.patch.contact_radius(load)) for load in loads])
         radius = np.where(radius > 0.0, radius, 1.0)
-        return np.stack([np.ones_like(radius), np.ones_like(radius), radius**-2], axis=1)
+        return np.stack(
+            [np.ones_like(radius), np.ones_like(radius), radius**-2], axis=1
+        )
     return np.ones((1, *shape))
 
 
@@ -112,7 +142,10 @@ def centres(patch: Any, loads: np.ndarray) -> np.ndarray:
     """Return the centre of pressure at each load `[T, 2]` [m]; without load, that at the largest load."""
     if not patch.depends_on_load:
         return np.broadcast_to(patch.centre_of_pressure(), (len(loads), 2))
-    known = {load: patch.centre_of_pressure(load) for load in np.unique(loads[loads > 0.0]).tolist()}
+    known = {
+        load: patch.centre_of_pressure(load)
+        for load in np.unique(loads[loads > 0.0]).tolist()
+    }
     last = known[max(known)] if known else np.zeros(2)
     return np.array([known.get(load, last) for load in loads.tolist()])
 
@@ -128,7 +161,9 @@ def _stretches(time: np.ndarray, above: np.ndarray) -> list[tuple[float, float]]
     changes = np.flatnonzero(on[1:] != on[:-1])
     share = above[changes] / (above[changes] - above[changes + 1])
     at = (time[changes] + share * (time[changes + 1] - time[changes])).tolist()
-    at = ([float(time[0])] if on[0] else []) + at + ([float(time[-1])] if on[-1] else [])
+    at = (
+        ([float(time[0])] if on[0] else []) + at + ([float(time[-1])] if on[-1] else [])
+    )
     return list(zip(at[::2], at[1::2], strict=True))
 
 
@@ -155,18 +190,26 @@ def slip_field(
     next, in the frame of the contact; `loads` are `[T]` [N]; `first` `[3]` is the first twist [m/s, m/s, rad/s]. A
     cell displaced by `u` while its bristle goes from z_0 to z_1 slips by `u - (z_1 - z_0)`.
     """
-    law, count, largest = bristles.law.numbers, len(bristles.patch.positions), bristles.law.largest_deflection
-    levers, lean = bristles.patch.levers(), np.zeros(state.shape)
+    law = bristles.law.numbers
+    count = len(bristles.patch.positions)
+    largest = bristles.law.largest_deflection
+    levers = bristles.patch.levers()
+    lean = np.zeros(state.shape)
     lean[:2] = bristles.patch.asymmetries().T
-    bent, slips = np.zeros((len(frames), count)), np.zeros((len(frames), count), dtype=bool)
-    distance, slip, frame = np.zeros(count), np.zeros(count), 1
+    bent = np.zeros((len(frames), count))
+    slips = np.zeros((len(frames), count), dtype=bool)
+    distance = np.zeros(count)
+    slip = np.zeros(count)
+    frame = 1
     factor = bristles.law.stiffness_factor(np.maximum(loads, 0.0))
     bent[0] = _bent(factor[0] * state, levers @ first, lean, law)
     for k, (step, dt) in enumerate(zip(displacements, np.diff(times), strict=True)):
         if not dt > 0.0:
             continue
         before = state
-        state, _ = bristles.step(state, step / dt, max(0.5 * (loads[k] + loads[k + 1]), 0.0), dt)
+        state, _ = bristles.step(
+            state, step / dt, max(0.5 * (loads[k] + loads[k + 1]), 0.0), dt
+        )
         moved = (levers @ step).T
         length = np.linalg.norm(moved, axis=0)
         distance += length
@@ -174,14 +217,20 @@ def slip_field(
         if frame < len(frames) and k + 1 == frames[frame]:
             bent[frame] = _bent(factor[k + 1] * state, moved.T / dt, lean, law)
             slips[frame] = (slip > SLIPS * distance) & (distance > AT_REST * largest)
-            distance[:], slip[:], frame = 0.0, 0.0, frame + 1
+            distance[:] = 0.0
+            slip[:] = 0.0
+            frame = frame + 1
     if len(frames) > 1:  # at first no distance is known: as right after it
         span = times[frames[1]] - times[frames[0]]
-        slips[0] = slips[1] & (np.linalg.norm(levers @ first, axis=1) * span > AT_REST * largest)
+        slips[0] = slips[1] & (
+            np.linalg.norm(levers @ first, axis=1) * span > AT_REST * largest
+        )
     return SlipField(bent, slips)
 
 
-def _bent(state: np.ndarray, velocity: np.ndarray, lean: np.ndarray, law: Any) -> np.ndarray:
+def _bent(
+    state: np.ndarray, velocity: np.ndarray, lean: np.ndarray, law: Any
+) -> np.ndarray:
     """Return the deflections of bristles `[d, N]` over their largest at the velocities `[N, d]` of the cells, `[N]`.
 
     The largest of a disc that spins is up to 6 % smaller.

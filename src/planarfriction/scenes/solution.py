@@ -85,7 +85,10 @@ class Solution:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Solution):
             return NotImplemented
-        mine, others = ((each.statistics, each.status, each.message, each.scene) for each in (self, other))
+        mine, others = (
+            (each.statistics, each.status, each.message, each.scene)
+            for each in (self, other)
+        )
         return self is other or (mine == others and self.data.identical(other.data))
 
     def __hash__(self) -> int:
@@ -94,17 +97,33 @@ class Solution:
     def __repr__(self) -> str:
         name = "no scene" if self.scene is None else repr(self.scene.name)
         time = np.asarray(self.histories["time"].values)
-        end = (f"{each}={float(self.histories[each].values[-1]):.4g}" for each in ("x", "y", "theta") if len(time))
-        cost = f"{self.statistics.steps} steps in {1e3 * self.statistics.wall_time:.3g} ms"
-        until = f"{len(time)} samples to t={float(time[-1]):g} s" if len(time) else "no samples"
+        end = (
+            f"{each}={float(self.histories[each].values[-1]):.4g}"
+            for each in ("x", "y", "theta")
+            if len(time)
+        )
+        cost = (
+            f"{self.statistics.steps} steps in {1e3 * self.statistics.wall_time:.3g} ms"
+        )
+        until = (
+            f"{len(time)} samples to t={float(time[-1]):g} s"
+            if len(time)
+            else "no samples"
+        )
         return f"Solution({name}, {self.status}: {until}, {', '.join([*end, *self._ends(), cost])})"
 
     def _ends(self) -> list[str]:
         """Return in words when contacts with an edge have ended."""
         if "ended" not in self.histories:
             return []
-        times, names = (np.asarray(self.histories[each].values) for each in ("ended", "contact"))
-        return [f"{str(name)!r} ended at t={t:.4g} s" for name, t in zip(names, times, strict=True) if t == t]
+        times, names = (
+            np.asarray(self.histories[each].values) for each in ("ended", "contact")
+        )
+        return [
+            f"{str(name)!r} ended at t={t:.4g} s"
+            for name, t in zip(names, times, strict=True)
+            if t == t
+        ]
 
     def _repr_html_(self) -> str:
         return picture("solution in a notebook", self)
@@ -132,20 +151,27 @@ class Solution:
         """
         chosen = scene_of(self, "a twist").contacts[self.contact_index(contact)]
         x, y, theta, *twists, time = (
-            np.asarray(self.histories[name].values) for name in ("x", "y", "theta", "vx", "vy", "omega", "time")
+            np.asarray(self.histories[name].values)
+            for name in ("x", "y", "theta", "vx", "vy", "omega", "time")
         )
-        centre, twist, at, angle = np.stack([x, y], -1), np.stack(twists, -1), np.array(chosen.position), chosen.angle
+        centre = np.stack([x, y], -1)
+        twist = np.stack(twists, -1)
+        at = np.array(chosen.position)
+        angle = chosen.angle
         if chosen.support_velocity is not None:
-            moves, to = chosen.support_velocity.left(time), np.zeros(2)
+            moves = chosen.support_velocity.left(time)
+            to = np.zeros(2)
             if chosen.mounted_on == "world":
                 shift = displacement(chosen.support_velocity, time)
-                at, angle = at + shift[:, :2], angle + shift[:, 2]
+                at = at + shift[:, :2]
+                angle = angle + shift[:, 2]
                 to = at
             twist = twist - twist_at(moves, centre - to)
         if self.scene.velocity is None and chosen.mounted_on == "world":
             at = at - centre
         elif self.scene.velocity is None:
-            at, angle = rotate(at, theta), angle + theta
+            at = rotate(at, theta)
+            angle = angle + theta
         return rotate(twist_at(twist, at), -angle)
 
     def contact_index(self, contact: str | None = None) -> int:
@@ -157,7 +183,11 @@ class Solution:
         if contact is None and len(names) == 1:
             return 0
         if contact is None:
-            raise InvalidValueError("contact", f"be given if there are several ({', '.join(names)})", contact)
+            raise InvalidValueError(
+                "contact",
+                f"be given if there are several ({', '.join(names)})",
+                contact,
+            )
         return names.index(validation.choice("contact", contact, names))
 
     def slip_events(self) -> tuple[SlipEvent, ...]:
@@ -201,7 +231,16 @@ class Solution:
         Raises FileError if the file cannot be written or the solution has no scene, InvalidValueError for a parameter
         that breaks its rule.
         """
-        return picture("animation", self, path, slow=slow, fps=fps, follow=follow, dpi=dpi, progress=progress)
+        return picture(
+            "animation",
+            self,
+            path,
+            slow=slow,
+            fps=fps,
+            follow=follow,
+            dpi=dpi,
+            progress=progress,
+        )
 
     def save(self, path: str | Path) -> Path:
         """Write everything, including the scene, to the NetCDF file `path`; `Solution.load` reads it.
@@ -234,7 +273,9 @@ class Solution:
 def scene_of(solution: Solution, what: str) -> Scene:
     """Return the scene of a solution, which `what` needs; raises FileError where it was loaded without one."""
     if solution.scene is None:
-        raise FileError(f"the file has no scene, which {what} needs: {solution.data.attrs[_LEFT_OUT]}")
+        raise FileError(
+            f"the file has no scene, which {what} needs: {solution.data.attrs[_LEFT_OUT]}"
+        )
     return solution.scene
 
 
@@ -253,8 +294,15 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
         try:
             with _quiet():
                 data = _renamed(data, functools.partial(quote, safe=_SAFE))
-                content = bytes(data.assign_attrs({_CHECKSUM: "sha256:" + _DIGITS * "0"}).to_netcdf(engine="scipy"))
-        except (TypeError, RecursionError) as error:  # of what someone added to the data
+                content = bytes(
+                    data.assign_attrs({_CHECKSUM: "sha256:" + _DIGITS * "0"}).to_netcdf(
+                        engine="scipy"
+                    )
+                )
+        except (
+            TypeError,
+            RecursionError,
+        ) as error:  # of what someone added to the data
             raise FileError(f"{path}: cannot be written: {_one_line(error)}") from None
         before, _, after, checksum = _parted(content)
         for part in (before, checksum, after):
@@ -264,7 +312,11 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
 
 def _renamed(data: xr.Dataset, change: Callable[[str], str]) -> xr.Dataset:
     """Return the data under changed names: in a file, other letters than ASCII are "%CF%86", as SciPy needs."""
-    names = {name: change(name) for name in {*data.variables, *data.dims} if isinstance(name, str)}
+    names = {
+        name: change(name)
+        for name in {*data.variables, *data.dims}
+        if isinstance(name, str)
+    }
     return data.rename({name: new for name, new in names.items() if name != new})
 
 
@@ -273,11 +325,18 @@ def _parted(content: bytes) -> tuple[memoryview, bytes, memoryview, bytes]:
 
     It is the SHA-256 in hexadecimal; raises ValueError for a file without one.
     """
-    begin, view = content.index(_MARK) + len(_MARK), memoryview(content)
-    before, after = view[:begin], view[begin + _DIGITS :]
+    begin = content.index(_MARK) + len(_MARK)
+    view = memoryview(content)
+    before = view[:begin]
+    after = view[begin + _DIGITS :]
     digest = hashlib.sha256(before)
     digest.update(after)
-    return before, bytes(view[begin : begin + _DIGITS]), after, digest.hexdigest().encode()
+    return (
+        before,
+        bytes(view[begin : begin + _DIGITS]),
+        after,
+        digest.hexdigest().encode(),
+    )
 
 
 def _read(path: str | Path) -> Solution:
@@ -291,9 +350,13 @@ def _read(path: str | Path) -> Solution:
     try:
         _, written, _, checksum = _parted(content)
     except ValueError:
-        raise FileError(f"{path}: not {what}: it has no checksum ({_OTHERWISE})") from None
+        raise FileError(
+            f"{path}: not {what}: it has no checksum ({_OTHERWISE})"
+        ) from None
     if written != checksum:
-        raise FileError(f"{path}: damaged, or changed by another program: its checksum differs ({_OTHERWISE})")
+        raise FileError(
+            f"{path}: damaged, or changed by another program: its checksum differs ({_OTHERWISE})"
+        )
     try:
         with _quiet():
             data = xr.load_dataset(io.BytesIO(content), engine="scipy")
@@ -302,17 +365,25 @@ def _read(path: str | Path) -> Solution:
     data = _renamed(data, unquote)
     missing = [name for name in _META if name not in data.attrs]
     if missing:
-        raise FileError(f"{path}: not {what} of planarfriction (no attribute {missing[0]!r})")
+        raise FileError(
+            f"{path}: not {what} of planarfriction (no attribute {missing[0]!r})"
+        )
     meta = {name: str(data.attrs[name]) for name in _META}
     for name in ("statistics", "status", "message", _CHECKSUM):
         del data.attrs[name]
     try:
-        scene: Any = Scene.from_dict(json.loads(meta["scene"])) if meta["scene"] else None
+        scene: Any = (
+            Scene.from_dict(json.loads(meta["scene"])) if meta["scene"] else None
+        )
         statistics = Statistics(**json.loads(meta["statistics"]))
     except (ValueError, TypeError, FrictionError) as error:
-        raise FileError(f"{path}: the scene in this file cannot be read: {_one_line(error)}") from None
+        raise FileError(
+            f"{path}: the scene in this file cannot be read: {_one_line(error)}"
+        ) from None
     solution = Solution(data, statistics, meta["status"], meta["message"], scene)
-    solution.data.attrs.update(data.attrs)  # as they were, with notes that someone added before it was saved
+    solution.data.attrs.update(
+        data.attrs
+    )  # as they were, with notes that someone added before it was saved
     return solution
 
 

@@ -32,12 +32,16 @@ def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
     loads = np.array([float(contact.normal_force(0.0)) for contact in scene.contacts])
     shaped = np.where(loads > 0.0, shaped, 0.0)
     if scene.start == "sliding":
-        fixed = [contact.model.law.reference_load is not None for contact in scene.contacts]
+        fixed = [
+            contact.model.law.reference_load is not None for contact in scene.contacts
+        ]
         return _sliding(scene, np.where(fixed, loads, shaped))
     return _equilibrium(scene, loads, shaped)
 
 
-def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np.ndarray) -> list[np.ndarray]:
+def first_slopes(
+    scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np.ndarray
+) -> list[np.ndarray]:
     """Return the changes of the first states `[K, *state_shape]` of an equilibrium, per contact, by K changes of loads.
 
     `d_loads` `[K, C]` are those of the normal forces [N], `d_pull` `[K, 3]` those of the load on the body. Bristles
@@ -48,37 +52,65 @@ def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np
     motion = _least_energy(cells, pull)
     bent, slope = cells.bent(motion)
     share = np.repeat(d_loads / np.where(loads == 0.0, 1.0, loads), sizes, axis=1)
-    longer = bent - np.einsum("nij,nj->ni", slope, cells.levers @ motion)  # limits of a fixed stiffness grow with loads
+    longer = bent - np.einsum(
+        "nij,nj->ni", slope, cells.levers @ motion
+    )  # limits of a fixed stiffness grow with loads
     fixed = cells.fixed[:, None]
-    held = np.einsum("kn,n,nij,ni->kj", share, cells.stiffness, cells.levers, np.where(fixed, longer, bent))
-    stiff = np.einsum("n,nia,nij,njb->ab", cells.stiffness, cells.levers, slope, cells.levers)
+    held = np.einsum(
+        "kn,n,nij,ni->kj",
+        share,
+        cells.stiffness,
+        cells.levers,
+        np.where(fixed, longer, bent),
+    )
+    stiff = np.einsum(
+        "n,nia,nij,njb->ab", cells.stiffness, cells.levers, slope, cells.levers
+    )
     motions = np.linalg.lstsq(stiff, (d_pull - held).T, rcond=None)[0]
     moved = np.einsum("nij,njb,bk->kni", slope, cells.levers, motions)
     moved = moved + share[:, :, None] * np.where(fixed, longer, 0.0)
     return _states(scene, shaped, moved, sizes)
 
 
-def _states(scene: Any, shaped: np.ndarray, deflections: np.ndarray, sizes: list[int]) -> list[np.ndarray]:
+def _states(
+    scene: Any, shaped: np.ndarray, deflections: np.ndarray, sizes: list[int]
+) -> list[np.ndarray]:
     """Return the states `[K, *state_shape]` of each contact with deflections `[K, n, 3]` of the cells of all."""
     found = []
     parts = np.split(deflections, np.cumsum(sizes)[:-1], axis=1)
     for contact, part, load in zip(scene.contacts, parts, shaped, strict=True):
         model = contact.model
-        states = [model.state_of(row.T[: model.patch.bristles], load) if load > 0.0 else model.rest() for row in part]
+        states = [
+            model.state_of(row.T[: model.patch.bristles], load)
+            if load > 0.0
+            else model.rest()
+            for row in part
+        ]
         found.append(np.array(states).reshape(len(part), *model.state_shape))
     return found
 
 
 def contact_map(scene: Any, contact: Any) -> np.ndarray:
     """Return `A` `[3, 3]` of `V = A u` at t = 0: the twist of a contact from the velocity of the body."""
-    body, (dx, dy), angle = scene.body, contact.position, contact.angle
+    body = scene.body
+    (dx, dy) = contact.position
+    angle = contact.angle
     if scene.velocity is None and contact.mounted_on == "world":
-        dx, dy = dx - body.position[0], dy - body.position[1]
+        dx = dx - body.position[0]
+        dy = dy - body.position[1]
     elif scene.velocity is None:
-        cos, sin = np.cos(body.angle), np.sin(body.angle)
+        cos = np.cos(body.angle)
+        sin = np.sin(body.angle)
         dx, dy, angle = cos * dx - sin * dy, sin * dx + cos * dy, angle + body.angle
-    cos, sin = np.cos(angle), np.sin(angle)
-    return np.array([[cos, sin, sin * dx - cos * dy], [-sin, cos, sin * dy + cos * dx], [0.0, 0.0, 1.0]])
+    cos = np.cos(angle)
+    sin = np.sin(angle)
+    return np.array(
+        [
+            [cos, sin, sin * dx - cos * dy],
+            [-sin, cos, sin * dy + cos * dx],
+            [0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def _sliding(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
@@ -86,8 +118,14 @@ def _sliding(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
     states = []
     for contact, load in zip(scene.contacts, shaped, strict=True):
         model = contact.model
-        twist = contact_map(scene, contact) @ (np.asarray(velocity) - _carried(scene.body, contact))
-        states.append(model.step(model.rest(), twist, load, _LONG)[0] if load > 0.0 else model.rest())
+        twist = contact_map(scene, contact) @ (
+            np.asarray(velocity) - _carried(scene.body, contact)
+        )
+        states.append(
+            model.step(model.rest(), twist, load, _LONG)[0]
+            if load > 0.0
+            else model.rest()
+        )
     return states
 
 
@@ -95,7 +133,9 @@ def _carried(body: Any, contact: Any) -> np.ndarray:
     """Return the velocity `[3]` that the centre of mass would have at t = 0 on what the contact touches."""
     if contact.support_velocity is None:
         return np.zeros(3)
-    x, y = np.subtract(body.position, contact.position if contact.mounted_on == "world" else (0.0, 0.0))
+    x, y = np.subtract(
+        body.position, contact.position if contact.mounted_on == "world" else (0.0, 0.0)
+    )
     vx, vy, omega = contact.support_velocity(0.0)
     return np.array([vx - omega * y, vy + omega * x, omega])
 
@@ -124,7 +164,9 @@ class _BristleField(NamedTuple):
         over = length > self.largest
         share = np.where(over, self.largest, 1.0) / np.where(over, length, 1.0)
         along = shift / np.where(length > 0.0, length, 1.0)[:, None]
-        slope = share[:, None, None] * (np.eye(3) - over[:, None, None] * along[:, :, None] * along[:, None, :])
+        slope = share[:, None, None] * (
+            np.eye(3) - over[:, None, None] * along[:, :, None] * along[:, None, :]
+        )
         return self.middle + share[:, None] * shift, slope
 
     def load(self, deflections: np.ndarray) -> np.ndarray:
@@ -150,52 +192,78 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
     return [states[0] for states in _states(scene, shaped, bent[None], sizes)]
 
 
-def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[_BristleField, list[int], np.ndarray]:
+def _held_by(
+    scene: Any, loads: np.ndarray, shaped: np.ndarray
+) -> tuple[_BristleField, list[int], np.ndarray]:
     """Return the cells of all contacts, the number of each contact's, and the load on the body that they hold."""
     for contact in scene.contacts:
         if not contact.model.law.holds_at_rest:
-            raise InvalidValueError("start", "be 'rest' or 'sliding' with a law that creeps", scene.start)
+            raise InvalidValueError(
+                "start", "be 'rest' or 'sliding' with a law that creeps", scene.start
+            )
     pull = pull_on(scene, scene.body, 0.0)
-    each = [_cells_of(scene, *each) for each in zip(scene.contacts, loads, shaped, strict=True)]
+    each = [
+        _cells_of(scene, *each)
+        for each in zip(scene.contacts, loads, shaped, strict=True)
+    ]
     whole = _BristleField(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
     return whole, [len(one.stiffness) for one in each], pull
 
 
 def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleField:
     model = contact.model
-    patch, law = model.patch, model.law.numbers
+    patch = model.patch
+    law = model.law.numbers
     levers = patch.levers() @ contact_map(scene, contact)
-    levers = np.concatenate([levers, np.zeros((len(levers), 3 - levers.shape[1], 3))], axis=1)  # points do not spin
+    levers = np.concatenate(
+        [levers, np.zeros((len(levers), 3 - levers.shape[1], 3))], axis=1
+    )  # points do not spin
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
     sigma_0 = law.sigma_0 * float(model.law.stiffness_factor(load))
     largest = float(formulas.stribeck(np, np.zeros(()), law)) / sigma_0
     middle = np.zeros((len(levers), 3))
     middle[:, :2] = largest * patch.asymmetries()
     fixed = np.full(len(levers), model.law.reference_load is not None)
-    return _BristleField(levers, contact.count * load * sigma_0 * weights, np.full(len(levers), largest), middle, fixed)
+    return _BristleField(
+        levers,
+        contact.count * load * sigma_0 * weights,
+        np.full(len(levers), largest),
+        middle,
+        fixed,
+    )
 
 
 def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:
     """Return the motion `[3]` after which bristles carry a load `[3]`; raises where none does."""
     elastic = np.einsum("n,nia,nib->ab", cells.stiffness, cells.levers, cells.levers)
-    carries = np.diagonal(elastic) > np.finfo(float).tiny  # stiffness of smaller loads has too few digits to divide by
+    carries = (
+        np.diagonal(elastic) > np.finfo(float).tiny
+    )  # stiffness of smaller loads has too few digits to divide by
     scale = 1.0 / np.sqrt(np.where(carries, np.diagonal(elastic), 1.0))
     scaled = np.where(np.outer(carries, carries), elastic, 0.0) * np.outer(scale, scale)
     motion = scale * np.linalg.lstsq(scaled, scale * pull, rcond=1e-14)[0]
-    if not np.array_equal(cells.bent(motion)[0], cells.middle + (cells.levers @ motion - cells.middle)):
+    if not np.array_equal(
+        cells.bent(motion)[0], cells.middle + (cells.levers @ motion - cells.middle)
+    ):
         motion = _bent_to_the_end(cells, pull, motion, scale)
     bent = cells.bent(motion)[0]
     size = max(np.abs(scale * pull).max(), np.finfo(float).tiny)
     if np.abs(scale * (cells.load(bent) - pull)).max() > _BALANCED * size:
         at_most = _held(cells, pull, motion)
-        friction = "" if at_most is None else f" (they hold {100.0 * at_most:.3g} % of the load at most)"
+        friction = (
+            ""
+            if at_most is None
+            else f" (they hold {100.0 * at_most:.3g} % of the load at most)"
+        )
         rule = f"be 'rest' or 'sliding' if the contacts do not hold the body{friction}"
         raise InvalidValueError("start", rule, "equilibrium")
     return motion
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of loads that nothing holds
-def _bent_to_the_end(cells: _BristleField, pull: np.ndarray, motion: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def _bent_to_the_end(
+    cells: _BristleField, pull: np.ndarray, motion: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
     """Return the motion of least energy where some bristles are bent as far as they can be."""
     from scipy.optimize import minimize, root
 
@@ -213,20 +281,41 @@ def _bent_to_the_end(cells: _BristleField, pull: np.ndarray, motion: np.ndarray,
 
     def curvature(x: np.ndarray) -> np.ndarray:
         bend = cells.bent(unit * scale * x)[1]
-        inner = np.einsum("n,nia,nij,njb->ab", cells.stiffness, cells.levers, bend, cells.levers)
+        inner = np.einsum(
+            "n,nia,nij,njb->ab", cells.stiffness, cells.levers, bend, cells.levers
+        )
         return inner * np.outer(scale, scale)
 
     options = {"gtol": 1e-13, "maxiter": 100, "max_trust_radius": 1e6}
-    found = minimize(energy, motion / (unit * scale), method="trust-exact", jac=slope, hess=curvature, options=options)
+    found = minimize(
+        energy,
+        motion / (unit * scale),
+        method="trust-exact",
+        jac=slope,
+        hess=curvature,
+        options=options,
+    )
     close = np.abs(found.jac).max() < _NEAR * np.abs(scale * pull).max() / unit
     if close:  # the energy hides in its own rounding how close this is
         closer = root(slope, found.x, jac=curvature)
-        return unit * scale * (closer.x if np.abs(closer.fun).max() < np.abs(found.jac).max() else found.x)
+        return (
+            unit
+            * scale
+            * (
+                closer.x
+                if np.abs(closer.fun).max() < np.abs(found.jac).max()
+                else found.x
+            )
+        )
     return unit * scale * found.x
 
 
 def _held(cells: _BristleField, pull: np.ndarray, motion: np.ndarray) -> float | None:
     """Return a bound below 1 on the share of the load that friction holds, if a motion proves it, or None."""
-    shift, power = cells.levers @ motion, float(pull @ motion)
-    most = (cells.stiffness * (cells.largest * _lengths(shift) + (cells.middle * shift).sum(axis=1))).sum()
+    shift = cells.levers @ motion
+    power = float(pull @ motion)
+    most = (
+        cells.stiffness
+        * (cells.largest * _lengths(shift) + (cells.middle * shift).sum(axis=1))
+    ).sum()
     return float(most / power) if 0.0 <= most < power else None

@@ -55,12 +55,20 @@ _MOST_PROCESSES = 3
 def compiled_together() -> Iterator[None]:
     """Let other processes compile functions of the solver in this block, if they are not on disk yet."""
     functions = () if kernels.advance in _loaded else kernels.FUNCTIONS
-    jobs = {function: i for i, function in enumerate(functions) if missing(function, signature_of(function))}
+    jobs = {
+        function: i
+        for i, function in enumerate(functions)
+        if missing(function, signature_of(function))
+    }
     processes = min(threads.processors() - 1, _MOST_PROCESSES, len(jobs) - 1)
     if processes < 1 or not together.possible():
         yield
         return
-    with together.sharing("from planarfriction.solvers import structured; structured.serve()", jobs, processes):
+    with together.sharing(
+        "from planarfriction.solvers import structured; structured.serve()",
+        jobs,
+        processes,
+    ):
         yield
 
 
@@ -72,7 +80,12 @@ def serve() -> None:
 def start_of(state: np.ndarray) -> Progress:
     """Return the progress of an integration that has yet to begin."""
     clock = np.array([0.0, _FIRST_STEP, np.inf])
-    return Progress(np.array(state, dtype=float), np.zeros(2, np.int64), clock, np.zeros(4, np.int64))
+    return Progress(
+        np.array(state, dtype=float),
+        np.zeros(2, np.int64),
+        clock,
+        np.zeros(4, np.int64),
+    )
 
 
 def tried(at: Progress) -> int:
@@ -120,21 +133,34 @@ def integrate(
     if not (np.isfinite(atol).all() and (atol > 0.0).all()):
         raise InvalidValueError("atol", "be > 0", float(np.min(atol)))
     at = start_of(state)
-    outcome, wall_time, compile_time = kernels.PAUSED, 0.0, 0.0
+    outcome = kernels.PAUSED
+    wall_time = 0.0
+    compile_time = 0.0
     slice_steps = max(20, _STATES_PER_SLICE // len(state))
     try:
         for system in windows:
             if kernels.advance not in _loaded:
                 begin = time.perf_counter()
-                first = kernels.Run(system, method, output, start_of(state), rtol=rtol, atol=atol)
-                kernels.advance(first.address, 0)  # compiles, or loads from the cache, and takes no step
+                first = kernels.Run(
+                    system, method, output, start_of(state), rtol=rtol, atol=atol
+                )
+                kernels.advance(
+                    first.address, 0
+                )  # compiles, or loads from the cache, and takes no step
                 compile_time = time.perf_counter() - begin
                 _loaded.add(kernels.advance)
-            run, breaks = kernels.Run(system, method, output, at, rtol=rtol, atol=atol), system.motion.breaks
-            at.cursor[0], outcome = 0, kernels.PAUSED
+            run = kernels.Run(system, method, output, at, rtol=rtol, atol=atol)
+            breaks = system.motion.breaks
+            at.cursor[0] = 0
+            outcome = kernels.PAUSED
             while outcome == kernels.PAUSED:
-                begin, left = time.perf_counter(), max_steps - tried(at)
-                outcome = kernels.advance(run.address, min(slice_steps, left)) if left > 0 else _STEP_LIMIT
+                begin = time.perf_counter()
+                left = max_steps - tried(at)
+                outcome = (
+                    kernels.advance(run.address, min(slice_steps, left))
+                    if left > 0
+                    else _STEP_LIMIT
+                )
                 wall_time += time.perf_counter() - begin
                 if progress is not None:
                     piece = min(int(at.cursor[0]), len(breaks) - 1)
@@ -147,7 +173,12 @@ def integrate(
             raise
         outcome = kernels.PAUSED
     reached = int(at.cursor[1])
-    kept = Output(*(array[:reached] if len(array) else array for array in output[:-1]), ended=output.ended)
+    kept = Output(
+        *(array[:reached] if len(array) else array for array in output[:-1]),
+        ended=output.ended,
+    )
     status, message = _MESSAGES[int(outcome)]
-    statistics = Statistics(*at.statistics.tolist(), wall_time=wall_time, compile_time=compile_time)
+    statistics = Statistics(
+        *at.statistics.tolist(), wall_time=wall_time, compile_time=compile_time
+    )
     return Integration(kept, status, message, statistics)

@@ -50,7 +50,8 @@ class Bookkeeper:
     """
 
     def __init__(self, grid: Grid, timed: bool, path: str | Path | None = None) -> None:
-        self.grid, self.timed = grid, timed
+        self.grid = grid
+        self.timed = timed
         self.runs: dict[Index, tuple[str, Record]] = {}
         """Keys and records of the runs that have been done."""
         self.found = self.new = self.failed = self.damaged = 0
@@ -100,7 +101,9 @@ class Bookkeeper:
 
     def first_failure(self) -> str:
         """Return the values and the reason of the first run of the grid that failed, in whatever order they ended."""
-        index = min(index for index, (_, record) in self.runs.items() if record.status == FAILED)
+        index = min(
+            index for index, (_, record) in self.runs.items() if record.status == FAILED
+        )
         return f"{self.grid.words(index)}: {self.runs[index][1].reason}"
 
     def flush(self, at_once: bool = False) -> None:
@@ -119,12 +122,21 @@ class Bookkeeper:
         import xarray as xr
 
         variables = self._results()
-        run, status, failure = (np.full(self.grid.shape, text, dtype=object) for text in ("", MISSING, ""))
+        run, status, failure = (
+            np.full(self.grid.shape, text, dtype=object) for text in ("", MISSING, "")
+        )
         for index, (key, record) in self.runs.items():
-            run[index], status[index], failure[index] = key, record.status, record.reason
+            run[index] = key
+            status[index] = record.status
+            failure[index] = record.reason
         for name, texts in (("run", run), ("status", status), ("failure", failure)):
-            variables[name] = History(tuple(self.grid.labels), texts.astype(str), {"long_name": OWN[name]})
-        variables |= {name: ((name,), np.array(labels)) for name, labels in self.grid.labels.items()}
+            variables[name] = History(
+                tuple(self.grid.labels), texts.astype(str), {"long_name": OWN[name]}
+            )
+        variables |= {
+            name: ((name,), np.array(labels))
+            for name, labels in self.grid.labels.items()
+        }
         coordinates = [name for name, each in variables.items() if each[0] == (name,)]
         return xr.Dataset(variables).set_coords(coordinates)
 
@@ -136,15 +148,29 @@ class Bookkeeper:
         if not done:
             return {}
         time = instants(self._ends) if self.timed else None
-        first = done[min(done)].variables if time is None else on_instants(done[min(done)], time)
+        first = (
+            done[min(done)].variables
+            if time is None
+            else on_instants(done[min(done)], time)
+        )
         check_names(self.grid, first)
         axes = [name for name, each in first.items() if each.dims == (name,)]
-        arrays = {name: self._empty(each, len(done)) for name, each in first.items() if name not in axes}
+        arrays = {
+            name: self._empty(each, len(done))
+            for name, each in first.items()
+            if name not in axes
+        }
         for index in sorted(done):
-            found = done[index].variables if time is None else on_instants(done[index], time)
+            found = (
+                done[index].variables
+                if time is None
+                else on_instants(done[index], time)
+            )
             self._place(index, found, first, arrays)
         variables: dict[str, Any] = {
-            name: History((*self.grid.labels, *first[name].dims), values, first[name].attrs)
+            name: History(
+                (*self.grid.labels, *first[name].dims), values, first[name].attrs
+            )
             for name, values in arrays.items()
         }
         return variables | {name: first[name] for name in axes}
@@ -155,14 +181,24 @@ class Bookkeeper:
         shape = (*self.grid.shape, *values.shape)
         if self.grid.size * values.size > MOST_NUMBERS:
             rule = f"need at most {MOST_NUMBERS} numbers in memory (measure less)"
-            raise InvalidValueError("values", rule, f"{self.grid.size} runs of {values.size}")
+            raise InvalidValueError(
+                "values", rule, f"{self.grid.size} runs of {values.size}"
+            )
         if values.dtype.kind == "U":
             return np.full(shape, "", dtype=object)
-        kind = values.dtype if done == self.grid.size or values.dtype.kind in "fc" else np.dtype(float)
+        kind = (
+            values.dtype
+            if done == self.grid.size or values.dtype.kind in "fc"
+            else np.dtype(float)
+        )
         return np.full(shape, np.nan if kind.kind in "fc" else 0, kind)
 
     def _place(
-        self, index: Index, found: Mapping[str, History], first: Mapping[str, History], arrays: dict[str, np.ndarray]
+        self,
+        index: Index,
+        found: Mapping[str, History],
+        first: Mapping[str, History],
+        arrays: dict[str, np.ndarray],
     ) -> None:
         """Write the variables of a run into the arrays, or note that it failed."""
         key, record = self.runs[index]
@@ -171,10 +207,15 @@ class Bookkeeper:
             return
         for name, array in list(arrays.items()):
             values = np.asarray(found[name].values)
-            if array.dtype.kind != "O" and not np.can_cast(values.dtype, array.dtype, "same_kind"):
+            if array.dtype.kind != "O" and not np.can_cast(
+                values.dtype, array.dtype, "same_kind"
+            ):
                 arrays[name] = array = array.astype(np.result_type(array, values))
             array[index] = values
-        self.runs[index] = key, record._replace(variables={})  # they are in the arrays now
+        self.runs[index] = (
+            key,
+            record._replace(variables={}),
+        )  # they are in the arrays now
 
 
 def _name(content: bytes) -> str:
@@ -189,7 +230,9 @@ def instants(ends: Iterable[tuple[float, float]]) -> np.ndarray:
     """Return the times at which any of several runs records [s], from their ends and intervals."""
     from planarfriction.scenes.scene import recording_times
 
-    times = np.unique(np.concatenate([recording_times(*each) for each in sorted(set(ends))]))
+    times = np.unique(
+        np.concatenate([recording_times(*each) for each in sorted(set(ends))])
+    )
     return times[np.diff(times, prepend=-np.inf) > SAME_TIME]
 
 
@@ -200,7 +243,9 @@ def on_instants(record: Record, time: np.ndarray) -> dict[str, History]:
     """
     own = np.asarray(record.variables["time"].values)
     at = np.searchsorted(time, own - SAME_TIME)
-    on = (at < len(time)) & (np.abs(time[np.minimum(at, len(time) - 1)] - own) <= SAME_TIME)
+    on = (at < len(time)) & (
+        np.abs(time[np.minimum(at, len(time) - 1)] - own) <= SAME_TIME
+    )
     result = {}
     for name, each in record.variables.items():
         if name == "time" or "time" not in each.dims:
@@ -218,13 +263,23 @@ def on_instants(record: Record, time: np.ndarray) -> dict[str, History]:
 
 def check_names(grid: Grid, variables: Mapping[str, History]) -> None:
     """Check that no swept quantity has the name of something else."""
-    taken = {*OWN, *variables, *(dim for each in variables.values() for dim in each.dims)}
+    taken = {
+        *OWN,
+        *variables,
+        *(dim for each in variables.values() for dim in each.dims),
+    }
     for name in grid.labels:
         if name in taken:
-            raise InvalidValueError("name of a swept quantity", "not be that of a variable or of its axis", name)
+            raise InvalidValueError(
+                "name of a swept quantity",
+                "not be that of a variable or of its axis",
+                name,
+            )
     for name in OWN:
         if name in variables:
-            raise InvalidValueError("measure", f"not return anything called {', '.join(OWN)}", name)
+            raise InvalidValueError(
+                "measure", f"not return anything called {', '.join(OWN)}", name
+            )
 
 
 def difference(found: Mapping[str, History], first: Mapping[str, History]) -> str:
@@ -232,7 +287,8 @@ def difference(found: Mapping[str, History], first: Mapping[str, History]) -> st
     if found.keys() != first.keys():
         return f"measured {', '.join(found) or 'nothing'} where the first run has {', '.join(first)}"
     for name, each in found.items():
-        mine, other = np.asarray(each.values), np.asarray(first[name].values)
+        mine = np.asarray(each.values)
+        other = np.asarray(first[name].values)
         if mine.shape != other.shape:
             return f"{name} has shape {list(mine.shape)} where the first run has {list(other.shape)}"
         if (mine.dtype.kind == "U") != (other.dtype.kind == "U"):

@@ -29,9 +29,13 @@ KEPT = 32
 @functools.cache
 def library_version() -> str:
     """Return the version of the library with a digest of its sources: other equations make other runs."""
-    root, digest = Path(__file__).parents[1], hashlib.sha256()
+    root = Path(__file__).parents[1]
+    digest = hashlib.sha256()
     for file in sorted(root.rglob("*.py")):
-        digest.update(file.relative_to(root).as_posix().encode() + hashlib.sha256(file.read_bytes()).digest())
+        digest.update(
+            file.relative_to(root).as_posix().encode()
+            + hashlib.sha256(file.read_bytes()).digest()
+        )
     return f"{__version__} {digest.hexdigest()}"
 
 
@@ -41,7 +45,11 @@ def name_of(measure: Any, kept: bool) -> str:
     Raises InvalidValueError for a measurement of kept runs that has no name of its own: a lambda, or a function that
     depends on values from around it.
     """
-    named = isinstance(measure, types.FunctionType) and measure.__name__.isidentifier() and not measure.__closure__
+    named = (
+        isinstance(measure, types.FunctionType)
+        and measure.__name__.isidentifier()
+        and not measure.__closure__
+    )
     if kept and measure is not None and not named:
         rule = "be a function with a name, and without values from around it, if out is given: runs are found by it"
         raise InvalidValueError("measure", rule, measure)
@@ -68,8 +76,16 @@ class Keys:
         """Return the scene with the models of earlier scenes where they are equal."""
         contacts = []
         for contact in scene.contacts:
-            model = _kept(self._models, self._of_part(contact.model), lambda first=contact.model: first)
-            contacts.append(contact if model is contact.model else dataclasses.replace(contact, model=model))
+            model = _kept(
+                self._models,
+                self._of_part(contact.model),
+                lambda first=contact.model: first,
+            )
+            contacts.append(
+                contact
+                if model is contact.model
+                else dataclasses.replace(contact, model=model)
+            )
         same = all(map(operator.is_, contacts, scene.contacts))
         return scene if same else dataclasses.replace(scene, contacts=tuple(contacts))
 
@@ -79,18 +95,26 @@ class Keys:
 
     def _table(self, part: Any) -> dict[str, Any]:
         """Return the digest of a part as the table that stands for it in the plain form of a scene."""
-        if isinstance(part, Signal) and len(part.times) == 1:  # it is shorter than its digest
+        if (
+            isinstance(part, Signal) and len(part.times) == 1
+        ):  # it is shorter than its digest
             return part.to_dict()
         return {"digest": self._of_part(part)}
 
     def _of_part(self, part: Any) -> str:
         """Return the digest of the plain form of a model, a patch or a signal, which is made once."""
-        return _kept(self._digests, id(part), lambda: (part, self._digest_of_part(part)))[1]
+        return _kept(
+            self._digests, id(part), lambda: (part, self._digest_of_part(part))
+        )[1]
 
     def _digest_of_part(self, part: Any) -> str:
         """Digest a model, patch or signal; what has no plain form counts as itself, unless its runs are to be kept."""
         try:
-            return _digest(model_to_dict(part, self._table) if hasattr(part, "patch") else part.to_dict())
+            return _digest(
+                model_to_dict(part, self._table)
+                if hasattr(part, "patch")
+                else part.to_dict()
+            )
         except InvalidValueError:
             if self._kept:
                 raise
@@ -98,7 +122,9 @@ class Keys:
 
 
 def _digest(value: Any) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True).encode(errors="surrogatepass")).hexdigest()[:32]
+    return hashlib.sha256(
+        json.dumps(value, sort_keys=True).encode(errors="surrogatepass")
+    ).hexdigest()[:32]
 
 
 def _kept(held: dict[Any, Any], key: Any, make: Callable[[], Any]) -> Any:

@@ -37,7 +37,11 @@ class Record(NamedTuple):
     """Time at which the run was to end [s]."""
 
 
-def run(scene: Scene, measure: Callable[[Solution], Any] | None, stopped: Callable[[], bool] | None = None) -> Record:
+def run(
+    scene: Scene,
+    measure: Callable[[Solution], Any] | None,
+    stopped: Callable[[], bool] | None = None,
+) -> Record:
     """Simulate a scene and measure it, in any thread or process; errors become part of the record."""
     from planarfriction.scenes import simulate
 
@@ -71,7 +75,8 @@ class Batch:
 
 def run_all(batch: Batch) -> tuple[list[Record], float]:
     """Run scenes until `TURN` is over, at least the first one; returns the records of those that were run, and time."""
-    begin, found = time.monotonic(), []
+    begin = time.monotonic()
+    found = []
     with contextlib.suppress(Stopped):
         for scene in batch.scenes:
             found.append(run(scene, batch.measure, batch.stopped))
@@ -88,14 +93,22 @@ def reason_of(error: BaseException) -> str:
     """Return an error as one line, with its class if it is not one of the library."""
     words = " ".join(str(error).split())
     return one_line(
-        words if isinstance(error, FrictionError) else f"{type(error).__name__}: {words}".removesuffix(": ")
+        words
+        if isinstance(error, FrictionError)
+        else f"{type(error).__name__}: {words}".removesuffix(": ")
     )
 
 
-def variables(found: Any, measure: Callable[..., Any] | None = None) -> dict[str, History]:
+def variables(
+    found: Any, measure: Callable[..., Any] | None = None
+) -> dict[str, History]:
     """Convert the result of a measurement to named arrays: a number, a mapping of names, or an xarray object."""
     if hasattr(found, "data_vars"):  # a Dataset
-        axes = {str(name): found[name] for name in found.coords if found[name].dims == (name,)}
+        axes = {
+            str(name): found[name]
+            for name in found.coords
+            if found[name].dims == (name,)
+        }
         found = {**{str(name): found[name] for name in found.data_vars}, **axes}
     elif not isinstance(found, Mapping):
         name = getattr(measure, "__name__", "")
@@ -103,7 +116,9 @@ def variables(found: Any, measure: Callable[..., Any] | None = None) -> dict[str
         found = {getattr(found, "name", None) or name: found}
     for name in found:
         if not (isinstance(name, str) and name):
-            raise InvalidValueError("measure", "use texts as names of what it returns", name)
+            raise InvalidValueError(
+                "measure", "use texts as names of what it returns", name
+            )
     return {name: _variable(name, value) for name, value in found.items()}
 
 
@@ -111,11 +126,18 @@ def _variable(name: str, value: Any) -> History:
     if isinstance(value, History):
         return value
     if hasattr(value, "dims") and hasattr(value, "attrs"):  # a DataArray
-        values, dims = np.asarray(value.values), tuple(map(str, value.dims))
-        attrs = {str(key): text for key, text in value.attrs.items() if isinstance(text, str)}
+        values = np.asarray(value.values)
+        dims = tuple(map(str, value.dims))
+        attrs = {
+            str(key): text for key, text in value.attrs.items() if isinstance(text, str)
+        }
     else:
-        values, attrs = np.asarray(value), {}
-        dims = tuple(f"{name}_{axis}" if values.ndim > 1 else f"{name}_index" for axis in range(values.ndim))
+        values = np.asarray(value)
+        attrs = {}
+        dims = tuple(
+            f"{name}_{axis}" if values.ndim > 1 else f"{name}_index"
+            for axis in range(values.ndim)
+        )
     if values.dtype.kind not in "biufcU":
         rule = f"return numbers, texts, or arrays of them, which {name!r} is not"
         raise InvalidValueError("measure", rule, type(value).__name__)
@@ -129,14 +151,23 @@ def pack(runs: Mapping[str, Record]) -> bytes:
     """
     groups: dict[Any, list[tuple[str, Record]]] = {}
     for key, record in sorted(runs.items()):  # runs end in any order
-        groups.setdefault(tuple(map(_layout, record.variables.items())), []).append((key, record))
-    meta, arrays = [], {}
+        groups.setdefault(tuple(map(_layout, record.variables.items())), []).append(
+            (key, record)
+        )
+    meta = []
+    arrays = {}
     for number, group in enumerate(groups.values()):
         first = group[0][1].variables
-        outcomes = [[key, record.status, record.reason, record.end] for key, record in group]
-        meta.append([[[name, each.dims, each.attrs] for name, each in first.items()], outcomes])
+        outcomes = [
+            [key, record.status, record.reason, record.end] for key, record in group
+        ]
+        meta.append(
+            [[[name, each.dims, each.attrs] for name, each in first.items()], outcomes]
+        )
         for place, name in enumerate(first):
-            arrays[f"{number}.{place}"] = np.stack([record.variables[name].values for _, record in group])
+            arrays[f"{number}.{place}"] = np.stack(
+                [record.variables[name].values for _, record in group]
+            )
     buffer = io.BytesIO()
     np.savez(buffer, meta=np.frombuffer(json.dumps(meta).encode(), np.uint8), **arrays)
     return buffer.getvalue()
@@ -152,10 +183,18 @@ def unpack(content: bytes) -> dict[str, Record]:
     """Convert the bytes of a file to the records of its runs, by their keys."""
     runs = {}
     with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        for number, (variables, outcomes) in enumerate(json.loads(file["meta"].tobytes())):
-            stacks = [(each, file[f"{number}.{place}"]) for place, each in enumerate(variables)]
+        for number, (variables, outcomes) in enumerate(
+            json.loads(file["meta"].tobytes())
+        ):
+            stacks = [
+                (each, file[f"{number}.{place}"])
+                for place, each in enumerate(variables)
+            ]
             for row, (key, status, reason, end) in enumerate(outcomes):
-                found = {name: History(tuple(dims), stack[row, ...], attrs) for (name, dims, attrs), stack in stacks}
+                found = {
+                    name: History(tuple(dims), stack[row, ...], attrs)
+                    for (name, dims, attrs), stack in stacks
+                }
                 runs[key] = Record(status, reason, found, end)
     return runs
 

@@ -27,7 +27,14 @@ from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupte
 from planarfriction.scenes import Scene, Solution
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index
 from planarfriction.sweeps.keys import Keys
-from planarfriction.sweeps.records import FAILED, TURN, Batch, Record, reason_of, run_all
+from planarfriction.sweeps.records import (
+    FAILED,
+    TURN,
+    Batch,
+    Record,
+    reason_of,
+    run_all,
+)
 from planarfriction.sweeps.settings import Settable, check_takes, grid_of
 
 if TYPE_CHECKING:
@@ -64,9 +71,17 @@ class Progress(NamedTuple):
     """Estimated remaining time [s], from the time of the runs so far; None before the first."""
 
     def __str__(self) -> str:
-        counts = {"found": self.found, "failed": self.failed, "damaged and done again": self.damaged}
+        counts = {
+            "found": self.found,
+            "failed": self.failed,
+            "damaged and done again": self.damaged,
+        }
         words = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-        left = "" if self.left is None or self.done == self.runs else f", {_duration(self.left)} left"
+        left = (
+            ""
+            if self.left is None or self.done == self.runs
+            else f", {_duration(self.left)} left"
+        )
         return f"{self.done} of {self.runs} runs{f' ({words})' if words else ''}{left}"
 
 
@@ -132,7 +147,9 @@ def sweep(
         Ctrl-C; carries the dataset so far. Finished runs stay in `out`.
     """
     if executor is not None and not isinstance(executor, Executor):
-        raise InvalidValueError("executor", "be a concurrent.futures.Executor, or None", executor)
+        raise InvalidValueError(
+            "executor", "be a concurrent.futures.Executor, or None", executor
+        )
     sweeping = Sweeping(make_scene, values, out, measure, progress)
     if isinstance(executor, ProcessPoolExecutor):
         try:
@@ -146,7 +163,9 @@ def sweep(
     except KeyboardInterrupt:
         raise SweepInterrupted(str(sweeping.progress()), book.dataset()) from None
     if book.failed == sweeping.grid.size:  # the mistake is in what all runs share
-        raise SweepError(f"all {book.failed} runs failed; the first: {book.first_failure()}")
+        raise SweepError(
+            f"all {book.failed} runs failed; the first: {book.first_failure()}"
+        )
     return book.dataset()
 
 
@@ -172,7 +191,9 @@ def finished_runs(
 class Sweeping:
     """Sweep in progress: hands out the runs and gives their results to the bookkeeper."""
 
-    def __init__(self, make_scene: Any, values: Any, out: Any, measure: Any, report: Any) -> None:
+    def __init__(
+        self, make_scene: Any, values: Any, out: Any, measure: Any, report: Any
+    ) -> None:
         """Check the arguments of a sweep, and prepare it."""
         self.grid = grid = grid_of(values)
         if callable(make_scene):
@@ -181,27 +202,44 @@ class Sweeping:
             self._make_scene = make = Settable(make_scene)
             make.check(grid.values)
         else:
-            raise InvalidValueError("make_scene", "be a function that returns a Scene, a Scene, or a path", make_scene)
+            raise InvalidValueError(
+                "make_scene",
+                "be a function that returns a Scene, a Scene, or a path",
+                make_scene,
+            )
         for name in OWN:
             if name in grid.labels:
-                raise InvalidValueError("name of a swept quantity", f"not be one of {', '.join(OWN)}", name)
-        for name, given, of in (("measure", measure, "Solution"), ("progress", report, "Progress")):
+                raise InvalidValueError(
+                    "name of a swept quantity", f"not be one of {', '.join(OWN)}", name
+                )
+        for name, given, of in (
+            ("measure", measure, "Solution"),
+            ("progress", report, "Progress"),
+        ):
             if not (given is None or callable(given)):
-                raise InvalidValueError(name, f"be a function of a {of}, or None", given)
-        self._keys, self._measure, self._report = Keys(measure, kept=out is not None), measure, report
+                raise InvalidValueError(
+                    name, f"be a function of a {of}, or None", given
+                )
+        self._keys = Keys(measure, kept=out is not None)
+        self._measure = measure
+        self._report = report
         if out is not None and not str(validation.path("out", out)).isprintable():
-            raise InvalidValueError("out", "be a path of printable characters", ascii(str(out)))
+            raise InvalidValueError(
+                "out", "be a path of printable characters", ascii(str(out))
+            )
         if out is not None and Path(out).suffix == ".zarr":
             rule = "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))"
             raise InvalidValueError("out", rule, str(out))
         self.book = Bookkeeper(grid, measure is None, out)
-        self._ended, self._size = "", 1
+        self._ended = ""
+        self._size = 1
         self._begin = self._reported = time.monotonic()
         self._stopped = threading.Event()
 
     def progress(self) -> Progress:
         """Return the progress so far."""
-        book, runs = self.book, self.grid.size
+        book = self.book
+        runs = self.grid.size
         done = book.found + book.new
         spent = time.monotonic() - self._begin
         left = spent / book.new * (runs - done) if book.new else None
@@ -219,20 +257,32 @@ class Sweeping:
         finally:
             self.book.flush(at_once=True)
 
-    def _go(self, executor: Executor, workers: int | None, stopped: Callable[[], bool] | None) -> None:
+    def _go(
+        self,
+        executor: Executor,
+        workers: int | None,
+        stopped: Callable[[], bool] | None,
+    ) -> None:
         pending: dict[Future, list[_Job]] = {}
         most = workers or _WORKERS
         done: queue.SimpleQueue[Future] = queue.SimpleQueue()
-        jobs, again = self.jobs(), []
+        jobs = self.jobs()
+        again = []
         try:
             while True:
                 batch = []
                 if len(pending) < most * (_AHEAD if self.book.new else 1):
-                    batch = again.pop() if again else list(itertools.islice(jobs, self._share(workers, pending)))
+                    batch = (
+                        again.pop()
+                        if again
+                        else list(itertools.islice(jobs, self._share(workers, pending)))
+                    )
                 if batch:
                     try:
                         scenes = [scene for *_, scene in batch]
-                        future = executor.submit(run_all, Batch(scenes, self._measure, stopped))
+                        future = executor.submit(
+                            run_all, Batch(scenes, self._measure, stopped)
+                        )
                     except RuntimeError as error:  # broken, or shut down
                         raise SweepError(_ENDED.format(reason_of(error))) from None
                     pending[future] = batch
@@ -245,9 +295,18 @@ class Sweeping:
             self._stopped.set()
             for future in pending:
                 future.cancel()
-            if stopped is not None:  # threads of its own, which hand over what they have
+            if (
+                stopped is not None
+            ):  # threads of its own, which hand over what they have
                 wait(pending)
-            self._take([future for future in pending if future.done() and not future.cancelled()], pending)
+            self._take(
+                [
+                    future
+                    for future in pending
+                    if future.done() and not future.cancelled()
+                ],
+                pending,
+            )
             raise
         finally:
             self._tell(at_once=True)
@@ -256,7 +315,12 @@ class Sweeping:
         """Return how many runs to hand out together: fewer towards the end, where workers are to end together."""
         if workers is None:
             return self._size
-        left = self.grid.size - self.book.found - self.book.new - sum(map(len, pending.values()))
+        left = (
+            self.grid.size
+            - self.book.found
+            - self.book.new
+            - sum(map(len, pending.values()))
+        )
         return min(self._size, 1 + left // (_AHEAD * workers))
 
     def jobs(self) -> Iterator[_Job]:
@@ -265,10 +329,17 @@ class Sweeping:
             try:
                 scene = self._make_scene(**values)
             except Exception as error:
-                self.book.add(index, "", Record(FAILED, f"make_scene: {reason_of(error)}", {}), None)
+                self.book.add(
+                    index,
+                    "",
+                    Record(FAILED, f"make_scene: {reason_of(error)}", {}),
+                    None,
+                )
                 continue
             if not isinstance(scene, Scene):
-                raise InvalidValueError("make_scene", "return a Scene", type(scene).__name__)
+                raise InvalidValueError(
+                    "make_scene", "return a Scene", type(scene).__name__
+                )
             scene = self._keys.shared(scene)
             key = self._keys.key(scene)
             if self.book.look_up(index, key, scene):
@@ -276,7 +347,9 @@ class Sweeping:
             else:
                 yield index, key, scene
 
-    def _collect(self, done: queue.SimpleQueue[Future], pending: dict[Future, list[_Job]]) -> list[list[_Job]]:
+    def _collect(
+        self, done: queue.SimpleQueue[Future], pending: dict[Future, list[_Job]]
+    ) -> list[list[_Job]]:
         """Take the runs that are done, or report after a while that none is; returns batches to be handed out again."""
         try:
             found = [done.get(timeout=_BETWEEN)]
@@ -288,7 +361,9 @@ class Sweeping:
         self._tell()
         return again
 
-    def _take(self, done: list[Future], pending: dict[Future, list[_Job]]) -> list[list[_Job]]:
+    def _take(
+        self, done: list[Future], pending: dict[Future, list[_Job]]
+    ) -> list[list[_Job]]:
         """Note the runs of batches that have ended; returns those that were not reached, in batches."""
         again = []
         for future in done:
@@ -298,15 +373,21 @@ class Sweeping:
             if isinstance(error, (BrokenExecutor, CancelledError)):
                 self._ended = _ENDED.format(reason_of(error))
                 continue
-            if isinstance(error, KeyboardInterrupt):  # in a process that heard Ctrl-C too: these runs are not done
+            if isinstance(
+                error, KeyboardInterrupt
+            ):  # in a process that heard Ctrl-C too: these runs are not done
                 continue
             # any other error means that the executor lost the runs, or could not send one of them
             if error is not None:
-                records = [Record(FAILED, reason_of(error), {})] if len(jobs) == 1 else []
+                records = (
+                    [Record(FAILED, reason_of(error), {})] if len(jobs) == 1 else []
+                )
                 size = 1
             else:
                 records, spent = future.result()
-                self._size = size = max(1, min(int(len(records) * TURN / (spent + 1e-9)), _BATCH))
+                self._size = size = max(
+                    1, min(int(len(records) * TURN / (spent + 1e-9)), _BATCH)
+                )
             for (index, key, scene), record in zip(jobs, records, strict=False):
                 self.book.add(index, key, record, scene)
             left = jobs[len(records) :]
@@ -323,4 +404,6 @@ class Sweeping:
             try:
                 self._report(self.progress())
             except Exception as error:
-                raise InvalidValueError("progress", "be a function of a Progress", reason_of(error)) from error
+                raise InvalidValueError(
+                    "progress", "be a function of a Progress", reason_of(error)
+                ) from error

@@ -46,11 +46,20 @@ class Grid:
     def points(self) -> Iterator[tuple[tuple[int, ...], dict[str, Any]]]:
         """Yield the places in the grid, the last quantity fastest, each with its values by name."""
         for index in itertools.product(*map(range, self.shape)):
-            yield index, {name: each[i] for (name, each), i in zip(self.values.items(), index, strict=True)}
+            yield (
+                index,
+                {
+                    name: each[i]
+                    for (name, each), i in zip(self.values.items(), index, strict=True)
+                },
+            )
 
     def words(self, index: tuple[int, ...]) -> str:
         """Describe a point in words: "mass=0.2, pad=disc"."""
-        return ", ".join(f"{name}={shown(each[i])}" for (name, each), i in zip(self.labels.items(), index, strict=True))
+        return ", ".join(
+            f"{name}={shown(each[i])}"
+            for (name, each), i in zip(self.labels.items(), index, strict=True)
+        )
 
 
 def grid_of(values: Any) -> Grid:
@@ -59,12 +68,21 @@ def grid_of(values: Any) -> Grid:
     Raises InvalidValueError for what is neither, for empty lists and for values that are there twice.
     """
     if not isinstance(values, Mapping) or not values:
-        raise InvalidValueError("values", "be a mapping from names to lists of values, not empty", values)
-    labels, behind = {}, {}
+        raise InvalidValueError(
+            "values", "be a mapping from names to lists of values, not empty", values
+        )
+    labels = {}
+    behind = {}
     for name, given in values.items():
         validation.text("name of a swept quantity in values", name)
-        behind[name] = list(given.values()) if isinstance(given, Mapping) else _scalars(name, given)
-        labels[name] = _scalars(name, list(given)) if isinstance(given, Mapping) else behind[name]
+        behind[name] = (
+            list(given.values())
+            if isinstance(given, Mapping)
+            else _scalars(name, given)
+        )
+        labels[name] = (
+            _scalars(name, list(given)) if isinstance(given, Mapping) else behind[name]
+        )
     result = Grid(labels, behind)
     if result.size > MOST_RUNS:
         raise InvalidValueError("values", f"make at most {MOST_RUNS} runs", result.size)
@@ -74,7 +92,9 @@ def grid_of(values: Any) -> Grid:
 def _scalars(name: str, given: Any) -> list[Any]:
     """Return the values of a quantity as plain Python scalars, or raise InvalidValueError."""
     rule = "be a list of numbers, texts or booleans (for other values: a mapping from labels to values)"
-    if isinstance(given, (str, bytes)) or not (isinstance(given, (Sequence, range)) or hasattr(given, "__array__")):
+    if isinstance(given, (str, bytes)) or not (
+        isinstance(given, (Sequence, range)) or hasattr(given, "__array__")
+    ):
         raise InvalidValueError(name, rule, validation.quoted(given))
     if isinstance(given, (list, tuple)) and not _of_one_kind(given):
         raise InvalidValueError(name, rule, given)
@@ -88,21 +108,29 @@ def _scalars(name: str, given: Any) -> list[Any]:
         raise InvalidValueError(name, "be finite", given)
     if len(set(result)) < len(result):
         twice = next(each for each in result if result.count(each) > 1)
-        raise InvalidValueError(name, "have each value once", f"{shown(twice)} {result.count(twice)} times")
+        raise InvalidValueError(
+            name, "have each value once", f"{shown(twice)} {result.count(twice)} times"
+        )
     return result
 
 
 def _of_one_kind(values: Sequence[Any]) -> bool:
     """Return True if all are numbers, or all texts, or all truth values."""
-    return any(all(isinstance(value, kind) for value in values) for kind in (str, (bool, np.bool_))) or all(
-        isinstance(value, (int, float, np.number)) and not isinstance(value, bool) for value in values
+    return any(
+        all(isinstance(value, kind) for value in values)
+        for kind in (str, (bool, np.bool_))
+    ) or all(
+        isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+        for value in values
     )
 
 
 def check_takes(make_scene: Any, names: Sequence[str]) -> Callable[..., Any]:
     """Return `make_scene` if it can be called with these names, or raise InvalidValueError."""
     if not callable(make_scene):
-        raise InvalidValueError("make_scene", "be a function that returns a Scene", make_scene)
+        raise InvalidValueError(
+            "make_scene", "be a function that returns a Scene", make_scene
+        )
     try:
         inspect.signature(make_scene).bind(**dict.fromkeys(names))
     except TypeError as error:
@@ -131,16 +159,22 @@ _FAMILIES: dict[str, tuple[Family, str]] = {
 class Settable:
     """Scene as a table whose values can be set: each call makes the scene of some values."""
 
-    def __init__(self, scene: Scene | str | Path | Mapping[str, Any], others: Sequence[str] = ()) -> None:
+    def __init__(
+        self, scene: Scene | str | Path | Mapping[str, Any], others: Sequence[str] = ()
+    ) -> None:
         """Read the table of a scene, or of a scene file; `others` are names that messages list too.
 
         Raises FileError for a file that holds no table.
         """
-        self._source, self._folder, self._others = "scene", None, others
+        self._source = "scene"
+        self._folder = None
+        self._others = others
         self._table: Any = scene.to_dict() if isinstance(scene, Scene) else scene
         if not isinstance(self._table, Mapping):
             path = validation.path("scene", scene)
-            self._table, self._source, self._folder = read_table(path), str(path), path.parent
+            self._table = read_table(path)
+            self._source = str(path)
+            self._folder = path.parent
             if not isinstance(self._table, dict):
                 Scene.from_dict(self._table, source=self._source)  # says what is wrong
 
@@ -160,48 +194,91 @@ class Settable:
         except FrictionError:
             self(**{path: each[-1] for path, each in values.items()})
 
-    def _changed(self, table: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
+    def _changed(
+        self, table: Mapping[str, Any], path: str, value: Any
+    ) -> dict[str, Any]:
         tables = table.get("contact", [])
         tables = tables if isinstance(tables, list) else [tables]
-        default = "contact" if len(tables) == 1 else "contact {}"  # as a solution names them
-        given = [each.get("name") if isinstance(each, Mapping) else None for each in tables]
-        names = [str(name or default.format(number)) for number, name in enumerate(given, 1)]
+        default = (
+            "contact" if len(tables) == 1 else "contact {}"
+        )  # as a solution names them
+        given = [
+            each.get("name") if isinstance(each, Mapping) else None for each in tables
+        ]
+        names = [
+            str(name or default.format(number)) for number, name in enumerate(given, 1)
+        ]
         for number, name in enumerate(names):
             if path.startswith(f"{name}."):
                 parts = path[len(name) + 1 :].split(".")
                 changed = _set(tables[number], parts, value, path, name, CONTACT_KEYS)
-                return {**table, "contact": [*tables[:number], changed, *tables[number + 1 :]]}
+                return {
+                    **table,
+                    "contact": [*tables[:number], changed, *tables[number + 1 :]],
+                }
         if path in ("body", *names):
-            there = ", ".join(f"{path}.{key}" for key in (BODY_KEYS if path == "body" else CONTACT_KEYS))
-            raise InvalidValueError(path, f"be one value, not a table of them: {there}", "the table")
+            there = ", ".join(
+                f"{path}.{key}"
+                for key in (BODY_KEYS if path == "body" else CONTACT_KEYS)
+            )
+            raise InvalidValueError(
+                path, f"be one value, not a table of them: {there}", "the table"
+            )
         keys = [key for key in SCENE_KEYS if key != "contact"]
-        return _set(table, path.split("."), value, path, "the scene", [*keys, *names, *self._others])
+        return _set(
+            table,
+            path.split("."),
+            value,
+            path,
+            "the scene",
+            [*keys, *names, *self._others],
+        )
 
 
-def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid: Sequence[str] | None = None) -> Any:
+def _set(
+    table: Any,
+    parts: list[str],
+    value: Any,
+    path: str,
+    where: str,
+    valid: Sequence[str] | None = None,
+) -> Any:
     """Return a copy of a table, or of a list, with a value changed; other parts are shared."""
     key, *rest = parts
     if isinstance(table, list):
         if not (key.isdecimal() and int(key) < len(table)):
-            raise InvalidValueError(path, f"be an index from 0 to {len(table) - 1} in {where}", repr(key))
+            raise InvalidValueError(
+                path, f"be an index from 0 to {len(table) - 1} in {where}", repr(key)
+            )
         number = int(key)
-        inner = _set(table[number], rest, value, path, f"{where}.{key}") if rest else value
+        inner = (
+            _set(table[number], rest, value, path, f"{where}.{key}") if rest else value
+        )
         return [*table[:number], inner, *table[number + 1 :]]
     if not isinstance(table, Mapping):
-        raise InvalidValueError(path, f"end at {where}, which is {shown(table)}", f"{key!r} after it")
+        raise InvalidValueError(
+            path, f"end at {where}, which is {shown(table)}", f"{key!r} after it"
+        )
     valid = list(table) if valid is None else list(dict.fromkeys(valid))
     if key not in valid:
         given = f"{key!r}{validation.hint(key, valid)}"
-        raise InvalidValueError(path, f"name a value of the scene: {where} has {', '.join(valid)}", given)
+        raise InvalidValueError(
+            path, f"name a value of the scene: {where} has {', '.join(valid)}", given
+        )
     name = key if where == "the scene" else f"{where}.{key}"
     if not rest:
         return {**table, key: value}
     if key not in table:
-        raise InvalidValueError(path, f"name an existing table: {where} has no {key!r}", repr(key))
+        raise InvalidValueError(
+            path, f"name an existing table: {where} has no {key!r}", repr(key)
+        )
     inner = table[key]
     if isinstance(inner, str) and key in _BY_NAME:
         inner = {_BY_NAME[key]: inner}
-    return {**table, key: _set(inner, rest, value, path, name, _keys(key, inner, rest[0]))}
+    return {
+        **table,
+        key: _set(inner, rest, value, path, name, _keys(key, inner, rest[0])),
+    }
 
 
 def _keys(key: str, table: Any, wanted: str) -> list[str] | None:
@@ -215,9 +292,21 @@ def _keys(key: str, table: Any, wanted: str) -> list[str] | None:
     if family is None or not isinstance(table, Mapping):
         return None
     make = family.get(table.get(kind, "lugre"))
-    more = [] if make is None else [name for name in inspect.signature(make).parameters if name not in ("patch", "law")]
+    more = (
+        []
+        if make is None
+        else [
+            name
+            for name in inspect.signature(make).parameters
+            if name not in ("patch", "law")
+        ]
+    )
     more += [wanted] if wanted in getattr(make, "REPLACED", ()) else []
-    return list(dict.fromkeys([kind, *more, *table, *(("metric", "asymmetry") if key == "patch" else ())]))
+    return list(
+        dict.fromkeys(
+            [kind, *more, *table, *(("metric", "asymmetry") if key == "patch" else ())]
+        )
+    )
 
 
 # ---------------------------------------------------------------------- as a command line spells them
@@ -231,18 +320,30 @@ def parse(text: str) -> tuple[str, dict[Any, Any]]:
     Raises InvalidValueError in one line.
     """
     path, equals, spelled = text.partition("=")
-    path, spelled = path.strip(), spelled.strip()
+    path = path.strip()
+    spelled = spelled.strip()
     if not (path and equals and spelled):
-        raise InvalidValueError("--set", "be PATH=VALUE, PATH=VALUE,VALUE,... or PATH=START:STOP:COUNT", repr(text))
+        raise InvalidValueError(
+            "--set",
+            "be PATH=VALUE, PATH=VALUE,VALUE,... or PATH=START:STOP:COUNT",
+            repr(text),
+        )
     if re.fullmatch(r"[^:\[\]{}\"']*:[^:]*:[^:]*", spelled):
         values = _spaced(path, spelled)
         return path, dict(zip(values, values, strict=True))
     pieces = _separated(spelled)
     values = [_value(path, each) for each in pieces]
-    labels = [each if isinstance(value, (list, dict)) else value for each, value in zip(pieces, values, strict=True)]
+    labels = [
+        each if isinstance(value, (list, dict)) else value
+        for each, value in zip(pieces, values, strict=True)
+    ]
     for label in labels:
         if labels.count(label) > 1:
-            raise InvalidValueError(f"--set {path}", "have each value once", f"{label} {labels.count(label)} times")
+            raise InvalidValueError(
+                f"--set {path}",
+                "have each value once",
+                f"{label} {labels.count(label)} times",
+            )
     return path, dict(zip(labels, values, strict=True))
 
 
@@ -263,20 +364,24 @@ def _spaced(path: str, spelled: str) -> list[float]:
     try:
         count = int(number)
     except ValueError:
-        raise InvalidValueError(f"--set {path}", "be START:STOP:COUNT with a whole number as COUNT", spelled) from None
+        raise InvalidValueError(
+            f"--set {path}", "be START:STOP:COUNT with a whole number as COUNT", spelled
+        ) from None
     validation.count(f"COUNT of --set {path}", count, 2, MOST_VALUES)
-    start, stop = (
-        validation.number_in(f"START of --set {path}", first),
-        validation.number_in(f"STOP of --set {path}", last),
-    )
+    start = validation.number_in(f"START of --set {path}", first)
+    stop = validation.number_in(f"STOP of --set {path}", last)
     if start == stop:
-        raise InvalidValueError(f"--set {path}", "have a STOP that differs from START", spelled)
+        raise InvalidValueError(
+            f"--set {path}", "have a STOP that differs from START", spelled
+        )
     return np.linspace(start, stop, count).tolist()
 
 
 def _separated(spelled: str) -> list[str]:
     """Split at commas that are in no brackets and no quotes."""
-    pieces, depth, quote = [""], 0, ""
+    pieces = [""]
+    depth = 0
+    quote = ""
     for letter in spelled:
         if letter in "\"'" and quote in ("", letter):
             quote = "" if quote else letter
@@ -290,12 +395,16 @@ def _separated(spelled: str) -> list[str]:
 
 def _value(path: str, spelled: str) -> Any:
     if not spelled:
-        raise InvalidValueError(f"--set {path}", "have a value between commas", repr(spelled))
+        raise InvalidValueError(
+            f"--set {path}", "have a value between commas", repr(spelled)
+        )
     if spelled[0] in "[{\"'":
         try:
             return tomllib.loads(f"value = {spelled}")["value"]
         except (ValueError, RecursionError):
-            raise InvalidValueError(f"--set {path}", "be a list or a text as in TOML", spelled) from None
+            raise InvalidValueError(
+                f"--set {path}", "be a list or a text as in TOML", spelled
+            ) from None
     if spelled in ("true", "false"):
         return spelled == "true"
     try:

@@ -53,7 +53,9 @@ class Cells(NamedTuple):
     """Digits of the positions, x then y [m], that the numbers of `levers` have no room for, `[2, N]`."""
 
 
-def cells_of(patch: ContactPatch, law: Any, normal_force: float | None, precision: Any) -> Cells:
+def cells_of(
+    patch: ContactPatch, law: Any, normal_force: float | None, precision: Any
+) -> Cells:
     """Return the cells of a patch at a load [N] as NumPy arrays, for levers of a number type of NumPy."""
     numbers = DistributedModel(patch, law).compiled.numbers()
     if patch.anisotropic and not patch.asymmetric:
@@ -80,8 +82,11 @@ def _numbers(shape: Cells) -> tuple[Any, Any]:
 
 def _bristle(xp, name: str, law: Any, shape: Cells, z, u, *dt):
     """Return two arrays `[..., d, N]`, the results of a function of the bristles."""
-    kind, (_, asymmetry) = KINDS[len(shape.levers)], _numbers(shape)
-    vector = Vector if kind.bristles == 2 else split  # the source of discs names components
+    kind = KINDS[len(shape.levers)]
+    (_, asymmetry) = _numbers(shape)
+    vector = (
+        Vector if kind.bristles == 2 else split
+    )  # the source of discs names components
     law = law if asymmetry is None else Leaning(law, asymmetry)
     found = xp.over(getattr(kind, name))(law, vector(z), vector(u), *dt)
     return tuple(joined(xp, each) for each in found)
@@ -134,5 +139,7 @@ def advance(xp, law: LawNumbers, shape: Cells, z, by, dt):
 
 def wrench(xp, shape: Cells, pull):
     """Return the wrench about the origin per unit load `[..., 3]`."""
-    found = xp.over(KINDS[len(shape.levers)].lever.wrench)(_numbers(shape)[0], split(shape.weights * pull))
+    found = xp.over(KINDS[len(shape.levers)].lever.wrench)(
+        _numbers(shape)[0], split(shape.weights * pull)
+    )
     return xp.concatenate([each.sum(-1) for each in found], -1)

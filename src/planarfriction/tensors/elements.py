@@ -45,14 +45,20 @@ def split(array: Any) -> tuple[Any, ...]:
 
 def joined(xp: Any, vector: Any) -> Any:
     """Return a vector as an array `[..., d, N]`."""
-    return vector.array if isinstance(vector, Vector) else xp.concatenate(xp.broadcast_arrays(*vector), -2)
+    return (
+        vector.array
+        if isinstance(vector, Vector)
+        else xp.concatenate(xp.broadcast_arrays(*vector), -2)
+    )
 
 
 class Placed:
     """Size of a table, with places in it that are known: cells about which numbers were read count as the first."""
 
     def __init__(self, size: int, place: tuple[Any, ...]) -> None:
-        self.size, self.cell, self.place = size, place[:2], (0, 0, *place[2:])
+        self.size = size
+        self.cell = place[:2]
+        self.place = (0, 0, *place[2:])
 
     def __add__(self, other: Any) -> Any:
         return self.size + other
@@ -74,7 +80,8 @@ def _place(xp: Any, size: Any, x: Any, y: Any, s: Any) -> tuple[Any, ...]:
     azimuth = xp.arctan2(xp.where(on_axis, 0.0, y), xp.where(on_axis, 1.0, x))
     azimuth = xp.where(azimuth < 0.0, azimuth + 2.0 * math.pi, azimuth)
     a, b = (size / (0.5 * math.pi) * each for each in (polar, azimuth))
-    i, j = xp.whole(a, size - 1), xp.whole(b, 4 * size - 1)
+    i = xp.whole(a, size - 1)
+    j = xp.whole(b, 4 * size - 1)
     return i, j, a - i, b - j, polar, azimuth
 
 
@@ -116,7 +123,11 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
 
     def through(root: Any, x: Any, y: Any) -> tuple[Any, Any]:
         """Return `published_contact.through`, without a metric if there is none."""
-        return (x, y) if root is None else (root.xx * x + root.xy * y, root.xy * x + root.yy * y)
+        return (
+            (x, y)
+            if root is None
+            else (root.xx * x + root.xy * y, root.xy * x + root.yy * y)
+        )
 
     def disc_friction(_: Any, slide: Any, spin: Any) -> Any:
         """Return `formulas.disc_friction` in a unit of speed that keeps squares and their slopes in range."""
@@ -126,7 +137,12 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
 
     return [
         (compiled_math, xp),
-        (math, SimpleNamespace(sqrt=xp.root, sin=xp.sin, cos=xp.cos, inf=math.inf, pi=math.pi)),
+        (
+            math,
+            SimpleNamespace(
+                sqrt=xp.root, sin=xp.sin, cos=xp.cos, inf=math.inf, pi=math.pi
+            ),
+        ),
         (vectors.plus, plus),
         (vectors.times, times),
         (vectors.dot, dot),
@@ -137,5 +153,8 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         (rules.per, per),
         (rules.ratio, ratio),
         (bristle_step.cap, lambda x, most: sloping(formulas.cap(xp, x, most), x, most)),
-        (bristle_step.reachable, lambda x, law: formulas.reachable_deflection(xp, sloping(x, x, 1.0), law)),
+        (
+            bristle_step.reachable,
+            lambda x, law: formulas.reachable_deflection(xp, sloping(x, x, 1.0), law),
+        ),
     ]

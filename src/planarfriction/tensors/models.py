@@ -39,8 +39,12 @@ class CellsModel(TensorModel):
         weights = self.xp.to_numpy(self.weights)
         cells = patch if patch.cells <= len(weights) else patch.discs(len(weights))
         if cells.cells != len(weights):
-            raise InvalidValueError("patch", f"have the {len(weights)} cells of the model", cells.cells)
-        return dataclasses.replace(cells, pressure=weights / cells.areas, point_shares=None)
+            raise InvalidValueError(
+                "patch", f"have the {len(weights)} cells of the model", cells.cells
+            )
+        return dataclasses.replace(
+            cells, pressure=weights / cells.areas, point_shares=None
+        )
 
     def _shape(self, values: Mapping[str, Any]) -> distributed.Cells:
         return distributed.Cells(self.positions, self.weights, self.remainder)
@@ -59,8 +63,18 @@ class PublishedModel(TensorModel):
         return published.numbers_of(self.xp, values, self.surface, self.root)
 
 
-def few_discs(name: str, patch: ContactPatch, law: FrictionLaw, cells: int, options: dict[str, Any]) -> ContactPatch:
+def few_discs(
+    name: str,
+    patch: ContactPatch,
+    law: FrictionLaw,
+    cells: int,
+    options: dict[str, Any],
+) -> ContactPatch:
     """Return the discs on which the reduced model `name` is the distributed one, and take its settings from options."""
     TensorModel.refuse(patch, law, name)
-    replaced = {each: options.pop(each) for each in models.ReducedModel.REPLACED if each in options}
+    replaced = {
+        each: options.pop(each)
+        for each in models.ReducedModel.REPLACED
+        if each in options
+    }
     return models.ReducedModel(patch, law, cells=cells, **replaced).reduction.patch

@@ -17,7 +17,19 @@ from planarfriction.families import MODELS
 from planarfriction.tensors.elements import over
 
 _SAME = (
-    *("exp", "sin", "cos", "sqrt", "log", "pow", "arctan2", "clip", "finfo", "ones_like", "full_like"),
+    *(
+        "exp",
+        "sin",
+        "cos",
+        "sqrt",
+        "log",
+        "pow",
+        "arctan2",
+        "clip",
+        "finfo",
+        "ones_like",
+        "full_like",
+    ),
     *("stack", "concatenate", "moveaxis", "broadcast_to", "broadcast_shapes"),
 )
 """Functions that PyTorch and JAX have with the same name and the same leading arguments."""
@@ -53,7 +65,11 @@ class Namespace:
 
     def where(self, condition: Any, a: Any, b: Any) -> Any:
         """Return `a` where the condition holds, else `b`; a plain bool selects one of them as it is."""
-        return (a if condition else b) if isinstance(condition, bool) else self._where(condition, a, b)
+        return (
+            (a if condition else b)
+            if isinstance(condition, bool)
+            else self._where(condition, a, b)
+        )
 
     def minimum(self, a: Any, b: Any) -> Any:
         """Return the smaller of two numbers; at a tie the first one, with its derivative."""
@@ -72,7 +88,9 @@ class Namespace:
         moving = x > 0.0
         within = moving & (exponent * self.log(self._where(moving, x, 1.0)) < limit)
         largest = self._where(moving, self.full_like(x, math.exp(limit)), 0.0)
-        return self._where(within, self.pow(self._where(within, x, 1.0), exponent), largest)
+        return self._where(
+            within, self.pow(self._where(within, x, 1.0), exponent), largest
+        )
 
     def dot(self, a: Any, b: Any, axis: int) -> Any:
         """Return `a . b` along an axis, which stays with length 1."""
@@ -110,7 +128,9 @@ def non_negative(xp: Any, name: str, value: Any) -> Any:
     """Return `value`; raise InvalidValueError if it can be read and is below zero, else replace what is by zero."""
     extremes = xp.extremes(name, value)
     if extremes is None:
-        return xp.where(value < 0.0, 0.0, value)  # not a maximum, which of NaN and zero takes zero
+        return xp.where(
+            value < 0.0, 0.0, value
+        )  # not a maximum, which of NaN and zero takes zero
     if extremes[0] < 0.0:
         raise InvalidValueError(name, "be >= 0", extremes[0])
     return value
@@ -128,11 +148,15 @@ def shaped(name: str, value: Any, inner: tuple[int, ...]) -> Any:
     """Return `value` `[..., *inner]`; raise InvalidValueError if its last axes have other lengths."""
     if tuple(value.shape[max(value.ndim - len(inner), 0) :]) != tuple(inner):
         wanted = ", ".join(map(str, inner))
-        raise InvalidValueError(name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}")
+        raise InvalidValueError(
+            name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}"
+        )
     return value
 
 
-def broadcast(xp: Any, subject: str, rule: str, shapes: Mapping[str, Any]) -> tuple[int, ...]:
+def broadcast(
+    xp: Any, subject: str, rule: str, shapes: Mapping[str, Any]
+) -> tuple[int, ...]:
     """Return the common shape of `shapes` by name; raise InvalidValueError, `subject must rule`, if there is none."""
     try:
         return xp.broadcast_shapes(*shapes.values())
@@ -142,7 +166,14 @@ def broadcast(xp: Any, subject: str, rule: str, shapes: Mapping[str, Any]) -> tu
 
 
 def rollout_inputs(
-    model: Any, kind: type, front: str, state: Any, twist: Any, normal_force: Any, dt: Any, method: str | None
+    model: Any,
+    kind: type,
+    front: str,
+    state: Any,
+    twist: Any,
+    normal_force: Any,
+    dt: Any,
+    method: str | None,
 ) -> tuple[Any, Any, Any, Any]:
     """Return state (at rest if None), twist `[..., T, 3]`, load `[..., T]` and dt, whose batch axes broadcast.
 
@@ -150,21 +181,41 @@ def rollout_inputs(
     """
     if not isinstance(model, kind):
         given = f"{type(model).__module__}.{type(model).__name__}"
-        raise InvalidValueError("model", f"be one of {front} ({MODELS.classes()})", given)
+        raise InvalidValueError(
+            "model", f"be one of {front} ({MODELS.classes()})", given
+        )
     if method is not None:
         validation.choice("method", method, METHODS)
     xp = model.xp
-    twist, dt = model._number("twist", twist), model._number("dt", dt)
+    twist = model._number("twist", twist)
+    dt = model._number("dt", dt)
     load = model._number("normal_force", normal_force)
     if twist.ndim < 2 or twist.shape[-1] != 3:
-        raise InvalidValueError("twist", "have shape [..., T, 3]", f"shape {list(twist.shape)}")
+        raise InvalidValueError(
+            "twist", "have shape [..., T, 3]", f"shape {list(twist.shape)}"
+        )
     inner = model.state_shape
-    start = model.rest() if state is None else shaped("state", model._number("state", state), inner)
-    start, twist = finite(xp, "state", start), finite(xp, "twist", twist)
-    load, dt = non_negative(xp, "normal_force", load), non_negative(xp, "dt", dt)
+    start = (
+        model.rest()
+        if state is None
+        else shaped("state", model._number("state", state), inner)
+    )
+    start = finite(xp, "state", start)
+    twist = finite(xp, "twist", twist)
+    load = non_negative(xp, "normal_force", load)
+    dt = non_negative(xp, "dt", dt)
     steps = twist.shape[-2:-1]
-    shape = broadcast(xp, "normal_force", f"broadcast with [..., {steps[0]}]", {"load": load.shape, "twist": steps})
+    shape = broadcast(
+        xp,
+        "normal_force",
+        f"broadcast with [..., {steps[0]}]",
+        {"load": load.shape, "twist": steps},
+    )
     batch = start.shape[: start.ndim - len(inner)]
-    shapes = {"state": (*batch, 1), "twist": twist.shape[:-1], "normal_force": load.shape}
+    shapes = {
+        "state": (*batch, 1),
+        "twist": twist.shape[:-1],
+        "normal_force": load.shape,
+    }
     broadcast(xp, "batch axes", "broadcast", shapes)
     return start, twist, xp.broadcast_to(load, shape), dt

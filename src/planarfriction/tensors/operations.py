@@ -20,7 +20,13 @@ from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.scene import MAX_STEPS, Scene
-from planarfriction.tensors.namespace import broadcast, finite, non_negative, positive, shaped
+from planarfriction.tensors.namespace import (
+    broadcast,
+    finite,
+    non_negative,
+    positive,
+    shaped,
+)
 
 Arrays = Sequence[Any]
 
@@ -52,29 +58,50 @@ class RolloutOperation(NamedTuple):
         """Return the last state and the wrenches, and with `keep` the states before each step."""
         state, twist, load, parameters, *weights = inputs
         roll = derivatives.rollout_states if keep else derivatives.rollout
-        found = roll(self.pack(*weights, *held[1:]), state, twist, load, float(held[0]), parameters=parameters)
+        found = roll(
+            self.pack(*weights, *held[1:]),
+            state,
+            twist,
+            load,
+            float(held[0]),
+            parameters=parameters,
+        )
         return found[:2], found[2:]
 
     def push(self, held: Arrays, inputs: Arrays, changes: Arrays) -> Arrays:
         """Return the changes of the last state and of the wrenches, which are linear in the weights."""
-        (state, twist, load, parameters, *weights), tangent = inputs, derivatives.RolloutTangent(*changes[:4])
-        given, more = (state, twist, load, float(held[0])), {"parameters": parameters}
-        *_, end, wrenches = derivatives.rollout_jvp(self.pack(*weights, *held[1:]), *given, tangent, **more)
+        (state, twist, load, parameters, *weights) = inputs
+        tangent = derivatives.RolloutTangent(*changes[:4])
+        given = (state, twist, load, float(held[0]))
+        more = {"parameters": parameters}
+        *_, end, wrenches = derivatives.rollout_jvp(
+            self.pack(*weights, *held[1:]), *given, tangent, **more
+        )
         if self.cells and changes[4].any():
-            wrenches = wrenches + derivatives.rollout(self.pack(changes[4], *held[1:]), *given, **more).wrenches
+            wrenches = (
+                wrenches
+                + derivatives.rollout(
+                    self.pack(changes[4], *held[1:]), *given, **more
+                ).wrenches
+            )
         return end, wrenches
 
     def pull(self, held: Arrays, inputs: Arrays, bars: Arrays, kept: Arrays) -> Arrays:
         """Return the cotangents of state, twist, load, parameters and any weights."""
-        (state, twist, load, parameters, *weights), step = inputs, float(held[0])
+        (state, twist, load, parameters, *weights) = inputs
+        step = float(held[0])
         more = {"parameters": parameters, "states": kept[0] if kept else None}
         model = self.pack(*weights, *held[1:])
-        found = derivatives.rollout_vjp(model, state, twist, load, step, bars[1], bars[0], **more)
+        found = derivatives.rollout_vjp(
+            model, state, twist, load, step, bars[1], bars[0], **more
+        )
         if not self.cells:
             return found
         if not self.weighs:
             return *found, np.zeros(weights[0].shape)
-        return *found, weights_vjp(model, state, twist, load, step, bars[1], weights[0], **more)
+        return *found, weights_vjp(
+            model, state, twist, load, step, bars[1], weights[0], **more
+        )
 
 
 class SceneOperation(NamedTuple):
@@ -85,7 +112,8 @@ class SceneOperation(NamedTuple):
     """Simulations that have been run, for `pull`; None to simulate once more."""
     inner = (1,)
     outer = (2, 3)
-    like, keeps = 0, False
+    like = 0
+    keeps = False
     """Index of the input whose number type results have; True if `run` keeps arrays for `pull`."""
 
     def shapes(self, numbers: Any) -> list[tuple[int, ...]]:
@@ -95,7 +123,9 @@ class SceneOperation(NamedTuple):
     def run(self, held: Arrays, inputs: Arrays, keep: bool) -> tuple[Arrays, Arrays]:
         """Return motion and wrenches."""
         batch, rows = _rows(inputs, self.inner)
-        return _shaped(batch, self.function.run(rows[0], self.memory if keep else None)), ()
+        return _shaped(
+            batch, self.function.run(rows[0], self.memory if keep else None)
+        ), ()
 
     def push(self, held: Arrays, inputs: Arrays, changes: Arrays) -> Arrays:
         """Return the changes of motion and wrenches."""
@@ -105,15 +135,26 @@ class SceneOperation(NamedTuple):
     def pull(self, held: Arrays, inputs: Arrays, bars: Arrays, kept: Arrays) -> Arrays:
         """Return the cotangent of the numbers."""
         batch, rows = _rows((*inputs, *bars), (*self.inner, *self.outer))
-        return _shaped(batch, (self.function.pull(rows[0], rows[1], rows[2], self.memory),))
+        return _shaped(
+            batch, (self.function.pull(rows[0], rows[1], rows[2], self.memory),)
+        )
 
 
-def _rows(arrays: Arrays, inner: Sequence[int]) -> tuple[tuple[int, ...], list[np.ndarray]]:
+def _rows(
+    arrays: Arrays, inner: Sequence[int]
+) -> tuple[tuple[int, ...], list[np.ndarray]]:
     """Return the common batch axes of arrays, and the arrays with one axis instead of these."""
-    each = [(array, array.ndim - axes) for array, axes in zip(arrays, inner, strict=True)]
+    each = [
+        (array, array.ndim - axes) for array, axes in zip(arrays, inner, strict=True)
+    ]
     batch = np.broadcast_shapes(*(array.shape[:own] for array, own in each))
-    full = [(np.broadcast_to(array, (*batch, *array.shape[own:])), array.shape[own:]) for array, own in each]
-    return batch, [np.ascontiguousarray(array).reshape(-1, *shape) for array, shape in full]
+    full = [
+        (np.broadcast_to(array, (*batch, *array.shape[own:])), array.shape[own:])
+        for array, own in each
+    ]
+    return batch, [
+        np.ascontiguousarray(array).reshape(-1, *shape) for array, shape in full
+    ]
 
 
 def _shaped(batch: tuple[int, ...], arrays: Arrays) -> Arrays:
@@ -132,7 +173,9 @@ class SceneMotion(NamedTuple):
     """Wrench of one of the identical contacts `[..., M, C, 3]` [N, N, N m]."""
 
 
-def simulator(xp: Any, call: Callable[..., Sequence[Any]]) -> Callable[..., SceneMotion]:
+def simulator(
+    xp: Any, call: Callable[..., Sequence[Any]]
+) -> Callable[..., SceneMotion]:
     """Return `simulate_scene` of a front end, whose `call(function, numbers)` returns motion and wrenches."""
 
     def simulate_scene(
@@ -161,8 +204,16 @@ def simulator(xp: Any, call: Callable[..., Sequence[Any]]) -> Callable[..., Scen
         Raises `InvalidValueError` for names and numbers out of range, and `SolverError` if the solver fails; inside
         `jax.jit` these end in an error of JAX whose last line names them.
         """
-        options = {"t_end": t_end, "rtol": rtol, "atol": atol, "save_every": save_every, "max_steps": max_steps}
-        function, numbers = scene_function(xp, scene, parameters, signals, initial, **options)
+        options = {
+            "t_end": t_end,
+            "rtol": rtol,
+            "atol": atol,
+            "save_every": save_every,
+            "max_steps": max_steps,
+        }
+        function, numbers = scene_function(
+            xp, scene, parameters, signals, initial, **options
+        )
         motion, wrenches = call(function, numbers)
         return SceneMotion(xp.from_numpy(function.time, numbers), motion, wrenches)
 
@@ -181,23 +232,40 @@ def scene_function(
 
     Raises InvalidValueError for names and numbers out of range.
     """
-    parameters, signals, initial = parameters or {}, signals or {}, initial or {}
+    parameters = parameters or {}
+    signals = signals or {}
+    initial = initial or {}
     for name, pair in signals.items():
         if not (isinstance(pair, Sequence) and len(pair) == 2):
-            raise InvalidValueError(f"signals of {name}", "be a pair of times and values", pair)
+            raise InvalidValueError(
+                f"signals of {name}", "be a pair of times and values", pair
+            )
     knots = {name: xp.to_numpy(times) for name, (times, _) in signals.items()}
     function = SceneFunction(scene, tuple(parameters), knots, tuple(initial), **options)
-    factors = [positive(xp, name, xp.real(name, value))[..., None] for name, value in parameters.items()]
-    start = [finite(xp, name, xp.real(name, value))[..., None] for name, value in initial.items()]
+    factors = [
+        positive(xp, name, xp.real(name, value))[..., None]
+        for name, value in parameters.items()
+    ]
+    start = [
+        finite(xp, name, xp.real(name, value))[..., None]
+        for name, value in initial.items()
+    ]
     arrays = dict(zip((*parameters, *initial), (*factors, *start), strict=True))
     for name, (_, values) in signals.items():
-        of_name, shape = f"values of {name}", function.shapes[name]
+        of_name = f"values of {name}"
+        shape = function.shapes[name]
         array = shaped(of_name, xp.real(of_name, values), shape)
-        check = non_negative if len(shape) == 1 else finite  # a load; a force or a velocity
-        arrays[name] = check(xp, of_name, array).reshape(*array.shape[: array.ndim - len(shape)], -1)
+        check = (
+            non_negative if len(shape) == 1 else finite
+        )  # a load; a force or a velocity
+        arrays[name] = check(xp, of_name, array).reshape(
+            *array.shape[: array.ndim - len(shape)], -1
+        )
     if not arrays:
         return function, xp.real("numbers", [])
     shapes = {name: array.shape[:-1] for name, array in arrays.items()}
     batch = broadcast(xp, "the numbers of a scene", "have axes that broadcast", shapes)
-    wide = [xp.broadcast_to(array, (*batch, array.shape[-1])) for array in arrays.values()]
+    wide = [
+        xp.broadcast_to(array, (*batch, array.shape[-1])) for array in arrays.values()
+    ]
     return function, xp.concatenate(wide, -1)

@@ -17,20 +17,32 @@ from planarfriction.tensors.distributed import Cells, positions_of
 
 def centre_of(xp: Any, moments: Any, load: Any) -> Any:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
-    return xp.stack(xp.over(tilt.centre)(moments[..., 0], moments[..., 1], xp.where(load > 0.0, load, math.inf)), -1)
+    return xp.stack(
+        xp.over(tilt.centre)(
+            moments[..., 0], moments[..., 1], xp.where(load > 0.0, load, math.inf)
+        ),
+        -1,
+    )
 
 
 def twist_at(xp: Any, twist: Any, offset: Any) -> Any:
     """Return twists `[..., 3]` at points displaced by `offset` `[..., 2]` [m] (see `geometry.twist_at`)."""
     spin = twist[..., 2]
-    vx, vy = twist[..., 0] - spin * offset[..., 1], twist[..., 1] + spin * offset[..., 0]
+    vx = twist[..., 0] - spin * offset[..., 1]
+    vy = twist[..., 1] + spin * offset[..., 0]
     return xp.stack(xp.broadcast_arrays(vx, vy, spin), -1)
 
 
 def wrench_from(xp: Any, wrench: Any, offset: Any) -> Any:
     """Return wrenches `[..., 3]` about the origin from those about points displaced by `offset` `[..., 2]` [m]."""
-    fx, fy = wrench[..., 0], wrench[..., 1]
-    return xp.stack(xp.broadcast_arrays(fx, fy, wrench[..., 2] + offset[..., 0] * fy - offset[..., 1] * fx), -1)
+    fx = wrench[..., 0]
+    fy = wrench[..., 1]
+    return xp.stack(
+        xp.broadcast_arrays(
+            fx, fy, wrench[..., 2] + offset[..., 0] * fy - offset[..., 1] * fx
+        ),
+        -1,
+    )
 
 
 def tilted(xp: Any, positions: Any, weights: Any, centre: Any) -> Any:
@@ -44,34 +56,57 @@ def tilted(xp: Any, positions: Any, weights: Any, centre: Any) -> Any:
 
     total = weights.sum(-1, keepdims=True)
     share = weights / xp.where(total > 0.0, total, 1.0)
-    (x, y), away = positions, []
+    (x, y) = positions
+    away = []
     for each, to in ((x, centre[..., :1]), (y, centre[..., 1:])):
         middle = mean(each, share)
         away.append((each - middle, to - middle))
     (dx, cx), (dy, cy) = away
-    xx, xy, yy = mean(dx * dx, share), mean(dx * dy, share), mean(dy * dy, share)
+    xx = mean(dx * dx, share)
+    xy = mean(dx * dy, share)
+    yy = mean(dy * dy, share)
     size = xx + yy
-    per_length = xp.where(size > 0.0, 1.0 / xp.sqrt(xp.where(size > 0.0, size, 1.0)), 0.0)
+    per_length = xp.where(
+        size > 0.0, 1.0 / xp.sqrt(xp.where(size > 0.0, size, 1.0)), 0.0
+    )
     narrow = ~(xx * yy - xy * xy > NARROW * size * size)
     u, v, cx, cy = (each * per_length for each in (dx, dy, cx, cy))
     square = cx * cx + cy * cy
-    back = xp.where(square > FARTHEST**2, FARTHEST / xp.sqrt(xp.where(square > 0.0, square, 1.0)), 1.0)
-    u, v, share, cx, cy, narrow = xp.broadcast_arrays(u, v, share, back * cx, back * cy, narrow)
-    held = (xp.stop_gradient(each) for each in (u, v, share, cx[..., :1], cy[..., :1], narrow[..., :1]))
+    back = xp.where(
+        square > FARTHEST**2,
+        FARTHEST / xp.sqrt(xp.where(square > 0.0, square, 1.0)),
+        1.0,
+    )
+    u, v, share, cx, cy, narrow = xp.broadcast_arrays(
+        u, v, share, back * cx, back * cy, narrow
+    )
+    held = (
+        xp.stop_gradient(each)
+        for each in (u, v, share, cx[..., :1], cy[..., :1], narrow[..., :1])
+    )
     pressing = xp.pressing(*held)
 
     one = xp.where(pressing, share, 0.0)
     own = one.sum(-1, keepdims=True)
-    mx, my = mean(u, one) / own, mean(v, one) / own
-    du, dv = u - mx, v - my
+    mx = mean(u, one) / own
+    my = mean(v, one) / own
+    du = u - mx
+    dv = v - my
     soft = xp.where(narrow[..., :1] | ~pressing.all(-1)[..., None], SOFTNESS, 0.0)
-    xx, xy, yy, right, up = mean(du * du, one) + soft, mean(du * dv, one), mean(dv * dv, one) + soft, cx - mx, cy - my
+    xx = mean(du * du, one) + soft
+    xy = mean(du * dv, one)
+    yy = mean(dv * dv, one) + soft
+    right = cx - mx
+    up = cy - my
     per = 1.0 / (xx * yy - xy * xy)
-    a, b = per * (yy * right - xy * up), per * (xx * up - xy * right)
+    a = per * (yy * right - xy * up)
+    b = per * (xx * up - xy * right)
     plane = 1.0 / own + a * du + b * dv
     pressed = xp.where(pressing, share * xp.where(plane > 0.0, plane, 0.0), 0.0)
     found = pressed.sum(-1, keepdims=True)
-    return xp.where(total > 0.0, pressed * total / xp.where(found > 0.0, found, 1.0), weights)
+    return xp.where(
+        total > 0.0, pressed * total / xp.where(found > 0.0, found, 1.0), weights
+    )
 
 
 class Pressed(NamedTuple):
@@ -91,7 +126,9 @@ class Pressed(NamedTuple):
 
 
 def _shared(xp: Any, levers: Any, weights: Any, remainder: Any, centre: Any) -> Any:
-    return tilted(xp, positions_of(xp, levers) + xp.stop_gradient(remainder), weights, centre)
+    return tilted(
+        xp, positions_of(xp, levers) + xp.stop_gradient(remainder), weights, centre
+    )
 
 
 def follow(xp: Any, equations: Any, contact: Any, centre: Any) -> Pressed:

@@ -49,10 +49,14 @@ class Drive(NamedTuple):
     """Velocity that viscous friction opposes [m/s]."""
 
 
-def shape_of(patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None) -> PublishedShape:
+def shape_of(
+    patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None
+) -> PublishedShape:
     """Return the shape of a patch at the load of `surface`, and with None the published table's."""
     when = "keep" if surface is not None else "rebuild"
-    return models.ReducedModelPublished(patch, law, surface, on_load_change=when).shapes.reference  # pyright: ignore
+    return models.ReducedModelPublished(
+        patch, law, surface, on_load_change=when
+    ).shapes.reference  # pyright: ignore
 
 
 def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:
@@ -62,16 +66,25 @@ def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:
     return law.numbers._asdict() | own | {"centre_x": x, "centre_y": y}
 
 
-def numbers_of(xp, values: Mapping[str, Any], surface: Any, root: Any) -> PublishedNumbers:
+def numbers_of(
+    xp, values: Mapping[str, Any], surface: Any, root: Any
+) -> PublishedNumbers:
     """Return a shape at values of its parameters `[..., 1, 1]`; `surface` has its `kind`, `size` and `data`."""
     shape = PublishedPatch(*(values[name] for name in PublishedPatch._fields))
-    sliding = functools.partial(surfaces.sliding, xp, surface.kind, surface.size, surface.data)
-    return PublishedNumbers(shape, sliding, None if root is None else Root(root[0, 0], root[0, 1], root[1, 1]))
+    sliding = functools.partial(
+        surfaces.sliding, xp, surface.kind, surface.size, surface.data
+    )
+    return PublishedNumbers(
+        shape,
+        sliding,
+        None if root is None else Root(root[0, 0], root[0, 1], root[1, 1]),
+    )
 
 
 def centre(own: PublishedNumbers) -> tuple[Any, Any]:
     """Return the centre of pressure [m]."""
-    x, y = own.shape.centre_x[..., 0, 0], own.shape.centre_y[..., 0, 0]
+    x = own.shape.centre_x[..., 0, 0]
+    y = own.shape.centre_y[..., 0, 0]
     if own.root is None:
         return x, y
     a, b, d = own.root
@@ -110,7 +123,8 @@ def scaled(xp, own: PublishedNumbers, z):
 def drive(xp, law: LawNumbers, own: PublishedNumbers, twist) -> Drive:
     """Return the drive of the bristle at a twist."""
     twist, viscous = (
-        _mapped(xp, each, own, wide(twist)) for each in (published_contact._seen, published_contact._viscous)
+        _mapped(xp, each, own, wide(twist))
+        for each in (published_contact._seen, published_contact._viscous)
     )
     speed = xp.norm(twist, -2)
     u = wide(own.surface(narrow(twist), narrow(speed)))
@@ -121,16 +135,26 @@ def drive(xp, law: LawNumbers, own: PublishedNumbers, twist) -> Drive:
 def evaluate(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive):
     """Return the rate of the bristle, and its pull (see `wrench`)."""
     z = scaled(xp, own, z)
-    rate = by.velocity - xp.over(published_contact.decay_of)(law, Vector(z), Vector(by.velocity), *by[1:4]) * z
+    rate = (
+        by.velocity
+        - xp.over(published_contact.decay_of)(
+            law, Vector(z), Vector(by.velocity), *by[1:4]
+        )
+        * z
+    )
     return raw(xp, own, rate), formulas.traction(z, rate, by.viscous, law)
 
 
 def advance(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive, dt):
     """Return the bristle after `dt` of a constant twist, and its pull (see `wrench`)."""
     z = scaled(xp, own, z)
-    new, k = xp.over(bristle_step.step)(law, Vector(z), Vector(by.velocity), *by[1:4], dt)
+    new, k = xp.over(bristle_step.step)(
+        law, Vector(z), Vector(by.velocity), *by[1:4], dt
+    )
     new = new.array
-    return raw(xp, own, new), formulas.traction(new, by.velocity - k * new, by.viscous, law)
+    return raw(xp, own, new), formulas.traction(
+        new, by.velocity - k * new, by.viscous, law
+    )
 
 
 def wrench(xp, own: PublishedNumbers, pull):

@@ -15,7 +15,13 @@ from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.elements import Vector
-from planarfriction.tensors.namespace import Namespace, broadcast, finite, non_negative, shaped
+from planarfriction.tensors.namespace import (
+    Namespace,
+    broadcast,
+    finite,
+    non_negative,
+    shaped,
+)
 from planarfriction.tensors.pressure import Pressed, centre_of, follow
 
 LAW = PARAMETERS[:8]
@@ -33,7 +39,9 @@ class Contact(NamedTuple):
     """Load [N] of a stiffness that does not grow with the load, or None."""
 
 
-def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any) -> tuple[Any, Any]:
+def evaluate(
+    xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any
+) -> tuple[Any, Any]:
     """Return the rate of the state, and the wrench `[..., 3]`."""
     by = equations.drive(xp, *contact[:2], twist)
     law, shape, reference = contact
@@ -45,29 +53,45 @@ def evaluate(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, 
         rate, pull = equations.evaluate(xp, law, shape, z, by)
         out = z - equations.middle(xp, law, shape)
         back = xp.over(settle.recovery)(law, Vector(out), xp.norm(by[0], -2)) * out
-        rate, pull = rate - back, pull + law.sigma_1 * back
+        rate = rate - back
+        pull = pull + law.sigma_1 * back
     return equations.narrow(rate), load[..., None] * equations.wrench(xp, shape, pull)
 
 
-def step(xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any, dt: Any) -> tuple[Any, Any]:
+def step(
+    xp: Any,
+    equations: Any,
+    contact: Contact,
+    state: Any,
+    twist: Any,
+    load: Any,
+    dt: Any,
+) -> tuple[Any, Any]:
     """Return the state after `dt` [s] of a constant twist, and the wrench at the end; without load bristles relax."""
-    given, z = (contact.law.sigma_0, state, twist), equations.wide(xp.widened(state))
+    given = (contact.law.sigma_0, state, twist)
+    z = equations.wide(xp.widened(state))
     by = equations.drive(xp, *contact[:2], xp.widened(twist))
     new, pull = advance(xp, equations, contact, z, by, load, dt)
     wrench = load[..., None] * equations.wrench(xp, contact.shape, pull)
     return xp.narrowed(equations.narrow(new), *given), xp.narrowed(wrench, *given)
 
 
-def advance(xp: Any, equations: Any, contact: Contact, z: Any, by: Any, load: Any, dt: Any) -> tuple[Any, Any]:
+def advance(
+    xp: Any, equations: Any, contact: Contact, z: Any, by: Any, load: Any, dt: Any
+) -> tuple[Any, Any]:
     """Return the bristles `[..., d, N]` after `dt`, zeros of contacts without load, and the tractions per unit load.
 
     With a fixed stiffness the step is the published one of another deflection and time (see `bristles.settle`).
     """
-    (law, shape, reference), loaded, dt = contact, inner(load > 0.0), inner(dt)
+    (law, shape, reference) = contact
+    loaded = inner(load > 0.0)
+    dt = inner(dt)
     if reference is None:
         new, pull = equations.advance(xp, law, shape, z, by, dt)
     else:
-        factor = xp.over(settle.factor_at)(reference, xp.where(loaded, inner(load), reference))
+        factor = xp.over(settle.factor_at)(
+            reference, xp.where(loaded, inner(load), reference)
+        )
         z = equations.limited(xp, law, shape, factor * z)
         new, pull = equations.advance(xp, law, shape, z, by, factor * dt)
         new = new / factor
@@ -110,32 +134,69 @@ class TensorModel:
         """Shape of the state of one contact."""
         return (3,)
 
-    def rate(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None, parameters: Any = None) -> Any:
+    def rate(
+        self,
+        state: Any,
+        twist: Any,
+        normal_force: Any,
+        *,
+        moments: Any = None,
+        parameters: Any = None,
+    ) -> Any:
         """Return the rate of the state, of its shape; of the load it depends on the moments alone, as in `step`."""
         return self._evaluated(state, twist, normal_force, parameters, moments)[0]
 
-    def wrench(self, state: Any, twist: Any, normal_force: Any, *, moments: Any = None, parameters: Any = None) -> Any:
+    def wrench(
+        self,
+        state: Any,
+        twist: Any,
+        normal_force: Any,
+        *,
+        moments: Any = None,
+        parameters: Any = None,
+    ) -> Any:
         """Return the friction wrench on the moving body, `[..., 3]` [N, N, N m]; `moments` as in `step`."""
         return self._evaluated(state, twist, normal_force, parameters, moments)[1]
 
     def step(
-        self, state: Any, twist: Any, normal_force: Any, dt: Any, *, moments: Any = None, parameters: Any = None
+        self,
+        state: Any,
+        twist: Any,
+        normal_force: Any,
+        dt: Any,
+        *,
+        moments: Any = None,
+        parameters: Any = None,
     ) -> tuple[Any, Any]:
         """Return the state after `dt` [s] of a constant twist, and the wrench at the end.
 
         Stable at any `dt`; the bristles of a contact without load relax. With `moments` `[..., 2]` [N m] the pressure
         follows them, as in `planarfriction.models.FrictionModel.step`.
         """
-        inputs, pressed = self._inputs_pressed(state, twist, normal_force, parameters, moments)
-        return self.step_pressed(pressed, *inputs, non_negative(self.xp, "dt", self._number("dt", dt)))
+        inputs, pressed = self._inputs_pressed(
+            state, twist, normal_force, parameters, moments
+        )
+        return self.step_pressed(
+            pressed, *inputs, non_negative(self.xp, "dt", self._number("dt", dt))
+        )
 
     def pressed(self, centre: Any, parameters: Any = None) -> Pressed:
         """Return the model with its pressure about `centre` `[..., 2]` [m], for any number of steps."""
         return follow(self.xp, self.equations, self._contact_at(parameters), centre)
 
-    def step_pressed(self, pressed: Pressed, state: Any, twist: Any, load: Any, dt: Any) -> tuple[Any, Any]:
+    def step_pressed(
+        self, pressed: Pressed, state: Any, twist: Any, load: Any, dt: Any
+    ) -> tuple[Any, Any]:
         """Return state and wrench after a step of the model that `pressed` has returned, with inputs as arrays."""
-        new, wrench = step(self.xp, self.equations, pressed.contact, state, pressed.seen(self.xp, twist), load, dt)
+        new, wrench = step(
+            self.xp,
+            self.equations,
+            pressed.contact,
+            state,
+            pressed.seen(self.xp, twist),
+            load,
+            dt,
+        )
         return new, pressed.pull(self.xp, wrench)
 
     def _values(self, parameters: Any) -> dict[str, Any]:
@@ -175,12 +236,21 @@ class TensorModel:
     def _prepared(self, values: Mapping[str, Any]) -> Contact:
         """Return the model at physical values `[...]`."""
         wide = {name: inner(value) for name, value in values.items()}
-        law = LawNumbers(**{name: wide[name] for name in LAW}, elasto_plastic=float(self.elasto_plastic))
+        law = LawNumbers(
+            **{name: wide[name] for name in LAW},
+            elasto_plastic=float(self.elasto_plastic),
+        )
         return Contact(law, self._shape(wide), self.reference_load)
 
-    def _evaluated(self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any) -> tuple[Any, Any]:
-        (z, v, load), pressed = self._inputs_pressed(state, twist, normal_force, parameters, moments)
-        rate, wrench = evaluate(self.xp, self.equations, pressed.contact, z, pressed.seen(self.xp, v), load)
+    def _evaluated(
+        self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any
+    ) -> tuple[Any, Any]:
+        (z, v, load), pressed = self._inputs_pressed(
+            state, twist, normal_force, parameters, moments
+        )
+        rate, wrench = evaluate(
+            self.xp, self.equations, pressed.contact, z, pressed.seen(self.xp, v), load
+        )
         return rate, pressed.pull(self.xp, wrench)
 
     def _inputs_pressed(
@@ -191,14 +261,26 @@ class TensorModel:
         if moments is None:
             return (z, v, load), Pressed(self._contact_at(parameters), None)
         if self.reference_load is not None:
-            raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
-        held = finite(self.xp, "moments", shaped("moments", self._number("moments", moments), (2,)))
-        shapes = {"twist": v.shape[:-1], "normal_force": load.shape, "moments": held.shape[:-1]}
+            raise InvalidValueError(
+                "moments", "be None for a law with a reference_load", "moments"
+            )
+        held = finite(
+            self.xp,
+            "moments",
+            shaped("moments", self._number("moments", moments), (2,)),
+        )
+        shapes = {
+            "twist": v.shape[:-1],
+            "normal_force": load.shape,
+            "moments": held.shape[:-1],
+        }
         batch = broadcast(self.xp, "batch axes", "broadcast", shapes)
         v = self.xp.broadcast_to(v, (*batch, 3))
         return (z, v, load), self.pressed(centre_of(self.xp, held, load), parameters)
 
-    def _inputs(self, state: Any, twist: Any, normal_force: Any) -> tuple[Any, Any, Any]:
+    def _inputs(
+        self, state: Any, twist: Any, normal_force: Any
+    ) -> tuple[Any, Any, Any]:
         """Return checked state, twist and load as arrays whose batch axes broadcast."""
         z = shaped("state", self._number("state", state), self.state_shape)
         v = shaped("twist", self._number("twist", twist), (3,))

@@ -24,22 +24,37 @@ def sliding(xp, kind: int, size: int, data, scaled, speed):
     if kind == kernel.ELLIPSOID:
         return scaled
     moving = speed > 0.0
-    safe = xp.where(moving, scaled, 1.0)  # at rest any twist will do: the result is not used
-    u = _cells(xp, size, data, safe) if kind == kernel.CELLS else _table(xp, kind, size, data, safe)
+    safe = xp.where(
+        moving, scaled, 1.0
+    )  # at rest any twist will do: the result is not used
+    u = (
+        _cells(xp, size, data, safe)
+        if kind == kernel.CELLS
+        else _table(xp, kind, size, data, safe)
+    )
     return xp.where(moving, u, scaled)
 
 
 def _cells(xp, size: int, data, scaled):
     """Return `|V_S| sum w_i [v_i/|v_i| ; rho_i x v_i/|v_i|]`; a cell in the centre of rotation adds nothing."""
-    px, py, weights = data[:size], data[size : 2 * size], data[2 * size : 3 * size]
+    px = data[:size]
+    py = data[size : 2 * size]
+    weights = data[2 * size : 3 * size]
     speed = xp.norm(scaled, -1)
     heading = scaled / speed
-    x, y, s = heading[..., 0:1], heading[..., 1:2], heading[..., 2:3]
-    ux, uy = x - s * py, y + s * px
+    x = heading[..., 0:1]
+    y = heading[..., 1:2]
+    s = heading[..., 2:3]
+    ux = x - s * py
+    uy = y + s * px
     square = ux * ux + uy * uy
     slides = square > (kernel._AT_REST * xp.epsilon(scaled) / _ROUNDING) ** 2
     share = xp.where(slides, weights / xp.root(xp.where(slides, square, 1.0)), 0.0)
-    h = [(share * ux).sum(-1), (share * uy).sum(-1), (share * (px * uy - py * ux)).sum(-1)]
+    h = [
+        (share * ux).sum(-1),
+        (share * uy).sum(-1),
+        (share * (px * uy - py * ux)).sum(-1),
+    ]
     return xp.stack(h, -1) * speed
 
 
@@ -50,7 +65,9 @@ def _table(xp, kind: int, size: int, data, scaled):
     """Return `u` of a table: near the spin axis its value at one place with the derivative at another."""
     here = xp.stop_gradient(scaled)
     near, moved = _off_axis(xp, size, here)
-    length, *heading = _upper(xp, xp.stack([scaled + xp.where(near, moved - here, 0.0), here], 0))
+    length, *heading = _upper(
+        xp, xp.stack([scaled + xp.where(near, moved - here, 0.0), here], 0)
+    )
     lookup = xp.over(kernel._bilinear if kind == kernel.BILINEAR else kernel._potential)
     at = Placed(size, xp.over(kernel.place)(size, *heading))
     u = length * xp.stack(lookup(_Corners(xp, at, data), 0, at, *heading, 1.0), -1)
@@ -61,10 +78,12 @@ class _Corners:
     """Numbers of the four nodes about places in a table, as if these were the first nodes, and those behind all."""
 
     def __init__(self, xp: Any, at: Placed, data: Any) -> None:
-        self._data, self._row = data, 4 * (4 * at + 1)
+        self._data = data
+        self._row = 4 * (4 * at + 1)
         i, j = at.cell
         nodes = data[: (at + 1) * self._row].reshape(at + 1, 4 * at + 1, 4)
-        rows, columns = xp.stack([i, i + 1], -1), xp.stack([j, j + 1], -1)
+        rows = xp.stack([i, i + 1], -1)
+        columns = xp.stack([j, j + 1], -1)
         self._nodes = nodes[rows[..., :, None], columns[..., None, :]]
 
     def __getitem__(self, q: int) -> Any:
@@ -85,5 +104,9 @@ def _off_axis(xp, size: int, scaled):
     length, x, y, s = _upper(xp, scaled)
     *_, polar, azimuth = xp.over(kernel.place)(size, x, y, s)
     across = math.sin(_MOVED)
-    moved = [across * xp.cos(azimuth), across * xp.sin(azimuth), math.cos(_MOVED) * xp.ones_like(s)]
+    moved = [
+        across * xp.cos(azimuth),
+        across * xp.sin(azimuth),
+        math.cos(_MOVED) * xp.ones_like(s),
+    ]
     return (polar < kernel._AXIS)[..., None], length * xp.stack(moved, -1)

@@ -9,7 +9,11 @@ from planarfriction.errors import needing
 with needing("torch", "torch"):
     from planarfriction.derivatives import Rollout
     from planarfriction.tensors.operations import SceneMotion
-    from planarfriction.torch.models import DistributedModel, ReducedModel, ReducedModelPublished
+    from planarfriction.torch.models import (
+        DistributedModel,
+        ReducedModel,
+        ReducedModelPublished,
+    )
     from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
     from planarfriction.torch.rollout import rollout, simulate_scene, tracking_loss
 

@@ -47,19 +47,33 @@ class FrictionModule(TensorModel, nn.Module):
         self.elasto_plastic = bool(law.numbers.elasto_plastic)
         self.register_buffer("reference_load", None)
 
-    def _adopt(self, values: dict[str, float], trainable: Iterable[str], lever: float, **kind: Any) -> None:
+    def _adopt(
+        self,
+        values: dict[str, float],
+        trainable: Iterable[str],
+        lever: float,
+        **kind: Any,
+    ) -> None:
         """Add the physical parameters, and the other entries of every model's state dict."""
         trainable = tuple(trainable)
         if "breakaway_ratio" in trainable and not self.elasto_plastic:
-            raise InvalidValueError("trainable", "not contain breakaway_ratio for plain bristles", trainable)
+            raise InvalidValueError(
+                "trainable", "not contain breakaway_ratio for plain bristles", trainable
+            )
         self.physical = self.physical_type(values, trainable, **kind)
-        self.register_buffer("bristles", torch.tensor(self.elasto_plastic, device=kind["device"]))
+        self.register_buffer(
+            "bristles", torch.tensor(self.elasto_plastic, device=kind["device"])
+        )
         self.register_buffer("lever", torch.tensor(lever, **kind))
 
-    def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
+    def _load_from_state_dict(
+        self, state_dict: dict[str, Any], prefix: str, *rest: Any
+    ) -> None:
         given = state_dict.get(f"{prefix}bristles")
         if given is not None and bool(given) != self.elasto_plastic:
-            own, other = (_BRISTLES[kind] for kind in (self.elasto_plastic, bool(given)))
+            own, other = (
+                _BRISTLES[kind] for kind in (self.elasto_plastic, bool(given))
+            )
             raise InvalidValueError("state_dict", f"be that of {own} bristles", other)
         super()._load_from_state_dict(state_dict, prefix, *rest)
 
@@ -77,14 +91,20 @@ class FrictionModule(TensorModel, nn.Module):
 
     def set(self, **values: float) -> None:
         """Set physical values by name, trainable or not."""
-        self.physical.set({name: validation.number(name, value) for name, value in values.items()})
+        self.physical.set(
+            {name: validation.number(name, value) for name, value in values.items()}
+        )
 
     def law(self) -> LuGre:
         """Return the law with the present values."""
         now = self._law_values()
         breakaway = ElastoPlastic(now.pop("breakaway_ratio"))
         fixed = None if self.reference_load is None else self.reference_load.item()
-        return LuGre(**now, elasto_plastic=breakaway if self.elasto_plastic else None, reference_load=fixed)
+        return LuGre(
+            **now,
+            elasto_plastic=breakaway if self.elasto_plastic else None,
+            reference_load=fixed,
+        )
 
     def _law_values(self) -> dict[str, float]:
         now = dict(zip(self.names, self.physical().tolist(), strict=True))
@@ -94,7 +114,9 @@ class FrictionModule(TensorModel, nn.Module):
 
     def rest(self, batch: int | Sequence[int] = ()) -> Tensor:
         """Return the state of a contact at rest, or of a `batch`: `[*batch, *state_shape]`."""
-        return self.physical.values.new_zeros(validation.batched(batch, self.state_shape))
+        return self.physical.values.new_zeros(
+            validation.batched(batch, self.state_shape)
+        )
 
     def forward(
         self,
@@ -108,7 +130,9 @@ class FrictionModule(TensorModel, nn.Module):
         """Return the rate of the state, and the wrench; `moments` as in `step`."""
         return self._evaluated(state, twist, normal_force, parameters, moments)
 
-    def compiled(self) -> tuple[Callable[..., Packed], tuple[Tensor, ...], tuple[Tensor, ...]]:
+    def compiled(
+        self,
+    ) -> tuple[Callable[..., Packed], tuple[Tensor, ...], tuple[Tensor, ...]]:
         """Return the model as compiled rollouts take it: a function of arrays, its buffers, and the weights of cells.
 
         The function packs the model from the weights, if there are cells, and the buffers.
@@ -116,22 +140,37 @@ class FrictionModule(TensorModel, nn.Module):
         raise NotImplementedError
 
     def rollout(
-        self, state: Tensor, twist: Tensor, normal_force: Tensor, dt: Tensor, *, parameters: Tensor | None = None
+        self,
+        state: Tensor,
+        twist: Tensor,
+        normal_force: Tensor,
+        dt: Tensor,
+        *,
+        parameters: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """Return the last state and the wrenches `[..., T, 3]` of steps through twists `[..., T, 3]` and loads.
 
         Only the bristles go step by step; their drives and the wrenches are computed for all steps at once. Inputs are
         tensors that have been checked.
         """
-        equations, vector = self.equations, self._vector(parameters)
-        of_step, contact = (self._prepared(self._named(values)) for values in (vector, vector[..., None, :]))
+        equations = self.equations
+        vector = self._vector(parameters)
+        of_step, contact = (
+            self._prepared(self._named(values))
+            for values in (vector, vector[..., None, :])
+        )
         z = equations.wide(xp.widened(state))
         by = equations.drive(xp, *contact[:2], xp.widened(twist))
-        drives, pulls = zip(*(value.unbind(-3) for value in by), strict=True), []
+        drives = zip(*(value.unbind(-3) for value in by), strict=True)
+        pulls = []
         for drive, now in zip(drives, normal_force.unbind(-1), strict=True):
-            z, pull = steps.advance(xp, equations, of_step, z, _like(by, drive), now, dt)
+            z, pull = steps.advance(
+                xp, equations, of_step, z, _like(by, drive), now, dt
+            )
             pulls.append(pull)
-        wrenches = normal_force[..., None] * equations.wrench(xp, contact.shape, torch.stack(pulls, -3))
+        wrenches = normal_force[..., None] * equations.wrench(
+            xp, contact.shape, torch.stack(pulls, -3)
+        )
         given = vector, state, twist
         return xp.narrowed(equations.narrow(z), *given), xp.narrowed(wrenches, *given)
 
@@ -149,7 +188,9 @@ class FrictionModule(TensorModel, nn.Module):
     def _vector(self, parameters: Tensor | None) -> Tensor:
         if parameters is None:
             return self.physical()
-        vector = self._counted(parameters, parameters.shape[-1] if parameters.ndim else 0, parameters.shape)
+        vector = self._counted(
+            parameters, parameters.shape[-1] if parameters.ndim else 0, parameters.shape
+        )
         self._in_range(self._named(vector))
         return vector
 

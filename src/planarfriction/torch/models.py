@@ -55,12 +55,15 @@ class DistributedModel(FrictionModule, CellsModel):
         cells = distributed.cells_of(patch, law, normal_force, precision)
         if law.reference_load is not None:
             self.reference_load = torch.tensor(law.reference_load, **kind)
-        numbers, chosen = law.numbers._asdict(), tuple(trainable)
+        numbers = law.numbers._asdict()
+        chosen = tuple(trainable)
         lever = float(patch.contact_radius(normal_force))
         physical = [name for name in chosen if name != "weights"]
         self._adopt({name: numbers[name] for name in LAW}, physical, lever, **kind)
         self.register_buffer("positions", torch.tensor(cells.levers, **kind))
-        self.register_buffer("remainder", torch.tensor(cells.remainder, **kind), persistent=False)
+        self.register_buffer(
+            "remainder", torch.tensor(cells.remainder, **kind), persistent=False
+        )
         raw = torch.tensor(cells.weights, **kind).log()
         if "weights" in chosen:
             self.raw_weights = nn.Parameter(raw)
@@ -79,7 +82,11 @@ class DistributedModel(FrictionModule, CellsModel):
     def compiled(self) -> tuple[Any, tuple[Tensor, ...], tuple[Tensor, ...]]:
         """Return the model as compiled rollouts take it (see `FrictionModule.compiled`)."""
         reference = () if self.reference_load is None else (self.reference_load,)
-        return functools.partial(pack_cells, self.elasto_plastic), (self.positions, *reference), (self.weights,)
+        return (
+            functools.partial(pack_cells, self.elasto_plastic),
+            (self.positions, *reference),
+            (self.weights,),
+        )
 
 
 class SurfaceBuffers(nn.Module):
@@ -93,13 +100,21 @@ class SurfaceBuffers(nn.Module):
         super().__init__()
         self.kind, self.size, data = surface.numbers
         self.register_buffer("data", torch.tensor(data, **kind))
-        self.register_buffer("form", torch.tensor([self.kind, self.size], device=kind["device"]))
+        self.register_buffer(
+            "form", torch.tensor([self.kind, self.size], device=kind["device"])
+        )
 
-    def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
+    def _load_from_state_dict(
+        self, state_dict: dict[str, Any], prefix: str, *rest: Any
+    ) -> None:
         given = state_dict.get(f"{prefix}form")
         if given is not None and given.tolist() != self.form.tolist():
             rule = "hold a limit surface of the same kind and size (kind, segments or cells)"
-            raise InvalidValueError("state_dict", f"{rule} as the model, {self.form.tolist()}", given.tolist())
+            raise InvalidValueError(
+                "state_dict",
+                f"{rule} as the model, {self.form.tolist()}",
+                given.tolist(),
+            )
         super()._load_from_state_dict(state_dict, prefix, *rest)
 
 
@@ -135,14 +150,29 @@ class ReducedModelPublished(FrictionModule, PublishedModel):
         shape = published.shape_of(patch, law, surface)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         self.surface = SurfaceBuffers(shape.surface, **kind)
-        self.register_buffer("root", None if patch.root is None else torch.tensor(shape.root, **kind))
+        self.register_buffer(
+            "root", None if patch.root is None else torch.tensor(shape.root, **kind)
+        )
         values = published.values_of(law, shape)
-        self._adopt({name: values[name] for name in PARAMETERS}, trainable, shape.contact_radius, **kind)
+        self._adopt(
+            {name: values[name] for name in PARAMETERS},
+            trainable,
+            shape.contact_radius,
+            **kind,
+        )
 
     def compiled(self) -> tuple[Any, tuple[Tensor, ...], tuple[Tensor, ...]]:
         """Return the model as compiled rollouts take it (see `FrictionModule.compiled`)."""
-        pack = functools.partial(pack_surface, self.elasto_plastic, self.surface.kind, self.surface.size)
-        return pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root), ()
+        pack = functools.partial(
+            pack_surface, self.elasto_plastic, self.surface.kind, self.surface.size
+        )
+        return (
+            pack,
+            (self.surface.data,)
+            if self.root is None
+            else (self.surface.data, self.root),
+            (),
+        )
 
 
 class ReducedModel(DistributedModel):
@@ -162,5 +192,10 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         **options: Any,
     ):
-        super().__init__(few_discs("torch.ReducedModel", patch, law, cells, options), law, normal_force, **options)
+        super().__init__(
+            few_discs("torch.ReducedModel", patch, law, cells, options),
+            law,
+            normal_force,
+            **options,
+        )
         self.patch = patch

@@ -22,11 +22,26 @@ class _Pressing(torch.autograd.Function):
     def forward(u, v, share, x, y, narrow):
         from planarfriction._engine.cells.tilt import tilt_many
 
-        rows = [np.array(each.detach().cpu().double().reshape(-1, each.shape[-1]).numpy()) for each in (u, v, share)]
-        centres = torch.cat([x, y], -1).detach().cpu().double().reshape(-1, 2).contiguous().numpy()
+        rows = [
+            np.array(each.detach().cpu().double().reshape(-1, each.shape[-1]).numpy())
+            for each in (u, v, share)
+        ]
+        centres = (
+            torch.cat([x, y], -1)
+            .detach()
+            .cpu()
+            .double()
+            .reshape(-1, 2)
+            .contiguous()
+            .numpy()
+        )
         out = np.empty_like(rows[2])
         tilt_many(*rows, centres, out)
-        return torch.from_numpy((out > 0.0) | (rows[2] == 0.0)).reshape(share.shape).to(share.device)
+        return (
+            torch.from_numpy((out > 0.0) | (rows[2] == 0.0))
+            .reshape(share.shape)
+            .to(share.device)
+        )
 
     @staticmethod
     def setup_context(ctx, inputs, output):
@@ -35,7 +50,9 @@ class _Pressing(torch.autograd.Function):
     @staticmethod
     def vmap(info, in_dims, *tensors):
         fronted = [
-            each.unsqueeze(0).expand(info.batch_size, *each.shape) if dim is None else each.movedim(dim, 0)
+            each.unsqueeze(0).expand(info.batch_size, *each.shape)
+            if dim is None
+            else each.movedim(dim, 0)
             for each, dim in zip(tensors, in_dims, strict=True)
         ]
         return _Pressing.apply(*fronted), 0
@@ -47,10 +64,14 @@ def _real(name: str, value: Any, like: Tensor | None = None) -> Tensor:
         if value.is_floating_point():
             return value
         if value.is_complex() or value.dtype == torch.bool:
-            raise InvalidValueError(name, "be a tensor of real numbers", f"one of {value.dtype}")
+            raise InvalidValueError(
+                name, "be a tensor of real numbers", f"one of {value.dtype}"
+            )
         return value.to(dtype)
     plain = value if type(value) is float else validation.numbers(name, value)
-    if isinstance(plain, np.ndarray) and min(plain.strides, default=0) < 0:  # which tensors do not support
+    if (
+        isinstance(plain, np.ndarray) and min(plain.strides, default=0) < 0
+    ):  # which tensors do not support
         plain = plain.copy()
     return torch.as_tensor(plain, dtype=dtype, device=device)
 
@@ -76,7 +97,9 @@ def _widened(x: Tensor) -> Tensor:
 
 
 def _narrowed(result: Tensor, *inputs: Tensor) -> Tensor:
-    return result.to(functools.reduce(torch.promote_types, (each.dtype for each in inputs)))
+    return result.to(
+        functools.reduce(torch.promote_types, (each.dtype for each in inputs))
+    )
 
 
 def _in_double(function: Any, *arrays: Tensor) -> Tensor:
@@ -108,8 +131,12 @@ xp = Namespace(
     real=_real,
     extremes=_extremes,
     pressing=_Pressing.apply,
-    to_numpy=lambda value: value.detach().cpu().numpy() if isinstance(value, Tensor) else value,
-    from_numpy=lambda array, like: torch.tensor(array, dtype=like.dtype, device=like.device),
+    to_numpy=lambda value: (
+        value.detach().cpu().numpy() if isinstance(value, Tensor) else value
+    ),
+    from_numpy=lambda array, like: torch.tensor(
+        array, dtype=like.dtype, device=like.device
+    ),
     in_double=_in_double,
     widened=_widened,
     narrowed=_narrowed,

@@ -47,10 +47,14 @@ class PhysicalParameters(nn.Module):
     def __init__(self, values: Mapping[str, float], trainable: Iterable[str], **kind):
         super().__init__()
         self.names = tuple(values)
-        chosen = dict.fromkeys(validation.choice("trainable", name, self.names) for name in trainable)
+        chosen = dict.fromkeys(
+            validation.choice("trainable", name, self.names) for name in trainable
+        )
         self.register_buffer("values", torch.zeros(len(self.names), **kind))
         self.register_buffer("scale", torch.ones(len(self.names), **kind))
-        self.raw = nn.ParameterDict({name: nn.Parameter(torch.zeros((), **kind)) for name in chosen})
+        self.raw = nn.ParameterDict(
+            {name: nn.Parameter(torch.zeros((), **kind)) for name in chosen}
+        )
         self.set(values)
 
     @torch.no_grad()
@@ -58,11 +62,15 @@ class PhysicalParameters(nn.Module):
         """Set physical values by name; raises InvalidValueError for one out of its range."""
         for name in values:
             validation.choice("parameter", name, self.names)
-        new = {**dict(zip(self.names, self._physical().tolist(), strict=True)), **values}
+        new = {
+            **dict(zip(self.names, self._physical().tolist(), strict=True)),
+            **values,
+        }
         _check(new)
         for i, name in enumerate(self.names):
             scale, raw = _raw(name, new, fixed_static="mu_s" not in self.raw)
-            self.values[i], self.scale[i] = new[name], scale
+            self.values[i] = new[name]
+            self.scale[i] = scale
             if name in self.raw:
                 self.raw[name].fill_(raw)
 
@@ -79,32 +87,45 @@ class PhysicalParameters(nn.Module):
 
     def _named(self) -> dict[str, Tensor]:
         """Return the physical values by name; trained ones follow from their raw numbers."""
-        now, raws = dict(zip(self.names, self.values.unbind(), strict=True)), dict(self.raw.items())
-        for name, scale in zip(self.names, self.scale.unbind(), strict=True):  # mu_c comes before mu_s
+        now = dict(zip(self.names, self.values.unbind(), strict=True))
+        raws = dict(self.raw.items())
+        for name, scale in zip(
+            self.names, self.scale.unbind(), strict=True
+        ):  # mu_c comes before mu_s
             if name not in raws:
                 continue
-            raw, bounded = raws[name], name == "mu_c" and "mu_s" not in raws  # below the fixed mu_s
+            raw = raws[name]
+            bounded = name == "mu_c" and "mu_s" not in raws  # below the fixed mu_s
             if name in _GROWING and not bounded:
-                now[name] = now[name] * torch.exp(raw.clamp(-_LARGEST_EXPONENT, _LARGEST_EXPONENT))
+                now[name] = now[name] * torch.exp(
+                    raw.clamp(-_LARGEST_EXPONENT, _LARGEST_EXPONENT)
+                )
                 continue
             if name.startswith("centre"):
                 now[name] = now[name] + scale * raw
                 continue
-            size = scale * nn.functional.leaky_relu(-raw, -1.0)  # |w|, with the slope 1 at 0
+            size = scale * nn.functional.leaky_relu(
+                -raw, -1.0
+            )  # |w|, with the slope 1 at 0
             if bounded:
                 now[name] = now["mu_s"] / (1.0 + size)
             elif name == "mu_s":
                 now[name] = now["mu_c"] * (1.0 + size)
             elif name == "breakaway_ratio":
-                now[name] = (1.0 - torch.exp(-size)).clamp(max=1.0 - 16.0 * torch.finfo(size.dtype).eps)
+                now[name] = (1.0 - torch.exp(-size)).clamp(
+                    max=1.0 - 16.0 * torch.finfo(size.dtype).eps
+                )
             else:
                 now[name] = size
         return now
 
 
-def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple[float, float]:
+def _raw(
+    name: str, values: Mapping[str, float], *, fixed_static: bool
+) -> tuple[float, float]:
     """Return scale and raw number of a value; a value of zero takes a natural size as its scale."""
-    value, mu_c = values[name], values["mu_c"]
+    value = values[name]
+    mu_c = values["mu_c"]
     if name == "mu_s" or (name == "mu_c" and fixed_static):
         excess = (values["mu_s"] - mu_c) / mu_c
         return 1.0 + excess, excess / (1.0 + excess)
@@ -114,7 +135,9 @@ def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple
         return 1.0, -float(torch.log1p(torch.tensor(-value, dtype=torch.float64)))
     if name.startswith("centre"):
         return values["contact_radius"], 0.0
-    natural = mu_c / values["v_s"] if name == "sigma_1" else mu_c  # of mu_c at the Stribeck speed, or at 1 m/s
+    natural = (
+        mu_c / values["v_s"] if name == "sigma_1" else mu_c
+    )  # of mu_c at the Stribeck speed, or at 1 m/s
     return (value, 1.0) if value > 0.0 else (natural, 0.0)
 
 
@@ -123,4 +146,6 @@ def _check(values: Mapping[str, float]) -> None:
     LuGre(**{name: values[name] for name in LAW[:-1]})
     ElastoPlastic(values["breakaway_ratio"])
     for name in values.keys() - set(LAW):
-        (validation.number if name.startswith("centre") else validation.positive)(name, values[name])
+        (validation.number if name.startswith("centre") else validation.positive)(
+            name, values[name]
+        )

@@ -41,7 +41,8 @@ class _OneSize(PhysicalParameters):
         super().set(values)
 
     def _named(self) -> dict[str, Tensor]:
-        now, set_last = super()._named(), dict(zip(self.names, self.values.unbind(), strict=True))
+        now = super()._named()
+        set_last = dict(zip(self.names, self.values.unbind(), strict=True))
         growth = now["contact_radius"] / set_last["contact_radius"]
         return now | {"second_moment": set_last["second_moment"] * growth**2}
 
@@ -84,7 +85,15 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         dtype: torch.dtype | None = None,
         device: torch.device | str | None = None,
     ) -> None:
-        law = LuGre(mu_c=mu_c, mu_s=mu_s, v_s=v_s, gamma=gamma, sigma_0=sigma_0, sigma_1=sigma_1, sigma_2=sigma_2)
+        law = LuGre(
+            mu_c=mu_c,
+            mu_s=mu_s,
+            v_s=v_s,
+            gamma=gamma,
+            sigma_0=sigma_0,
+            sigma_1=sigma_1,
+            sigma_2=sigma_2,
+        )
         # the very object: a radius that was left out, and not one that happens to be as large
         own_size = surface is not None and radius is RADIUS
         self._given = None if own_size else validation.positive("radius", radius)
@@ -93,23 +102,44 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         if not isinstance(surface, LimitSurface):
             raise InvalidValueError("surface", "be a limit surface", surface)
         trainable = (*TRAINABLE, "contact_radius")
-        super().__init__(surface.patch, law, surface, trainable=trainable, dtype=dtype, device=device)
+        super().__init__(
+            surface.patch, law, surface, trainable=trainable, dtype=dtype, device=device
+        )
 
-    def _adopt(self, values: dict[str, float], trainable: Iterable[str], lever: float, **kind: Any) -> None:
+    def _adopt(
+        self,
+        values: dict[str, float],
+        trainable: Iterable[str],
+        lever: float,
+        **kind: Any,
+    ) -> None:
         radius = lever if self._given is None else self._given
-        size = {"contact_radius": radius, "second_moment": values["second_moment"] * (radius / lever) ** 2}
+        size = {
+            "contact_radius": radius,
+            "second_moment": values["second_moment"] * (radius / lever) ** 2,
+        }
         super()._adopt(values | size, trainable, radius, **kind)
 
     # ------------------------------------------------------------------ the present values
 
     mu_c = property(lambda self: self.value("mu_c"), doc="Coulomb coefficient [-].")
-    mu_s = property(lambda self: self.value("mu_s"), doc="Static coefficient [-], at least `mu_c`.")
+    mu_s = property(
+        lambda self: self.value("mu_s"), doc="Static coefficient [-], at least `mu_c`."
+    )
     v_s = property(lambda self: self.value("v_s"), doc="Stribeck speed [m/s].")
     gamma = property(lambda self: self.value("gamma"), doc="Stribeck exponent [-].")
-    sigma_0 = property(lambda self: self.value("sigma_0"), doc="Bristle stiffness per unit load [1/m].")
-    sigma_1 = property(lambda self: self.value("sigma_1"), doc="Bristle damping per unit load [s/m].")
-    sigma_2 = property(lambda self: self.value("sigma_2"), doc="Viscous friction per unit load [s/m].")
-    radius = property(lambda self: self.value("contact_radius"), doc="Contact radius r [m].")
+    sigma_0 = property(
+        lambda self: self.value("sigma_0"), doc="Bristle stiffness per unit load [1/m]."
+    )
+    sigma_1 = property(
+        lambda self: self.value("sigma_1"), doc="Bristle damping per unit load [s/m]."
+    )
+    sigma_2 = property(
+        lambda self: self.value("sigma_2"), doc="Viscous friction per unit load [s/m]."
+    )
+    radius = property(
+        lambda self: self.value("contact_radius"), doc="Contact radius r [m]."
+    )
 
     # ------------------------------------------------------------------ the interface
 
@@ -118,7 +148,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
         Raises InvalidValueError for what is not a tensor of numbers.
         """
-        law, given = self._contact_at(None).law, self._number("speed", speed)
+        law = self._contact_at(None).law
+        given = self._number("speed", speed)
         return formulas.stribeck(xp, given[..., None, None].abs(), law)[..., 0, 0]
 
     def steady_state_z(self, v_scaled: Tensor) -> Tensor:
@@ -129,8 +160,11 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         Raises InvalidValueError for what is not a tensor `[..., 3]`.
         """
         v_scaled = self._number("v_scaled", v_scaled)
-        (law, shape, _), speed = self._contact_at(None), xp.norm(v_scaled, -1)
-        h = shape.surface(v_scaled, speed) / torch.where(speed > 0.0, speed, 1.0)  # zero at rest
+        (law, shape, _) = self._contact_at(None)
+        speed = xp.norm(v_scaled, -1)
+        h = shape.surface(v_scaled, speed) / torch.where(
+            speed > 0.0, speed, 1.0
+        )  # zero at rest
         most = formulas.stribeck(xp, published.wide(speed), law) / law.sigma_0
         return published.narrow(published.raw(xp, shape, published.wide(h) * most))
 
@@ -146,14 +180,23 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         law, shape, _ = self._contact_at(None)
         z, v, load = self._inputs(z, v, f_n)
         by = published.drive(xp, law, shape, v)
-        z, rate = (published.scaled(xp, shape, published.wide(each)) for each in (z, self._number("z_dot", z_dot)))
-        return load[..., None] * published.wrench(xp, shape, formulas.traction(z, rate, by.viscous, law))
+        z, rate = (
+            published.scaled(xp, shape, published.wide(each))
+            for each in (z, self._number("z_dot", z_dot))
+        )
+        return load[..., None] * published.wrench(
+            xp, shape, formulas.traction(z, rate, by.viscous, law)
+        )
 
-    def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def step(
+        self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float
+    ) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the bristles after `dt` [s] of a constant twist, and the wrench at the end. Stable at any `dt`."""
         return super().step(z, v, f_n, dt)
 
-    def forward(self, z: Tensor, v: Tensor, f_n: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def forward(
+        self, z: Tensor, v: Tensor, f_n: Tensor | float
+    ) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return `bristle_rate` and `force`: `(z_dot, wrench)`."""
         return super().forward(z, v, f_n)
 
@@ -164,7 +207,12 @@ def _ring(radius: float) -> ContactPatch:
     return ContactPatch.points(points, name="ring")
 
 
-def simulate(model: ReducedPlanarLuGre, v_profile: Tensor, f_n: Tensor | float, dt: Tensor | float = 1e-4) -> Tensor:
+def simulate(
+    model: ReducedPlanarLuGre,
+    v_profile: Tensor,
+    f_n: Tensor | float,
+    dt: Tensor | float = 1e-4,
+) -> Tensor:
     """Return the wrenches `[T, 3]` at the end of each of the steps `dt` [s] of `v_profile` `[T, 3]`, from rest.
 
     Batches `[..., T, 3]` and loads `[T]` are possible, as in `planarfriction.torch.rollout`, which chooses the method.
@@ -173,7 +221,11 @@ def simulate(model: ReducedPlanarLuGre, v_profile: Tensor, f_n: Tensor | float, 
 
 
 def tracking_loss(
-    model: ReducedPlanarLuGre, v_profile: Tensor, reference: Tensor, f_n: Tensor | float, dt: Tensor | float = 1e-4
+    model: ReducedPlanarLuGre,
+    v_profile: Tensor,
+    reference: Tensor,
+    f_n: Tensor | float,
+    dt: Tensor | float = 1e-4,
 ) -> Tensor:
     """Return the mean squared error of `simulate` against wrenches `[T, 3]`, relative to the load.
 
@@ -187,19 +239,32 @@ def smoke_test() -> None:
 
     Everything is finite, every number has a gradient, and the torque of a steady spin stays below `mu_s f_n r`.
     """
-    model, f_n = ReducedPlanarLuGre(dtype=torch.float64), 2.0
+    model = ReducedPlanarLuGre(dtype=torch.float64)
+    f_n = 2.0
     t = torch.linspace(0.0, 0.2, 2000, dtype=torch.float64)
-    v_profile = torch.stack([1e-2 * torch.sin(40.0 * t), 5e-3 * torch.cos(30.0 * t), torch.sin(25.0 * t)], -1)
+    v_profile = torch.stack(
+        [1e-2 * torch.sin(40.0 * t), 5e-3 * torch.cos(30.0 * t), torch.sin(25.0 * t)],
+        -1,
+    )
     wrenches = simulate(model, v_profile, f_n)
     wrenches.square().sum().backward()
     gradients = {name: raw.grad for name, raw in model.named_parameters()}
-    lost = [name for name, slope in gradients.items() if slope is None or not slope.isfinite() or slope == 0.0]
+    lost = [
+        name
+        for name, slope in gradients.items()
+        if slope is None or not slope.isfinite() or slope == 0.0
+    ]
     if lost or not wrenches.isfinite().all():
-        raise FrictionError(f"ReducedPlanarLuGre has no finite wrench, or no gradient to {', '.join(lost)}")
+        raise FrictionError(
+            f"ReducedPlanarLuGre has no finite wrench, or no gradient to {', '.join(lost)}"
+        )
     spin = torch.tensor([0.0, 0.0, 0.02], dtype=torch.float64).expand(100, 3)
-    torque, bound = simulate(model, spin, f_n, 1e-2)[-1, 2].abs().item(), (model.mu_s * model.radius).item() * f_n
+    torque = simulate(model, spin, f_n, 1e-2)[-1, 2].abs().item()
+    bound = (model.mu_s * model.radius).item() * f_n
     if not torque <= bound:
-        raise FrictionError(f"the torque of a steady spin is {torque} N m, above mu_s f_n r = {bound} N m")
+        raise FrictionError(
+            f"the torque of a steady spin is {torque} N m, above mu_s f_n r = {bound} N m"
+        )
     print(
         f"ReducedPlanarLuGre: {len(t)} steps, gradients to {len(gradients)} numbers; steady torque {torque:.4f} N m,"
         f" at most {bound:.4f} N m"

@@ -10,7 +10,11 @@ from torch import Tensor
 from planarfriction.derivatives import Rollout
 from planarfriction.errors import InvalidValueError
 from planarfriction.tensors.namespace import rollout_inputs
-from planarfriction.tensors.operations import RolloutOperation, SceneOperation, simulator
+from planarfriction.tensors.operations import (
+    RolloutOperation,
+    SceneOperation,
+    simulator,
+)
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import FrictionModule
 from planarfriction.torch.namespace import xp
@@ -38,24 +42,36 @@ def rollout(
     Raises `InvalidValueError` as a step does (see `TensorModel`), and for a method that is not possible.
     """
     front = "planarfriction.torch"
-    inputs = rollout_inputs(model, FrictionModule, front, state, twist, normal_force, dt, method)
+    inputs = rollout_inputs(
+        model, FrictionModule, front, state, twist, normal_force, dt, method
+    )
     start, twist, load, step = inputs
     if step.ndim:
         raise InvalidValueError("dt", "be one number", f"shape {list(step.shape)}")
     if twist.shape[-2] == 0:
-        raise InvalidValueError("twist", "have T > 0 steps", f"shape {list(twist.shape)}")
+        raise InvalidValueError(
+            "twist", "have T > 0 steps", f"shape {list(twist.shape)}"
+        )
     pack, buffers, weights = model.compiled()
     obstacle = _obstacle(model, buffers, *inputs)
     if method == "adjoint" and obstacle:
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle:
         return Rollout(*model.rollout(*inputs, parameters=parameters))
-    cells, weighs = len(weights) > 0, any(each.requires_grad for each in weights)
-    operation, inputs = RolloutOperation(pack, len(model.state_shape), cells, weighs), (start, twist, load)
-    return Rollout(*adjoint.call(operation, (step, *buffers), *inputs, model._vector(parameters), *weights))
+    cells = len(weights) > 0
+    weighs = any(each.requires_grad for each in weights)
+    operation = RolloutOperation(pack, len(model.state_shape), cells, weighs)
+    inputs = (start, twist, load)
+    return Rollout(
+        *adjoint.call(
+            operation, (step, *buffers), *inputs, model._vector(parameters), *weights
+        )
+    )
 
 
-def _obstacle(model: FrictionModule, buffers: Sequence[Tensor], *tensors: Tensor) -> str:
+def _obstacle(
+    model: FrictionModule, buffers: Sequence[Tensor], *tensors: Tensor
+) -> str:
     """Return the reason why the adjoint cannot be used, or an empty text."""
     if any(tensor.device.type != "cpu" for tensor in (*tensors, model.physical.values)):
         return "for tensors that are not on the processor"
@@ -84,15 +100,26 @@ def tracking_loss(
 
     Raises InvalidValueError as `rollout` does.
     """
-    run = rollout(model, state, twist, normal_force, dt, parameters=parameters, method=method)
+    run = rollout(
+        model, state, twist, normal_force, dt, parameters=parameters, method=method
+    )
     measured = model._number("wrenches", wrenches)
     load = model._number("normal_force", normal_force).detach()[..., None]
     loaded = load > 0.0
     one = torch.ones_like(model.lever)
     lever = torch.stack([one, one, model.lever]).to(load)
-    error = torch.where(loaded, (run.wrenches - measured) / (torch.where(loaded, load, 1.0) * lever), 0.0)
-    count = loaded.expand(torch.broadcast_shapes(loaded.shape, (*error.shape[:-1], 1))).sum()
+    error = torch.where(
+        loaded,
+        (run.wrenches - measured) / (torch.where(loaded, load, 1.0) * lever),
+        0.0,
+    )
+    count = loaded.expand(
+        torch.broadcast_shapes(loaded.shape, (*error.shape[:-1], 1))
+    ).sum()
     return (error * error).sum() / count.clamp(min=1)
 
 
-simulate_scene = simulator(xp, lambda function, numbers: adjoint.call(SceneOperation(function, {}), (), numbers))
+simulate_scene = simulator(
+    xp,
+    lambda function, numbers: adjoint.call(SceneOperation(function, {}), (), numbers),
+)

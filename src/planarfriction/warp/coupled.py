@@ -65,16 +65,26 @@ class CoupledPatches:
             raise InvalidValueError("models", "hold at least one", "none")
         precision = arrays.precision_of(dtype)
         self.worlds = validation.count("worlds", worlds, at_most=2**31 - 1)
-        self.device, self.dtype = wp.get_device(device), dtype
+        self.device = wp.get_device(device)
+        self.dtype = dtype
         known = list({id(model): model for model in self.models}.values())
-        which = [next(i for i, each in enumerate(known) if each is model) for model in self.models]
+        which = [
+            next(i for i, each in enumerate(known) if each is model)
+            for model in self.models
+        ]
         if follows is not None and len(follows) != len(which):
-            raise InvalidValueError("follows", f"hold one for each of {len(which)} models", len(follows))
+            raise InvalidValueError(
+                "follows", f"hold one for each of {len(which)} models", len(follows)
+            )
         pieces = [pieces_of(model, precision) for model in known]
         can = [not pieces[kind].fixed for kind in which]
         for p, follow in enumerate(follows or ()):
             if follow and not can[p]:
-                raise InvalidValueError("follows", "be False for a law with a reference_load", f"True of model {p}")
+                raise InvalidValueError(
+                    "follows",
+                    "be False for a law with a reference_load",
+                    f"True of model {p}",
+                )
         self._follows = follows is not None or all(can)
         radii = [lever_of(model) or 1.0 for model in self.models]
         source = coupled_source_of(pieces, which, follows or can, radii, precision)
@@ -83,7 +93,9 @@ class CoupledPatches:
         self.names = tuple((*pieces[kind].parameters, "scale") for kind in which)
         """Parameters of each patch, in the order of the columns of `parameters`, one patch after the other."""
         defaults = [{**pieces[kind].parameters, "scale": 1.0} for kind in which]
-        self.parameters = wp.array(self._rows(defaults, parameters or {}), dtype=dtype, device=self.device)
+        self.parameters = wp.array(
+            self._rows(defaults, parameters or {}), dtype=dtype, device=self.device
+        )
         """Parameters [worlds or 1, names]; a program may write new ones between steps."""
         self.status = wp.zeros(self.worlds, dtype=wp.int32, device=self.device)
         """Bits of what was wrong since the last `check` [worlds]: 1 in parameters, 2 in what a step was given."""
@@ -99,8 +111,13 @@ class CoupledPatches:
     def results(self) -> Any:
         """Return a `CoupledStep` of Warp's arrays, which `step` can write."""
         k = len(self.models)
-        rounds, converged = (wp.zeros(self.worlds, dtype=wp.int32, device=self.device) for _ in range(2))
-        own: list[Any] = [self.rest(), *(self._zeros(*shape) for shape in ((k, 3), (k, 3), (k,)))]
+        rounds, converged = (
+            wp.zeros(self.worlds, dtype=wp.int32, device=self.device) for _ in range(2)
+        )
+        own: list[Any] = [
+            self.rest(),
+            *(self._zeros(*shape) for shape in ((k, 3), (k, 3), (k,))),
+        ]
         return CoupledStep(*own, rounds, self._zeros(), converged)  # pyright: ignore
 
     def step(
@@ -127,22 +144,36 @@ class CoupledPatches:
         range.
         """
         if results.state is state:
-            raise InvalidValueError("results.state", "be another array than state", "the same")
-        k, one = len(self.models), Problems()
-        one.rows, one.dt = self.parameters.shape[0], validation.non_negative("dt", dt)
+            raise InvalidValueError(
+                "results.state", "be another array than state", "the same"
+            )
+        k = len(self.models)
+        one = Problems()
+        one.rows = self.parameters.shape[0]
+        one.dt = validation.non_negative("dt", dt)
         one.tolerance = validation.positive("tolerance", tolerance)
-        one.iterations = coupling.ITERATIONS if iterations is None else validation.count("iterations", iterations, 0)
+        one.iterations = (
+            coupling.ITERATIONS
+            if iterations is None
+            else validation.count("iterations", iterations, 0)
+        )
         one.again = int(iterations is None)
         one.state = self._address("state", state, *self.state_shape)
         one.twist = self._address("twist", host.twist, k, 3)
         one.normal_force = self._address("normal_force", host.normal_force, k)
         one.wrench = self._address("wrench", host.wrench, k, 3)
-        one.twist_response = self._address("twist_response", host.twist_response, 3 * k, 3 * k)
+        one.twist_response = self._address(
+            "twist_response", host.twist_response, 3 * k, 3 * k
+        )
         if host.load_response is not None:
-            one.load_response = self._address("load_response", host.load_response, k, 3 * k)
+            one.load_response = self._address(
+                "load_response", host.load_response, k, 3 * k
+            )
         if host.moments is not None:
             if not self._follows:
-                raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
+                raise InvalidValueError(
+                    "moments", "be None for a law with a reference_load", "moments"
+                )
             one.moments = self._address("moments", host.moments, k, 2)
         if skip is not None:
             one.skip = self._address("skip", skip, dtype=wp.int32)
@@ -151,9 +182,14 @@ class CoupledPatches:
         one.new_twist = self._address("results.twist", results.twist, k, 3)
         one.new_load = self._address("results.normal_force", results.normal_force, k)
         one.residual = self._address("results.residual", results.residual)
-        one.rounds = self._address("results.iterations", results.iterations, dtype=wp.int32)
-        one.converged = self._address("results.converged", results.converged, dtype=wp.int32)
-        one.parameters, one.status = self.parameters.ptr, self.status.ptr
+        one.rounds = self._address(
+            "results.iterations", results.iterations, dtype=wp.int32
+        )
+        one.converged = self._address(
+            "results.converged", results.converged, dtype=wp.int32
+        )
+        one.parameters = self.parameters.ptr
+        one.status = self.status.ptr
         one.numbers = self._numbers.ptr
         wp.launch(self.kernel, dim=self.worlds, inputs=[one], device=self.device)
 
@@ -168,20 +204,31 @@ class CoupledPatches:
         return wp.zeros((self.worlds, *shape), dtype=self.dtype, device=self.device)
 
     def _address(self, name: str, given: Any, *shape: int, dtype: Any = None) -> int:
-        return arrays.address(name, given, (self.worlds, *shape), dtype or self.dtype, self.device)
+        return arrays.address(
+            name, given, (self.worlds, *shape), dtype or self.dtype, self.device
+        )
 
-    def _rows(self, defaults: Sequence[Mapping[str, float]], given: Mapping[str, Any]) -> np.ndarray:
+    def _rows(
+        self, defaults: Sequence[Mapping[str, float]], given: Mapping[str, Any]
+    ) -> np.ndarray:
         """Return the parameters of all patches, side by side."""
         validation.keys("parameters", dict(given), (), set().union(*defaults))
         values = {name: np.asarray(value) for name, value in given.items()}
         each = [
             {
-                name: value[:, p] if value.shape == (self.worlds, len(defaults)) else value
+                name: value[:, p]
+                if value.shape == (self.worlds, len(defaults))
+                else value
                 for name, value in values.items()
                 if name in own
             }
             for p, own in enumerate(defaults)
         ]
-        rows = [arrays.parameter_rows(own, mine, self.worlds) for own, mine in zip(defaults, each, strict=True)]
+        rows = [
+            arrays.parameter_rows(own, mine, self.worlds)
+            for own, mine in zip(defaults, each, strict=True)
+        ]
         count = max(map(len, rows))
-        return np.concatenate([np.broadcast_to(row, (count, row.shape[1])) for row in rows], axis=1)
+        return np.concatenate(
+            [np.broadcast_to(row, (count, row.shape[1])) for row in rows], axis=1
+        )

@@ -64,28 +64,49 @@ class Model:
         if not models:
             raise InvalidValueError("model", "hold at least one", "none")
         self.contacts = validation.count("contacts", contacts, at_most=2**31 - 1)
-        self.device, self.dtype = wp.get_device(device), dtype
+        self.device = wp.get_device(device)
+        self.dtype = dtype
         kinds = self._indices(which, len(models))
-        precision, most = arrays.precision_of(dtype), max((each.state_shape for each in models), key=math.prod)
-        pieces = [pieces_of(each, precision, count=most[-1] if len(most) > 1 else 0) for each in models]
+        precision = arrays.precision_of(dtype)
+        most = max((each.state_shape for each in models), key=math.prod)
+        pieces = [
+            pieces_of(each, precision, count=most[-1] if len(most) > 1 else 0)
+            for each in models
+        ]
         sources = [source_of(each, precision) for each in pieces]
         self._fixed = pieces[0].fixed
         if any(each.text != sources[0].text for each in sources):
-            raise InvalidValueError("model", "have one source, as all of `ReducedModel(patch, law)` do", "several")
+            raise InvalidValueError(
+                "model",
+                "have one source, as all of `ReducedModel(patch, law)` do",
+                "several",
+            )
         numbers = [{**each.parameters, "scale": 1.0} for each in pieces]
         self.names = tuple(numbers[0])
         """Parameters in the order of the columns of `parameters`."""
         self.state_shape = (self.contacts, *most)
-        columns = {name: np.array([each[name] for each in numbers]) for name in self.names}
-        differ = {name: each[kinds] for name, each in columns.items() if (each != each[0]).any()}
-        rows = arrays.parameter_rows(numbers[0], differ | dict(parameters or {}), self.contacts)
+        columns = {
+            name: np.array([each[name] for each in numbers]) for name in self.names
+        }
+        differ = {
+            name: each[kinds]
+            for name, each in columns.items()
+            if (each != each[0]).any()
+        }
+        rows = arrays.parameter_rows(
+            numbers[0], differ | dict(parameters or {}), self.contacts
+        )
         self.parameters = wp.array(rows, dtype=dtype, device=self.device)
         """Parameters [contacts or 1, names]; a program may write new ones between steps."""
         self.which = wp.array(kinds, dtype=wp.int32, device=self.device)
         """Index of the model of each contact [contacts]; a program may write new ones between steps."""
         self.status = wp.zeros(self.contacts, dtype=wp.int32, device=self.device)
         """Bits of what was wrong since the last `check` [contacts]: 1 in parameters, 2 in state, twist or load."""
-        self._numbers = wp.array(np.stack([each.numbers for each in sources]), dtype=dtype, device=self.device)
+        self._numbers = wp.array(
+            np.stack([each.numbers for each in sources]),
+            dtype=dtype,
+            device=self.device,
+        )
         self.kernel = kernel_of(sources[0].text, Batch)
         """Kernel of `step` and `rollout`."""
         wp.load_module(self.kernel.module, device=self.device)
@@ -136,7 +157,16 @@ class Model:
 
         Raises InvalidValueError as `step` does.
         """
-        self._launch(twists.shape[:1], state, twists, normal_forces, dt, new_state, wrenches, moments)
+        self._launch(
+            twists.shape[:1],
+            state,
+            twists,
+            normal_forces,
+            dt,
+            new_state,
+            wrenches,
+            moments,
+        )
 
     def check(self) -> None:
         """Wait for the device, and forget what was wrong.
@@ -146,23 +176,42 @@ class Model:
         arrays.check(self.status, WRONG, "contacts")
 
     def _launch(
-        self, steps: tuple[int, ...], state: Any, twist: Any, load: Any, dt: float, new: Any, wrench: Any, moments: Any
+        self,
+        steps: tuple[int, ...],
+        state: Any,
+        twist: Any,
+        load: Any,
+        dt: float,
+        new: Any,
+        wrench: Any,
+        moments: Any,
     ) -> None:
         if moments is not None and self._fixed:
-            raise InvalidValueError("moments", "be None for a law with a reference_load", "moments")
+            raise InvalidValueError(
+                "moments", "be None for a law with a reference_load", "moments"
+            )
         along = (*steps, self.contacts)
         batch = Batch()
-        batch.contacts, batch.steps, batch.rows = self.contacts, *(steps or (1,)), self.parameters.shape[0]
+        batch.contacts, batch.steps, batch.rows = (
+            self.contacts,
+            *(steps or (1,)),
+            self.parameters.shape[0],
+        )
         batch.dt = validation.non_negative("dt", dt)
         batch.state = self._address("state", state, self.state_shape)
         batch.twist = self._address("twist", twist, (*along, 3))
         batch.normal_force = self._address("normal_force", load, along)
-        batch.moments = 0 if moments is None else self._address("moments", moments, (*along, 2))
+        batch.moments = (
+            0 if moments is None else self._address("moments", moments, (*along, 2))
+        )
         batch.new_state = self._address("new_state", new, self.state_shape)
         batch.wrench = self._address("wrench", wrench, (*along, 3))
-        batch.parameters, batch.status = self.parameters.ptr, self.status.ptr
-        batch.numbers, batch.number_count = self._numbers.ptr, self._numbers.shape[1]
-        batch.models, batch.which = self._numbers.shape[0], self.which.ptr
+        batch.parameters = self.parameters.ptr
+        batch.status = self.status.ptr
+        batch.numbers = self._numbers.ptr
+        batch.number_count = self._numbers.shape[1]
+        batch.models = self._numbers.shape[0]
+        batch.which = self.which.ptr
         wp.launch(self.kernel, dim=self.contacts, inputs=[batch], device=self.device)
 
     def _indices(self, which: Any, count: int) -> np.ndarray:
@@ -170,8 +219,16 @@ class Model:
         if which is None and count > 1:
             raise InvalidValueError("which", "name the model of each contact", "none")
         given = np.zeros(self.contacts, int) if which is None else np.asarray(which)
-        if given.shape != (self.contacts,) or given.dtype.kind not in "iu" or not np.isin(given, range(count)).all():
-            raise InvalidValueError("which", f"be {self.contacts} whole numbers from 0 to {count - 1}", which)
+        if (
+            given.shape != (self.contacts,)
+            or given.dtype.kind not in "iu"
+            or not np.isin(given, range(count)).all()
+        ):
+            raise InvalidValueError(
+                "which",
+                f"be {self.contacts} whole numbers from 0 to {count - 1}",
+                which,
+            )
         return given
 
     def _address(self, name: str, given: Any, shape: tuple[int, ...]) -> int:

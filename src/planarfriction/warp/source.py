@@ -43,7 +43,11 @@ def source_of(model: Pieces, precision: str) -> Source:
 
 
 def coupled_source_of(
-    models: Sequence[Pieces], which: Sequence[int], follows: Sequence[bool], radii: Sequence[float], precision: str
+    models: Sequence[Pieces],
+    which: Sequence[int],
+    follows: Sequence[bool],
+    radii: Sequence[float],
+    precision: str,
 ) -> Source:
     """Return the source of a step in contact space.
 
@@ -70,7 +74,9 @@ def coupled_source_of(
         follows=follows,
         loaded="loaded" if any(each.fixed for each in pieces) else "unit",
         rounding=list(map(writer.constant, ROUNDING[precision])),
-        shortening="\n".join(writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)),
+        shortening="\n".join(
+            writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)
+        ),
         systems=_systems(writer, 4 * len(which)),
         stages=writer.constant(STAGES),
         shorter=writer.constant(SHORTER),
@@ -86,15 +92,24 @@ def _shortening(trace: Trace) -> Any:
 
 def _systems(writer: Writer, unknowns: int) -> str:
     """Return the functions of the linear systems, and of slopes that fall."""
-    loops, names = Loops(writer), ("slopes", "scale", "turned", "axes")
-    loops.add(small_matrices.leave_out_rising, tuple(Array(name, (9,)) for name in names))
-    loops.add(small_matrices.solved, (Array("matrix", (unknowns**2,)), Array("x", (unknowns,)), Fixed(unknowns)))
+    loops = Loops(writer)
+    names = ("slopes", "scale", "turned", "axes")
+    loops.add(
+        small_matrices.leave_out_rising, tuple(Array(name, (9,)) for name in names)
+    )
+    loops.add(
+        small_matrices.solved,
+        (Array("matrix", (unknowns**2,)), Array("x", (unknowns,)), Fixed(unknowns)),
+    )
     return "\n\n".join(loops.functions).replace("static ", "static CUDA_CALLABLE ")
 
 
-def _described(models: Sequence[Pieces], precision: str, slopes: bool) -> tuple[list[dict[str, Any]], np.ndarray]:
+def _described(
+    models: Sequence[Pieces], precision: str, slopes: bool
+) -> tuple[list[dict[str, Any]], np.ndarray]:
     """Return what a template needs of each model, and the tables of all of them."""
-    writer, described = Writer(precision), []
+    writer = Writer(precision)
+    described = []
     joined: list[np.ndarray] = []
     for pieces in models:
         block = _slopes_by_twist(pieces) if slopes else pieces.step
@@ -104,14 +119,22 @@ def _described(models: Sequence[Pieces], precision: str, slopes: bool) -> tuple[
         tables = {name: pieces.tables[name] for name in ("place_x", "place_y", "share")}
         for axis in "xy":  # digits that single precision has no room for, and of which the slopes of a plane make much
             place = tables[f"place_{axis}"]
-            tables[f"rest_{axis}"] = place - place.astype({"float": "f4", "double": "f8"}[precision])
-        tables |= {name: each for name, each in pieces.tables.items() if any(f"{name}[" in line for line in lines)}
+            tables[f"rest_{axis}"] = place - place.astype(
+                {"float": "f4", "double": "f8"}[precision]
+            )
+        tables |= {
+            name: each
+            for name, each in pieces.tables.items()
+            if any(f"{name}[" in line for line in lines)
+        }
         described.append(
             {
                 "precision": precision,
                 "pieces": pieces,
                 "slopes": slopes,
-                "tilt": tilt_of(pieces.count).replace("static ", "CUDA_CALLABLE ").replace(")\n{", ") const\n{"),
+                "tilt": tilt_of(pieces.count)
+                .replace("static ", "CUDA_CALLABLE ")
+                .replace(")\n{", ") const\n{"),
                 "ranges": [PARAMETERS[each][1] for each in pieces.parameters],
                 "largest": writer.constant(PRECISIONS[precision]),
                 "numbers": _placed(tables, joined),
@@ -123,10 +146,18 @@ def _described(models: Sequence[Pieces], precision: str, slopes: bool) -> tuple[
 
 def _slopes_by_twist(pieces: Pieces) -> Block:
     """Return the step with the slopes of the wrench by the twist, row by row, and of a fixed stiffness by the load."""
-    block, first = pieces.slopes(), pieces.states + 3
-    rows = [block.results[first + pieces.columns * row :][: pieces.columns] for row in range(3)]
-    results = sum((row[pieces.states : pieces.states + 3] for row in rows), block.results[:first])
-    return Block(block.operations, results + tuple(row[-1] for row in rows if pieces.fixed))
+    block = pieces.slopes()
+    first = pieces.states + 3
+    rows = [
+        block.results[first + pieces.columns * row :][: pieces.columns]
+        for row in range(3)
+    ]
+    results = sum(
+        (row[pieces.states : pieces.states + 3] for row in rows), block.results[:first]
+    )
+    return Block(
+        block.operations, results + tuple(row[-1] for row in rows if pieces.fixed)
+    )
 
 
 def _placed(tables: dict[str, np.ndarray], joined: list[np.ndarray]) -> dict[str, int]:

@@ -49,7 +49,10 @@ def looped_of_two(function):
     return call
 
 
-exp, expm1, log, sin, cos = (looped(getattr(compiled_math, name)) for name in ("exp", "expm1", "log", "sin", "cos"))
+exp, expm1, log, sin, cos = (
+    looped(getattr(compiled_math, name))
+    for name in ("exp", "expm1", "log", "sin", "cos")
+)
 power, atan2 = looped_of_two(compiled_math.power), looped_of_two(compiled_math.atan2)
 
 
@@ -67,14 +70,20 @@ def test_exp(random, reach):
 def test_exp_at_the_ends_of_its_range():
     assert exp([0.0])[0] == 1.0
     # Limited to +-708 as stated; bristles ask for exp(-infinity) when a step is long.
-    assert np.array_equal(exp([1e9, math.inf, -1e9, -math.inf]), exp([708.0, 708.0, -708.0, -708.0]))
+    assert np.array_equal(
+        exp([1e9, math.inf, -1e9, -math.inf]), exp([708.0, 708.0, -708.0, -708.0])
+    )
     assert 0.0 < exp([-math.inf])[0] < 1e-300
 
 
 def test_expm1(random):
     tiny = 10.0 ** random.uniform(-300, 2.8, 100_000)
-    x = np.concatenate([random.uniform(-1.0, 1.0, 100_000), tiny, -tiny, [0.4, 700.0, -800.0]])
-    assert np.abs(expm1(x) / np.expm1(x) - 1.0).max() < 6e-16 + NUMPY  # the stated error
+    x = np.concatenate(
+        [random.uniform(-1.0, 1.0, 100_000), tiny, -tiny, [0.4, 700.0, -800.0]]
+    )
+    assert (
+        np.abs(expm1(x) / np.expm1(x) - 1.0).max() < 6e-16 + NUMPY
+    )  # the stated error
     assert expm1([0.0])[0] == 0.0 and expm1([-math.inf])[0] == -1.0
 
 
@@ -89,13 +98,24 @@ def test_log_at_special_values():
     assert log([1.0])[0] == 0.0
     # Half the last place: powers of two have no series.
     powers = 2.0 ** np.arange(-1022.0, 1024.0)
-    assert log(powers) == pytest.approx(np.log(2.0) * np.arange(-1022, 1024), rel=EPSILON)
-    assert log([0.0])[0] == pytest.approx(-709.0, abs=1.0)  # stated: about, not minus infinity
+    assert log(powers) == pytest.approx(
+        np.log(2.0) * np.arange(-1022, 1024), rel=EPSILON
+    )
+    assert log([0.0])[0] == pytest.approx(
+        -709.0, abs=1.0
+    )  # stated: about, not minus infinity
 
 
 def test_sin_and_cos(random):
-    x = np.concatenate([random.uniform(-math.pi / 2, math.pi / 2, 100_000), [0.0, math.pi / 2, -math.pi / 2]])
-    assert np.abs(sin(x) - np.sin(x)).max() < 4e-16 + NUMPY / 2  # the stated absolute error; NumPy's, of values below 1
+    x = np.concatenate(
+        [
+            random.uniform(-math.pi / 2, math.pi / 2, 100_000),
+            [0.0, math.pi / 2, -math.pi / 2],
+        ]
+    )
+    assert (
+        np.abs(sin(x) - np.sin(x)).max() < 4e-16 + NUMPY / 2
+    )  # the stated absolute error; NumPy's, of values below 1
     assert np.abs(cos(x) - np.cos(x)).max() < 4e-16 + NUMPY / 2
     assert sin([0.0])[0] == 0.0 and cos([0.0])[0] == 1.0
 
@@ -103,14 +123,20 @@ def test_sin_and_cos(random):
 def test_atan2(random):
     angle = random.uniform(-math.pi, math.pi, 100_000)
     length = 10.0 ** random.uniform(-12, 3, angle.size)
-    y, x = length * np.sin(angle), length * np.cos(angle)
-    assert np.abs(atan2(y, x) - np.arctan2(y, x)).max() < 1e-15 + 2 * NUMPY  # the stated error; angles reach pi
+    y = length * np.sin(angle)
+    x = length * np.cos(angle)
+    assert (
+        np.abs(atan2(y, x) - np.arctan2(y, x)).max() < 1e-15 + 2 * NUMPY
+    )  # the stated error; angles reach pi
     small = 10.0 ** random.uniform(-300, -3, 1000)
-    assert atan2(small, 1.0) == pytest.approx(np.arctan2(small, 1.0), rel=EPSILON)  # relative, near the axis
+    assert atan2(small, 1.0) == pytest.approx(
+        np.arctan2(small, 1.0), rel=EPSILON
+    )  # relative, near the axis
 
 
 def test_atan2_on_the_axes():
-    y, x = np.array([0, 0, 1, -1, 0, 1, -1, 1, -1.0]), np.array([1, -1, 0, 0, 0, 1, 1, -1, -1.0])
+    y = np.array([0, 0, 1, -1, 0, 1, -1, 1, -1.0])
+    x = np.array([1, -1, 0, 0, 0, 1, 1, -1, -1.0])
     assert atan2(y, x) == pytest.approx(np.arctan2(y, x), abs=EPSILON)
 
 
@@ -127,17 +153,22 @@ def test_power_is_exact_where_it_can_be(random):
     assert np.array_equal(power(x, 2.0), x * x)
     assert np.array_equal(power(1.0, [0.1, 1.0, 2.0, 7.0]), np.ones(4))
     # At rest: no exponent leaves a rest of exp(-709 exponent).
-    assert np.array_equal(power(0.0, [0.001, 0.1, 0.5, 1.0, 1.5, 2.0, 9.0]), np.zeros(7))
+    assert np.array_equal(
+        power(0.0, [0.001, 0.1, 0.5, 1.0, 1.5, 2.0, 9.0]), np.zeros(7)
+    )
 
 
 def test_integers_in_order(random):
-    x = np.concatenate([[-3.0, -1e-300], np.sort(10.0 ** random.uniform(-300, 300, 1000)), [math.inf]])
+    x = np.concatenate(
+        [[-3.0, -1e-300], np.sort(10.0 ** random.uniform(-300, 300, 1000)), [math.inf]]
+    )
     bits = [njit(lambda x: compiled_math.in_order(x))(each) for each in x[::100]]
     assert bits == sorted(bits) and bits[0] < 0 and len(set(bits)) == len(bits)
 
 
 def test_where_minimum_maximum():
-    a, b = np.array([1.0, -2.0, 3.0, 0.0]), np.array([2.0, -3.0, 3.0, 0.0])
+    a = np.array([1.0, -2.0, 3.0, 0.0])
+    b = np.array([2.0, -3.0, 3.0, 0.0])
     assert np.array_equal(looped_of_two(compiled_math.minimum)(a, b), np.minimum(a, b))
     assert np.array_equal(looped_of_two(compiled_math.maximum)(a, b), np.maximum(a, b))
     chosen = looped(njit(lambda x: compiled_math.where(x > 0.0, x, 7.0)))

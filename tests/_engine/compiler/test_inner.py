@@ -39,7 +39,9 @@ def symbol_of(function) -> tuple:
 
 def test_callers_take_inner_functions_in_and_give_the_same_numbers():
     compiled = njit(outer)
-    assert compiled(POINT) == pytest.approx(2.0 * math.sin(3.0 * POINT) + 3.0 * POINT, rel=1e-15)
+    assert compiled(POINT) == pytest.approx(
+        2.0 * math.sin(3.0 * POINT) + 3.0 * POINT, rel=1e-15
+    )
     library, name = symbol_of(compiled)
     assert library.get_pointer_to_function(name) != 0
     inside = library.get_llvm_str()
@@ -60,7 +62,9 @@ def test_inner_functions_skip_passes_that_find_nothing_in_them():
 
     with event.install_recorder("numba:run_pass") as recorder:
         whole(POINT)
-    passes = [each.data["name"].split(" [")[0] for _, each in recorder.buffer if each.is_start]
+    passes = [
+        each.data["name"].split(" [")[0] for _, each in recorder.buffer if each.is_start
+    ]
     assert passes.count("nopython_type_inference") == 2
     assert passes.count("inline_closure_likes") == passes.count("native_lowering") == 1
     assert passes.count("lowering of inner functions") == 1

@@ -42,8 +42,21 @@ print(fourth(2.0))
     ],
 )
 def test_without_it_functions_are_compiled_all_the_same(owner, name):
-    command = [sys.executable, "-W", "always::RuntimeWarning", "-c", PROGRAM, owner, name]
-    run = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "NUMBA_BOUNDSCHECK": "0"})
+    command = [
+        sys.executable,
+        "-W",
+        "always::RuntimeWarning",
+        "-c",
+        PROGRAM,
+        owner,
+        name,
+    ]
+    run = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "NUMBA_BOUNDSCHECK": "0"},
+    )
     assert run.stdout.strip() == "16.0", run.stderr
     (line,) = [line for line in run.stderr.splitlines() if "RuntimeWarning" in line]
     assert name in line and numba.__version__ in line and llvmlite.__version__ in line

@@ -58,7 +58,9 @@ def sources(tmp_path, monkeypatch) -> Path:
     folder.mkdir()
     (folder / "own_formula.py").write_text(FORMULA)
     (folder / "own_loops.py").write_text(LOOPS)
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python's own cache goes by time and size
+    monkeypatch.setattr(
+        sys, "dont_write_bytecode", True
+    )  # Python's own cache goes by time and size
     monkeypatch.setattr(config, "CACHE_DIR", "")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
     monkeypatch.setattr(machine_code.MachineCode, "warned", False)
@@ -78,7 +80,8 @@ def imported(sources: Path):
 
 
 def was_read(function) -> bool:
-    hits, misses = sum(function.stats.cache_hits.values()), sum(function.stats.cache_misses.values())
+    hits = sum(function.stats.cache_hits.values())
+    misses = sum(function.stats.cache_misses.values())
     assert hits + misses == 1
     return hits == 1
 
@@ -87,7 +90,11 @@ def machine_files(place: Path) -> list[Path]:
     return sorted(place.rglob("*.machine"))
 
 
-PLACES = {"named": "named by the user", "beside": "sources/__pycache__", "user": "user/planarfriction"}
+PLACES = {
+    "named": "named by the user",
+    "beside": "sources/__pycache__",
+    "user": "user/planarfriction",
+}
 
 
 @pytest.fixture(params=PLACES)
@@ -97,7 +104,9 @@ def place(request, sources, tmp_path, monkeypatch) -> Path:
     if request.param == "named":
         monkeypatch.setattr(config, "CACHE_DIR", str(folder))
     if request.param == "user":
-        (sources / "__pycache__").write_text("nothing can be written beside the sources")
+        (sources / "__pycache__").write_text(
+            "nothing can be written beside the sources"
+        )
     return folder
 
 
@@ -107,7 +116,9 @@ def test_machine_code_is_that_of_the_sources_wherever_it_is_kept(sources, place)
     assert again.outer(3.0) == 7.0 and was_read(again.outer)
     formula = sources / "own_formula.py"
     before = formula.stat()
-    formula.write_text(FORMULA.replace("2.0", "5.0"))  # an upgrade that keeps sizes and times
+    formula.write_text(
+        FORMULA.replace("2.0", "5.0")
+    )  # an upgrade that keeps sizes and times
     os.utime(formula, ns=(before.st_atime_ns, before.st_mtime_ns))
     edited = imported(sources)
     assert edited.outer(3.0) == 16.0 and not was_read(edited.outer)
@@ -129,7 +140,9 @@ def test_machine_code_of_old_sources_does_not_pile_up(sources, tmp_path):
     assert imported(sources).outer(3.0) == 7.0
     kept = {path.name for path in place.glob("planarfriction-*")}
     assert len(kept) == machine_code._VERSIONS_KEPT + 1
-    assert f"planarfriction-{19:016x}" in kept and f"planarfriction-{0:016x}" not in kept
+    assert (
+        f"planarfriction-{19:016x}" in kept and f"planarfriction-{0:016x}" not in kept
+    )
     assert "planarfriction-of-the-user" in kept
     assert was_read_again(sources)
 
@@ -198,14 +211,21 @@ def full_disk(size: int) -> Iterator[None]:
 
 def test_on_a_full_disk_it_runs_and_leaves_nothing(sources, tmp_path):
     functions = imported(sources)
-    with pytest.warns(RuntimeWarning, match="compiled code is not kept"), full_disk(4096):
+    with (
+        pytest.warns(RuntimeWarning, match="compiled code is not kept"),
+        full_disk(4096),
+    ):
         assert functions.outer(3.0) == 7.0
-    assert not [path for path in tmp_path.rglob("*") if path.suffix in (".machine", ".part")]
+    assert not [
+        path for path in tmp_path.rglob("*") if path.suffix in (".machine", ".part")
+    ]
     assert not was_read_again(sources)
     assert was_read_again(sources)
 
 
-def test_what_was_compiled_before_is_read_where_nothing_can_be_written(sources, monkeypatch):
+def test_what_was_compiled_before_is_read_where_nothing_can_be_written(
+    sources, monkeypatch
+):
     imported(sources).outer(3.0)
 
     def refuse(path):
@@ -224,8 +244,13 @@ def test_sources_that_change_under_a_running_process_leave_nothing_stale(sources
     assert imported(sources).outer(3.0) == 16.0
 
 
-@pytest.mark.parametrize(("module", "name", "other"), [(config, "BOUNDSCHECK", 1), (numba, "__version__", "0.0")])
-def test_settings_and_versions_of_the_compiler_are_told_apart(sources, monkeypatch, module, name, other):
+@pytest.mark.parametrize(
+    ("module", "name", "other"),
+    [(config, "BOUNDSCHECK", 1), (numba, "__version__", "0.0")],
+)
+def test_settings_and_versions_of_the_compiler_are_told_apart(
+    sources, monkeypatch, module, name, other
+):
     imported(sources).outer(3.0)
     with monkeypatch.context() as elsewhere:
         elsewhere.setattr(module, name, other)
@@ -246,7 +271,8 @@ def test_functions_made_by_functions_are_not_kept(sources):
 def pressed_in_llvm(monkeypatch) -> list[int]:
     """Ctrl-C while LLVM hands the object code over, where an exception is printed and forgotten."""
     engine = cpu_target.target_context.codegen()._engine._ee
-    notify, presses = engine._object_cache_notify, []
+    notify = engine._object_cache_notify
+    presses = []
 
     def press(module, buffer):
         if not presses:
@@ -293,14 +319,22 @@ def test_ctrl_c_is_left_alone_in_other_threads():
 
 
 def test_ctrl_c_is_heard_when_the_block_fails_too():
-    with pytest.raises(KeyboardInterrupt), heard_between_passes(), heard_between_passes():
+    with (
+        pytest.raises(KeyboardInterrupt),
+        heard_between_passes(),
+        heard_between_passes(),
+    ):
         os.kill(os.getpid(), signal.SIGINT)
         raise ValueError
 
 
 PACKAGE = Path(compiler.__file__).parents[2]
 FILES = [
-    next(each for each in (f"{name}.py", f"{name}/__init__.py") if (PACKAGE / each).exists())
+    next(
+        each
+        for each in (f"{name}.py", f"{name}/__init__.py")
+        if (PACKAGE / each).exists()
+    )
     for name in compiler.FOLDERS
 ]
 
@@ -312,4 +346,7 @@ def test_a_change_in_any_folder_with_compiled_code_is_another_origin(tmp_path, f
     sources = compiler.sources_of(package)
     assert sources.digest == compiler.SOURCES.digest  # the same files, elsewhere
     (package / file).write_text((package / file).read_text() + "\nCHANGED = 1\n")
-    assert not sources.unchanged() and compiler.sources_of(package).digest != sources.digest
+    assert (
+        not sources.unchanged()
+        and compiler.sources_of(package).digest != sources.digest
+    )

@@ -52,7 +52,15 @@ RECORD = Arrays(3, Numbers(0.25, -4), VALUES, MARKS, np.empty(0))
 @njit
 def seen(place):
     own = read(place)
-    return own.first, own.numbers.a, own.numbers.b, own.values[2], own.marks[1], exists(own.values), exists(own.nothing)
+    return (
+        own.first,
+        own.numbers.a,
+        own.numbers.b,
+        own.values[2],
+        own.marks[1],
+        exists(own.values),
+        exists(own.nothing),
+    )
 
 
 @njit
@@ -114,20 +122,32 @@ OFFSETS = LAYOUT.offsets
 @njit
 def fill(block):
     p = arrays_at(OFFSETS, block)
-    p.count[0], p.matrix[5], p.vector[0] = 9, 2.0, 1.0
+    p.count[0] = 9
+    p.matrix[5] = 2.0
+    p.vector[0] = 1.0
 
 
 def test_a_layout_names_the_parts_of_a_block():
-    assert isinstance(OFFSETS, offsets_of(Scratch)) and tuple(OFFSETS) == (0, 6, 7) and LAYOUT.size == 10
+    assert (
+        isinstance(OFFSETS, offsets_of(Scratch))
+        and tuple(OFFSETS) == (0, 6, 7)
+        and LAYOUT.size == 10
+    )
     block = np.zeros(LAYOUT.size)
     fill(block)
     assert block[LAYOUT.slices["count"]].view(np.int64).tolist() == [9]
-    assert block[LAYOUT.slices["matrix"]].tolist() == [0.0] * 5 + [2.0] and block[7] == 1.0
+    assert (
+        block[LAYOUT.slices["matrix"]].tolist() == [0.0] * 5 + [2.0] and block[7] == 1.0
+    )
 
 
 def test_a_new_block_has_the_shapes_of_its_layout():
     made = LAYOUT.made(vector=VALUES)
-    assert made.matrix.shape == (2, 3) and made.count.dtype == np.int64 and made.vector is VALUES
+    assert (
+        made.matrix.shape == (2, 3)
+        and made.count.dtype == np.int64
+        and made.vector is VALUES
+    )
     made.count[0] = 5
     assert made.matrix.tolist() == [[0.0] * 3] * 2
 
@@ -136,12 +156,24 @@ def freed_too_early(function: ast.FunctionDef) -> Iterator[str]:
     """Yield the arrays of a function that are made in it and reached by a pointer: Numba frees them at once."""
     given = {each.arg for each in function.args.args}
     for node in ast.walk(function):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "pointer":
-            yield from {each.id for each in ast.walk(node.args[0]) if isinstance(each, ast.Name)} - given
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id == "pointer"
+        ):
+            yield from {
+                each.id for each in ast.walk(node.args[0]) if isinstance(each, ast.Name)
+            } - given
 
 
 @pytest.mark.parametrize("file", SOURCES.files, ids=lambda file: file.stem)
 def test_pointers_are_to_arrays_that_a_caller_keeps_alive(file):
     """The last use of an array is where its pointer is taken, and memory in use would be given to another thread."""
-    functions = [each for each in ast.walk(ast.parse(file.read_text())) if isinstance(each, ast.FunctionDef)]
-    assert {each.name: found for each in functions if (found := [*freed_too_early(each)])} == {}
+    functions = [
+        each
+        for each in ast.walk(ast.parse(file.read_text()))
+        if isinstance(each, ast.FunctionDef)
+    ]
+    assert {
+        each.name: found for each in functions if (found := [*freed_too_early(each)])
+    } == {}

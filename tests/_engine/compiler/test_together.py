@@ -46,14 +46,18 @@ def test_another_process_takes_jobs_from_the_last_on(tmp_path):
         patience = time.monotonic() + 60.0
         while len(crew.seconds) < 3 and time.monotonic() < patience:
             time.sleep(0.01)
-        assert list(crew.seconds) == [2, 1, 0] and all(seconds > 0.0 for seconds in crew.seconds.values())
+        assert list(crew.seconds) == [2, 1, 0] and all(
+            seconds > 0.0 for seconds in crew.seconds.values()
+        )
         assert not any(crew.take(job) for job in range(3))
     assert sorted(os.listdir(tmp_path)) == ["0", "1", "2"]
 
 
 def test_a_job_is_done_once(tmp_path):
     """Here or there: whoever comes first takes it, and the other waits for its end."""
-    with Crew(served(tmp_path, "{}.touch(exist_ok=False)"), range(20), processes=2) as crew:
+    with Crew(
+        served(tmp_path, "{}.touch(exist_ok=False)"), range(20), processes=2
+    ) as crew:
         here = [job for job in range(20) if crew.take(job)]
         for job in here:
             (tmp_path / str(job)).touch(exist_ok=False)
@@ -70,13 +74,19 @@ def test_jobs_of_a_process_that_ends_come_back(tmp_path, work):
 
 def test_a_process_at_work_is_ended_with_the_block(tmp_path):
     begin = time.monotonic()
-    with Crew(served(tmp_path, "(({}).touch(), __import__('time').sleep(1000))"), [0], processes=1):
+    with Crew(
+        served(tmp_path, "(({}).touch(), __import__('time').sleep(1000))"),
+        [0],
+        processes=1,
+    ):
         while not (tmp_path / "0").exists() and time.monotonic() < begin + 60.0:
             time.sleep(0.01)
     assert time.monotonic() < begin + 90.0
 
 
-@pytest.mark.parametrize("executable", ["", "/opt/blender/blender", shutil.which("sh") or "sh"])
+@pytest.mark.parametrize(
+    "executable", ["", "/opt/blender/blender", shutil.which("sh") or "sh"]
+)
 def test_nothing_is_shared_by_programs_that_are_not_python(monkeypatch, executable):
     assert together.possible()
     monkeypatch.setattr(sys, "executable", executable)
@@ -90,7 +100,11 @@ def test_first_runs_that_compile_together_find_the_same(tmp_path):
     for processors in (1, 2):
         where = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / str(processors))}
         command = [sys.executable, "-c", FIRST_RUN, str(processors)]
-        runs.append(subprocess.run(command, env=where, capture_output=True, text=True, check=True).stdout.split())
+        runs.append(
+            subprocess.run(
+                command, env=where, capture_output=True, text=True, check=True
+            ).stdout.split()
+        )
     alone, with_another = runs
     assert alone[0] == with_another[0]
     assert "advance" in alone and "advance" not in with_another

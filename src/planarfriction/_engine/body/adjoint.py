@@ -28,7 +28,13 @@ from planarfriction._engine.body.body import (
     record_of,
     total_load,
 )
-from planarfriction._engine.body.path import Path, Stretch, Tolerances, hold, node_before
+from planarfriction._engine.body.path import (
+    Path,
+    Stretch,
+    Tolerances,
+    hold,
+    node_before,
+)
 from planarfriction._engine.body.sdirk import (
     AGAIN,
     ERROR,
@@ -48,9 +54,22 @@ from planarfriction._engine.body.sdirk import (
     write_errors,
 )
 from planarfriction._engine.body.step_control import fitted, judged
-from planarfriction._engine.body.tangent import MOST, Drives, partial_of, wrench_by_input
+from planarfriction._engine.body.tangent import (
+    MOST,
+    Drives,
+    partial_of,
+    wrench_by_input,
+)
 from planarfriction._engine.codegen.small_matrices import applied
-from planarfriction._engine.codegen.vectors import Vector, applied_back, dot, plus, put, three, times
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    applied_back,
+    dot,
+    plus,
+    put,
+    three,
+    times,
+)
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel
 from planarfriction._engine.compiler.calls import call, pointer
@@ -63,35 +82,66 @@ PER_STEP = 2.0
 
 @kernel
 def _pulled(
-    system: SystemRecord, piece: int, c: int, y: Doubles, rates: Doubles, wrench: Vector, w: Workspace
+    system: SystemRecord,
+    piece: int,
+    c: int,
+    y: Doubles,
+    rates: Doubles,
+    wrench: Vector,
+    w: Workspace,
 ) -> tuple[Vector, Vector]:
     """Pull back `rates` of the bristles and `wrench` of the wrench per unit load of contact c.
 
     Pointers to all states; the cotangent of the bristles goes to `w.forcing`. Returns the cotangents of the body's
     velocity and pose.
     """
-    first, rows, (a, g, _) = system.contacts.state[c], arrays_at(ROWS, system.work.rows), maps_of(system, c)
+    first = system.contacts.state[c]
+    rows = arrays_at(ROWS, system.work.rows)
+    (a, g, _) = maps_of(system, c)
     put(rows.d_wrench, wrench)
-    states = at(y, first), linearisation_of(system, c), at(rates, first), system.work.rows, at(w.forcing, first)
+    states = (
+        at(y, first),
+        linearisation_of(system, c),
+        at(rates, first),
+        system.work.rows,
+        at(w.forcing, first),
+    )
     call(functions_of(system, c).pull_back, (record_of(system, piece, c), *states))
     return applied_back(a, rows.d_twist), applied_back(g, rows.d_twist)
 
 
 @kernel
-def _solve_bristles(system: SystemRecord, piece: int, c: int, y: Doubles, b: Doubles, out: Doubles) -> None:
+def _solve_bristles(
+    system: SystemRecord, piece: int, c: int, y: Doubles, b: Doubles, out: Doubles
+) -> None:
     first = system.contacts.state[c]
-    states = record_of(system, piece, c), at(y, first), at(b, first), linearisation_of(system, c), at(out, first)
+    states = (
+        record_of(system, piece, c),
+        at(y, first),
+        at(b, first),
+        linearisation_of(system, c),
+        at(out, first),
+    )
     call(functions_of(system, c).solve_transposed, states)
 
 
 @kernel
 def _body_solved(
-    system: SystemRecord, shift: float, body: Doubles, velocity: Vector, pose: Vector, out: Doubles
+    system: SystemRecord,
+    shift: float,
+    body: Doubles,
+    velocity: Vector,
+    pose: Vector,
+    out: Doubles,
 ) -> Vector:
     """Solve the equations of velocity and pose (see `_solve`); return the velocity."""
-    (x, y, s), per_shift, cos, sin = pose, 1.0 / shift, 1.0, 0.0
+    (x, y, s) = pose
+    per_shift = 1.0 / shift
+    cos = 1.0
+    sin = 0.0
     if system.motion.body_axes:
-        cos, sin = math.cos(body[5]), math.sin(body[5])
+        cos = math.cos(body[5])
+        sin = math.sin(body[5])
         s -= per_shift * (sin * body[0] + cos * body[1]) * x
         s += per_shift * (cos * body[0] - sin * body[1]) * y
     velocity = plus(velocity, per_shift, (cos * x + sin * y, cos * y - sin * x, s))
@@ -103,7 +153,13 @@ def _body_solved(
 
 @kernel
 def _solve(
-    system: SystemRecord, piece: int, since: float, shift: float, b: Doubles, w: Workspace, out: Doubles
+    system: SystemRecord,
+    piece: int,
+    since: float,
+    shift: float,
+    b: Doubles,
+    w: Workspace,
+    out: Doubles,
 ) -> None:
     """Solve `(shift I - J') out = b` with the matrix that `factor` prepared at the state `w.state`.
 
@@ -114,18 +170,25 @@ def _solve(
 
     whose second for a free body holds the transpose of what `factor` kept as `to_pose`.
     """
-    o, y, inverse_mass, none = system.bristles, w.state, system.motion.inverse_mass, (0.0, 0.0, 0.0)
-    velocity, pose = three(at(b, o)), three(at(b, o + 3))
+    o = system.bristles
+    y = w.state
+    inverse_mass = system.motion.inverse_mass
+    none = (0.0, 0.0, 0.0)
+    velocity = three(at(b, o))
+    pose = three(at(b, o + 3))
     for c in range(system.size):
         _solve_bristles(system, piece, c, y, b, out)
         by_velocity, by_pose = _pulled(system, piece, c, y, out, none, w)
-        velocity, pose = plus(velocity, 1.0, by_velocity), plus(pose, 1.0, by_pose)
+        velocity = plus(velocity, 1.0, by_velocity)
+        pose = plus(pose, 1.0, by_pose)
     u = _body_solved(system, shift, at(y, o), velocity, pose, at(out, o))
     if system.motion.body_axes:  # the wrench does not move the body
         return
     for c in range(system.size):
         pull = inverse_mass[0] * u[0], inverse_mass[1] * u[1], inverse_mass[2] * u[2]
-        wrench = times(total_load(system, piece, since, c), applied(maps_of(system, c)[0], pull))
+        wrench = times(
+            total_load(system, piece, since, c), applied(maps_of(system, c)[0], pull)
+        )
         _pulled(system, piece, c, y, w.zero, wrench, w)
         for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
             w.forcing[m] += b[m]
@@ -134,10 +197,21 @@ def _solve(
 
 @kernel
 def _step(
-    address: Place, path: Path, k: int, first: int, since: float, h: float, d: Variation, drives: Drives, w: Workspace
+    address: Place,
+    path: Path,
+    k: int,
+    first: int,
+    since: float,
+    h: float,
+    d: Variation,
+    drives: Drives,
+    w: Workspace,
 ) -> None:
     """Carry the adjoint back over `h` seconds into `w.new`, as `tangent` does its slopes forwards."""
-    system, piece, n, shift = read(address), path.piece[k], path.state.shape[1], 1.0 / (h * GAMMA)
+    system = read(address)
+    piece = path.piece[k]
+    n = path.state.shape[1]
+    shift = 1.0 / (h * GAMMA)
     inputs = drives.input_kind.shape[0]
     for i in range(PLACES.shape[0]):
         time = since - h * PLACES[i]
@@ -148,7 +222,15 @@ def _step(
         _solve(system, piece, time, shift, w.right, w, d.new)
         keep_stage(i, shift, n, d, w.base)
         for u in range(inputs):
-            partial_of(system, piece, time, w, drives.input_kind[u], drives.input_place[u], w.forcing)
+            partial_of(
+                system,
+                piece,
+                time,
+                w,
+                drives.input_kind[u],
+                drives.input_place[u],
+                w.forcing,
+            )
             gain = 0.0
             for m in range(n):
                 gain += d.new[m] * w.forcing[m]
@@ -161,7 +243,9 @@ def _error_of_step(
     tolerances: Tolerances, w: Workspace,
 ) -> float:  # fmt: skip
     """Return the error of a step that ended at `since`, where the matrix is of, per tolerance (see `sdirk.PLAIN`)."""
-    shift, rtol, atol = 1.0 / (h * GAMMA), tolerances.rtol, pointer(tolerances.atol)
+    shift = 1.0 / (h * GAMMA)
+    rtol = tolerances.rtol
+    atol = pointer(tolerances.atol)
     write_errors(n, d, known)
     error = error_of(system, n, d, h, rtol, atol)
     if error > PLAIN:
@@ -181,17 +265,22 @@ def _weight(i: int) -> float:
 
 
 @kernel
-def _error_of_gains(inputs: int, h: float, known: float, rtol: float, w: Workspace) -> float:
+def _error_of_gains(
+    inputs: int, h: float, known: float, rtol: float, w: Workspace
+) -> float:
     """Return the larger error estimate of the cost's gain in a step, per tolerance."""
     largest = 0.0
     for u in range(inputs):
-        one, other, gained = 0.0, START * w.gain_before[u], 0.0
+        one = 0.0
+        other = START * w.gain_before[u]
+        gained = 0.0
         for i in range(PLACES.shape[0]):
             gain = w.gain[i * inputs + u]
             one += ERROR[i] * gain
             other += AGAIN[i] * gain
             gained += _weight(i) * gain
-        error, size = h * xp.maximum(abs(one), known * abs(other)), xp.maximum(w.most[u], abs(h * gained))
+        error = h * xp.maximum(abs(one), known * abs(other))
+        size = xp.maximum(w.most[u], abs(h * gained))
         if not xp.is_finite(error + size):
             return math.inf
         largest = xp.maximum(largest, error / (rtol * xp.where(size > 0.0, size, 1.0)))
@@ -221,25 +310,36 @@ def propagate_back(
     `known` is 0 where the adjoint has just jumped. Returns the number of steps. It stops where none is left (`w.left`);
     each step of the motion that is passed over allows `PER_STEP` more.
     """
-    system, w, n, first = read(address), read_workspace(workspace), adjoint.shape[0], stretch.first
-    d, taken, since, until = variation_of(w, pointer(adjoint), 0, 0, n), 0, stretch.begin, stretch.until
+    system = read(address)
+    w = read_workspace(workspace)
+    n = adjoint.shape[0]
+    first = stretch.first
+    d = variation_of(w, pointer(adjoint), 0, 0, n)
+    taken = 0
+    since = stretch.begin
+    until = stretch.until
     k = node_before(path, stretch.last - 1, first, since)
     while since > until and w.left[0] > 0.0:
-        before, k = k, node_before(path, k, first, since)
+        before = k
+        k = node_before(path, k, first, since)
         w.left[0] += PER_STEP * (before - k) - 1.0
-        local, remaining = path.since[k + 1] - path.since[k], since - until
+        local = path.since[k + 1] - path.since[k]
+        remaining = since - until
         reach = since - path.since[xp.maximum(k + 1 - MOST, first)]
         h = fitted(xp.minimum(w.pace[0] * local, reach), remaining)
         _step(address, path, k, first, since, h, d, drives, w)
         taken += 1
         of_gains = _error_of_gains(moments.shape[0], h, known, tolerances.rtol, w)
-        of_step = _error_of_step(system, path.piece[k], since - h, h, n, d, known, tolerances, w)
+        of_step = _error_of_step(
+            system, path.piece[k], since - h, h, n, d, known, tolerances, w
+        )
         error = xp.maximum(of_step, of_gains)
         accepted, w.pace[0] = judged(w.pace[0], error, h, local)
         if accepted:
             _gain(since, h, moments, w)
             accept(n, d)
-            since, known = until if h == remaining else since - h, 1.0
+            since = until if h == remaining else since - h
+            known = 1.0
     return taken
 
 
@@ -252,8 +352,10 @@ def jump(
 
     The workspace holds the state.
     """
-    system, w = read(address), read_workspace(workspace)
-    y, o = w.state, system.bristles
+    system = read(address)
+    w = read_workspace(workspace)
+    y = w.state
+    o = system.bristles
     call(system.rates, (address, piece, since, y, w.rate))
     call(system.linearise, (address, piece, y))
     for c in range(system.size):
@@ -261,11 +363,21 @@ def jump(
         seed = seeds[c, 0], seeds[c, 1], seeds[c, 2]
         for u in range(moments.shape[0]):
             slope = wrench_by_input(
-                system, piece, since, c, y, w, drives.input_kind[u], drives.input_place[u], w.forcing
+                system,
+                piece,
+                since,
+                c,
+                y,
+                w,
+                drives.input_kind[u],
+                drives.input_place[u],
+                w.forcing,
             )
             moments[u, 0] += dot(seed, slope)
             moments[u, 1] += dot(seed, slope) * since
-        by_velocity, by_pose = _pulled(system, piece, c, y, w.zero, times(load, seed), w)
+        by_velocity, by_pose = _pulled(
+            system, piece, c, y, w.zero, times(load, seed), w
+        )
         for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
             adjoint[m] += w.forcing[m]
         for i in range(3):

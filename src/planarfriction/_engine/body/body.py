@@ -13,13 +13,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.body.contacts import WORLD, Contacts, contact_map, contact_map_slopes
+from planarfriction._engine.body.contacts import (
+    WORLD,
+    Contacts,
+    contact_map,
+    contact_map_slopes,
+)
 from planarfriction._engine.body.springs import add_spring_slopes, spring_wrench
 from planarfriction._engine.bristles.settle import factor_at
 from planarfriction._engine.cells import cells
 from planarfriction._engine.cells.fixed_stiffness import bring_back
 from planarfriction._engine.codegen.small_matrices import applied, inverse
-from planarfriction._engine.codegen.vectors import Vector, applied_back, clear, copy, plus, put, put_all, three
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    applied_back,
+    clear,
+    copy,
+    plus,
+    put,
+    put_all,
+    three,
+)
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import entry, jit, kernel
 from planarfriction._engine.compiler.calls import address_of, call
@@ -34,7 +48,14 @@ from planarfriction._engine.compiler.memory import (
     layout,
     reader,
 )
-from planarfriction._engine.protocol import CALLS, SEEN, SEEN_SIZE, Addresses, Seen, addresses_at
+from planarfriction._engine.protocol import (
+    CALLS,
+    SEEN,
+    SEEN_SIZE,
+    Addresses,
+    Seen,
+    addresses_at,
+)
 
 NO_LOAD = 1e-6
 """Share of the reference load below which a fixed stiffness is fixed no longer: limits of 1e-12 m are not followed."""
@@ -141,17 +162,33 @@ class System(Packed):
     """
 
     def __init__(
-        self, contacts: Contacts, motion: Motion, keepalive: tuple[np.ndarray, ...] = (), pressures: int = 0
+        self,
+        contacts: Contacts,
+        motion: Motion,
+        keepalive: tuple[np.ndarray, ...] = (),
+        pressures: int = 0,
     ) -> None:
-        n, square = len(contacts.count), (3, 3)
+        n = len(contacts.count)
+        square = (3, 3)
         work = layout(
             Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=SEEN_SIZE, factor=n,
             covered=n, stiffness=18, matrix=square, inverse=square, to_pose=square, rows=(4, 3), frame=(n, 8),
         )  # fmt: skip
-        self._block, addresses = np.zeros(work.size), [address_of(each) for each in BODY_FUNCTIONS]
-        sizes = n, int(contacts.state[n]), pressures, len(motion.breaks) - 1, len(motion.spring)
-        super().__init__(SystemRecord(contacts, motion, work.placed(self._block), *sizes, *addresses))
-        self.contacts, self.motion, self.keepalive = contacts, motion, keepalive
+        self._block = np.zeros(work.size)
+        addresses = [address_of(each) for each in BODY_FUNCTIONS]
+        sizes = (
+            n,
+            int(contacts.state[n]),
+            pressures,
+            len(motion.breaks) - 1,
+            len(motion.spring),
+        )
+        super().__init__(
+            SystemRecord(contacts, motion, work.placed(self._block), *sizes, *addresses)
+        )
+        self.contacts = contacts
+        self.motion = motion
+        self.keepalive = keepalive
         self.wrench = self._block[work.slices["wrench"]].reshape(n, 3)
         """Wrenches of the contacts per unit load, as they were last evaluated."""
 
@@ -159,7 +196,8 @@ class System(Packed):
 @kernel
 def load_of(system: SystemRecord, piece: int, since: float, c: int) -> float:
     """Return the normal force of one of the identical contacts that contact c stands for."""
-    load, first = system.motion.load, 2 * piece * system.size + c
+    load = system.motion.load
+    first = 2 * piece * system.size + c
     return load[first] + since * load[first + system.size]
 
 
@@ -189,7 +227,8 @@ def settle_all(system: SystemRecord, piece: int, y: Doubles) -> None:
     """
     for c in range(system.size):
         if hardly_loaded(system, piece, c):
-            contact, size = cells.read(record_of(system, piece, c)), system.contacts.bristle[c]
+            contact = cells.read(record_of(system, piece, c))
+            size = system.contacts.bristle[c]
             bring_back(contact, size, at(y, system.contacts.state[c]), 1.0 / NO_LOAD)
 
 
@@ -213,7 +252,9 @@ def linearisation_of(system: SystemRecord, c: int) -> Doubles:
 
 
 @kernel
-def place_at(system: SystemRecord, piece: int, since: float, c: int, body: Doubles) -> tuple[Doubles, Doubles]:
+def place_at(
+    system: SystemRecord, piece: int, since: float, c: int, body: Doubles
+) -> tuple[Doubles, Doubles]:
     """Return the place of the frame of contact c (see `Contacts.place`), and the velocity [3] that the contact sees.
 
     It is the velocity at `body` (velocity and pose), less the velocity that the world's side of the contact would have
@@ -221,20 +262,29 @@ def place_at(system: SystemRecord, piece: int, since: float, c: int, body: Doubl
     """
     if not exists(system.motion.mover):
         return at(system.contacts.place, 4 * c), body
-    place, frame = at(system.contacts.place, 4 * c), at(system.work.frame, 8 * c)
+    place = at(system.contacts.place, 4 * c)
+    frame = at(system.work.frame, 8 * c)
     mover = at(system.motion.mover, 9 * (piece * system.size + c))
-    vx, vy, omega = mover[3] + since * mover[6], mover[4] + since * mover[7], mover[5] + since * mover[8]
-    dx, dy = body[3], body[4]
+    vx = mover[3] + since * mover[6]
+    vy = mover[4] + since * mover[7]
+    omega = mover[5] + since * mover[8]
+    dx = body[3]
+    dy = body[4]
     copy(place, frame, 4)
     if system.contacts.mount[c] == WORLD:
         half = 0.5 * since
         turned = mover[2] + since * (mover[5] + half * mover[8])
-        cos, sin = math.cos(turned), math.sin(turned)
+        cos = math.cos(turned)
+        sin = math.sin(turned)
         frame[0] += mover[0] + since * (mover[3] + half * mover[6])
         frame[1] += mover[1] + since * (mover[4] + half * mover[7])
-        frame[2], frame[3] = cos * place[2] - sin * place[3], sin * place[2] + cos * place[3]
-        dx, dy = dx - frame[0], dy - frame[1]
-    frame[4], frame[5], frame[6] = body[0] - (vx - omega * dy), body[1] - (vy + omega * dx), body[2] - omega
+        frame[2] = cos * place[2] - sin * place[3]
+        frame[3] = sin * place[2] + cos * place[3]
+        dx = dx - frame[0]
+        dy = dy - frame[1]
+    frame[4] = body[0] - (vx - omega * dy)
+    frame[5] = body[1] - (vy + omega * dx)
+    frame[6] = body[2] - omega
     frame[7] = omega
     return frame, at(frame, 4)
 
@@ -242,7 +292,11 @@ def place_at(system: SystemRecord, piece: int, since: float, c: int, body: Doubl
 @kernel
 def seen_by(system: SystemRecord, c: int, y: Doubles) -> Doubles:
     """Return the velocity [3] that contact c sees, as `rates` of the state `y` left it."""
-    return at(system.work.frame, 8 * c + 4) if exists(system.motion.mover) else at(y, system.bristles)
+    return (
+        at(system.work.frame, 8 * c + 4)
+        if exists(system.motion.mover)
+        else at(y, system.bristles)
+    )
 
 
 @kernel
@@ -252,12 +306,17 @@ def _placed(a: Doubles, x: float, y: float, angle: float) -> Vector:
 
 
 @kernel
-def _seen_from(work: Work, c: int, place: Doubles, pose: Doubles, a: Doubles, u: Doubles) -> Seen:
+def _seen_from(
+    work: Work, c: int, place: Doubles, pose: Doubles, a: Doubles, u: Doubles
+) -> Seen:
     """Write what contact c sees of a body: twist, factor, place and axes, with all of the contact covered."""
     seen = arrays_at(SEEN, work.twist)
     put(seen.twist, applied(a, u))
     put(seen.place, _placed(a, pose[0] - place[0], pose[1] - place[1], pose[2]))
-    seen.factor[0], seen.axes[0], seen.axes[1], seen.covered[0] = work.factor[c], place[2], place[3], 1.0
+    seen.factor[0] = work.factor[c]
+    seen.axes[0] = place[2]
+    seen.axes[1] = place[3]
+    seen.covered[0] = 1.0
     return seen
 
 
@@ -265,23 +324,32 @@ def _seen_from(work: Work, c: int, place: Doubles, pose: Doubles, a: Doubles, u:
 def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> None:
     """Write the right-hand side `dy` at `since` seconds into a piece, and wrenches per unit load into the workspace."""
     system = read(address)
-    work, body, out, a = system.work, at(y, system.bristles), at(dy, system.bristles), system.work.stiffness
+    work = system.work
+    body = at(y, system.bristles)
+    out = at(dy, system.bristles)
+    a = system.work.stiffness
     force = at(system.motion.force, 6 * piece)
     total = plus(three(force), since, three(at(force, 3)))
     total = plus(total, 1.0, spring_wrench(system, piece, since, body))
     for c in range(system.size):
-        first, w = system.contacts.state[c], at(work.wrench, 3 * c)
+        first = system.contacts.state[c]
+        w = at(work.wrench, 3 * c)
         place, seen = place_at(system, piece, since, c, body)
         contact_map(system.contacts.mount[c], place, at(body, 3), a)
         reference = system.contacts.reference[c]
-        work.factor[c] = factor_at(reference, xp.maximum(load_of(system, piece, since, c), NO_LOAD * reference))
+        work.factor[c] = factor_at(
+            reference, xp.maximum(load_of(system, piece, since, c), NO_LOAD * reference)
+        )
         inputs = _seen_from(work, c, place, at(body, 3), a, seen)
         states = at(y, first), work.twist, at(dy, first), w
         call(functions_of(system, c).evaluate, (record_of(system, piece, c), *states))
         work.covered[c] = inputs.covered[0]
         total = plus(total, total_load(system, piece, since, c), applied_back(a, w))
     for i in range(3):
-        out[i] = system.motion.acceleration[3 * piece + i] + system.motion.inverse_mass[i] * total[i]
+        out[i] = (
+            system.motion.acceleration[3 * piece + i]
+            + system.motion.inverse_mass[i] * total[i]
+        )
     put(at(out, 3), _turned(system, body, three(body)))
 
 
@@ -290,7 +358,8 @@ def _turned(system: SystemRecord, body: Doubles, u: Vector) -> Vector:
     """Return a velocity of the body in world axes."""
     x, y, s = u
     if system.motion.body_axes:
-        cos, sin = math.cos(body[5]), math.sin(body[5])
+        cos = math.cos(body[5])
+        sin = math.sin(body[5])
         x, y = cos * x - sin * y, sin * x + cos * y
     return x, y, s
 
@@ -299,20 +368,28 @@ def _turned(system: SystemRecord, body: Doubles, u: Vector) -> Vector:
 def linearise(address: Place, piece: int, y: Doubles) -> None:
     """Linearise every contact about `y`, whose `rates` were evaluated last."""
     system = read(address)
-    work, moves = system.work, exists(system.motion.mover)
+    work = system.work
+    moves = exists(system.motion.mover)
     for c in range(system.size):
-        mount, (a, g, h) = system.contacts.mount[c], maps_of(system, c)
+        mount = system.contacts.mount[c]
+        (a, g, h) = maps_of(system, c)
         seen = seen_by(system, c, y)
         place = at(work.frame, 8 * c) if moves else at(system.contacts.place, 4 * c)
         contact_map(mount, place, at(y, system.bristles + 3), a)
         contact_map_slopes(mount, a, seen, at(work.wrench, 3 * c), g, h)
         if moves:
-            omega = work.frame[8 * c + 7]  # elsewhere, the other side has another velocity
+            omega = work.frame[
+                8 * c + 7
+            ]  # elsewhere, the other side has another velocity
             for i in range(3):
                 g[3 * i] -= omega * a[3 * i + 1]
                 g[3 * i + 1] += omega * a[3 * i]
         _seen_from(work, c, place, at(y, system.bristles + 3), a, seen)
-        states = at(y, system.contacts.state[c]), work.twist, linearisation_of(system, c)
+        states = (
+            at(y, system.contacts.state[c]),
+            work.twist,
+            linearisation_of(system, c),
+        )
         call(functions_of(system, c).linearise, (record_of(system, piece, c), *states))
 
 
@@ -324,54 +401,106 @@ def factor(address: Place, piece: int, since: float, y: Doubles, shift: float) -
     `(A + G/shift) u + G r_pose/shift`. (A prescribed velocity does not see the pose at all.)
     """
     system = read(address)
-    s, m, to_pose = system.work.stiffness, system.work.matrix, system.work.to_pose
+    s = system.work.stiffness
+    m = system.work.matrix
+    to_pose = system.work.to_pose
     clear(m, 9)
     clear(to_pose, 9)
     for c in range(system.size):
-        z, (a, g, h) = at(y, system.contacts.state[c]), maps_of(system, c)
+        z = at(y, system.contacts.state[c])
+        (a, g, h) = maps_of(system, c)
         clear(at(s, 9), 9)
-        call(functions_of(system, c).factor, (record_of(system, piece, c), z, shift, linearisation_of(system, c), s))
+        call(
+            functions_of(system, c).factor,
+            (record_of(system, piece, c), z, shift, linearisation_of(system, c), s),
+        )
         load = total_load(system, piece, since, c)
         for j in range(3):
             by_u = applied_back(a, applied(s, (a[j], a[3 + j], a[6 + j])))
-            place = applied(at(s, 9), (a[j], a[3 + j], 0.0) if j < 2 else (0.0, 0.0, 1.0))
-            bpy = applied_back(a, plus(applied(s, (g[j], g[3 + j], g[6 + j])), 1.0, place))
+            place = applied(
+                at(s, 9), (a[j], a[3 + j], 0.0) if j < 2 else (0.0, 0.0, 1.0)
+            )
+            bpy = applied_back(
+                a, plus(applied(s, (g[j], g[3 + j], g[6 + j])), 1.0, place)
+            )
             for i in range(3):
-                weight, per_pose = system.motion.inverse_mass[i] * load, (h[3 * i + j] + bpy[i]) / shift
+                weight = system.motion.inverse_mass[i] * load
+                per_pose = (h[3 * i + j] + bpy[i]) / shift
                 to_pose[3 * i + j] += weight * per_pose
                 m[3 * i + j] += weight * (by_u[i] + per_pose)
-    add_spring_slopes(system, piece, since, at(y, system.bristles), 1.0 / shift, to_pose, m)
+    add_spring_slopes(
+        system, piece, since, at(y, system.bristles), 1.0 / shift, to_pose, m
+    )
     put_all(system.work.inverse, inverse(shift, m))
 
 
 @entry
-def solve(address: Place, piece: int, since: float, y: Doubles, shift: float, r: Doubles, out: Doubles) -> None:
+def solve(
+    address: Place,
+    piece: int,
+    since: float,
+    y: Doubles,
+    shift: float,
+    r: Doubles,
+    out: Doubles,
+) -> None:
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
     system = read(address)
-    w, v, inverse_mass = system.work.stiffness, system.work.twist, system.motion.inverse_mass
+    w = system.work.stiffness
+    v = system.work.twist
+    inverse_mass = system.motion.inverse_mass
     body = at(y, system.bristles)
-    r_body, r_pose = at(r, system.bristles), at(r, system.bristles + 3)
+    r_body = at(r, system.bristles)
+    r_pose = at(r, system.bristles + 3)
     b = plus(three(r_body), 1.0, applied(system.work.to_pose, r_pose))
     for c in range(system.size):
         first = system.contacts.state[c]
-        states = record_of(system, piece, c), at(y, first), shift, at(r, first), linearisation_of(system, c), w
+        states = (
+            record_of(system, piece, c),
+            at(y, first),
+            shift,
+            at(r, first),
+            linearisation_of(system, c),
+            w,
+        )
         call(functions_of(system, c).eliminate, states)
-        load, force = total_load(system, piece, since, c), applied_back(maps_of(system, c)[0], w)
-        b = plus(b, load, (inverse_mass[0] * force[0], inverse_mass[1] * force[1], inverse_mass[2] * force[2]))
-    u, pose, per_shift = at(out, system.bristles), at(out, system.bristles + 3), 1.0 / shift
+        load = total_load(system, piece, since, c)
+        force = applied_back(maps_of(system, c)[0], w)
+        b = plus(
+            b,
+            load,
+            (
+                inverse_mass[0] * force[0],
+                inverse_mass[1] * force[1],
+                inverse_mass[2] * force[2],
+            ),
+        )
+    u = at(out, system.bristles)
+    pose = at(out, system.bristles + 3)
+    per_shift = 1.0 / shift
     put(u, applied(system.work.inverse, b))
     px, py, s = plus(three(r_pose), 1.0, _turned(system, body, three(u)))
     pose[2] = per_shift * s
     if system.motion.body_axes:
-        cos, sin = math.cos(body[5]), math.sin(body[5])
+        cos = math.cos(body[5])
+        sin = math.sin(body[5])
         px -= (sin * body[0] + cos * body[1]) * pose[2]
         py += (cos * body[0] - sin * body[1]) * pose[2]
-    pose[0], pose[1] = per_shift * px, per_shift * py
+    pose[0] = per_shift * px
+    pose[1] = per_shift * py
     for c in range(system.size):
-        first, (a, g, _) = system.contacts.state[c], maps_of(system, c)
+        first = system.contacts.state[c]
+        (a, g, _) = maps_of(system, c)
         put(v, plus(applied(a, u), 1.0, applied(g, pose)))
         put(at(v, 3), _placed(a, pose[0], pose[1], pose[2]))
-        states = record_of(system, piece, c), at(y, first), at(r, first), v, linearisation_of(system, c), at(out, first)
+        states = (
+            record_of(system, piece, c),
+            at(y, first),
+            at(r, first),
+            v,
+            linearisation_of(system, c),
+            at(out, first),
+        )
         call(functions_of(system, c).back_substitute, states)
 
 
@@ -380,6 +509,8 @@ BODY_FUNCTIONS = rates, linearise, factor, solve
 
 
 @jit
-def right_hand_side(address: Place, piece: int, since: float, y: np.ndarray, dy: np.ndarray) -> None:
+def right_hand_side(
+    address: Place, piece: int, since: float, y: np.ndarray, dy: np.ndarray
+) -> None:
     """Write `rates` for callers in Python, as an explicit or a general implicit solver needs it; contiguous arrays."""
     call(read(address).rates, (address, piece, since, y, dy))

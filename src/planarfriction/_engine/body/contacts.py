@@ -44,29 +44,46 @@ class Contacts(NamedTuple):
 @kernel
 def contact_map(mount: int, place: Doubles, pose: Doubles, a: Doubles) -> None:
     """Write `A`, with `V = A u`, into `a` [3, 3]."""
-    dx, dy, c, s = place[0], place[1], place[2], place[3]
+    dx = place[0]
+    dy = place[1]
+    c = place[2]
+    s = place[3]
     if mount == WORLD:
-        dx, dy = dx - pose[0], dy - pose[1]
+        dx = dx - pose[0]
+        dy = dy - pose[1]
     elif mount == BODY:
-        ct, st = math.cos(pose[2]), math.sin(pose[2])
+        ct = math.cos(pose[2])
+        st = math.sin(pose[2])
         dx, dy = ct * dx - st * dy, st * dx + ct * dy
         c, s = c * ct - s * st, s * ct + c * st
-    a[0], a[1], a[2] = c, s, s * dx - c * dy
-    a[3], a[4], a[5] = -s, c, s * dy + c * dx
-    a[6], a[7], a[8] = 0.0, 0.0, 1.0
+    a[0] = c
+    a[1] = s
+    a[2] = s * dx - c * dy
+    a[3] = -s
+    a[4] = c
+    a[5] = s * dy + c * dx
+    a[6] = 0.0
+    a[7] = 0.0
+    a[8] = 1.0
 
 
 @kernel
-def contact_map_slopes(mount: int, a: Doubles, u: Doubles, w: Doubles, g: Doubles, h: Doubles) -> None:
+def contact_map_slopes(
+    mount: int, a: Doubles, u: Doubles, w: Doubles, g: Doubles, h: Doubles
+) -> None:
     """Write `G = d(A u)/d pose` and `H = d(A' W)/d pose` into `g` and `h` [3, 3]."""
     clear(g, 9)
     clear(h, 9)
     if mount == WORLD:
         # the lever arm shortens as the body moves; world axes of the force
-        fx, fy = a[0] * w[0] + a[3] * w[1], a[1] * w[0] + a[4] * w[1]
-        g[0], g[1] = -u[2] * a[1], u[2] * a[0]
-        g[3], g[4] = -u[2] * a[4], u[2] * a[3]
-        h[6], h[7] = -fy, fx
+        fx = a[0] * w[0] + a[3] * w[1]
+        fy = a[1] * w[0] + a[4] * w[1]
+        g[0] = -u[2] * a[1]
+        g[1] = u[2] * a[0]
+        g[3] = -u[2] * a[4]
+        g[4] = u[2] * a[3]
+        h[6] = -fy
+        h[7] = fx
     elif mount == BODY:
         # the contact's axes turn with the body
         g[2] = a[3] * u[0] + a[4] * u[1]

@@ -20,19 +20,26 @@ _HALVINGS = 40
 
 
 @kernel
-def _ends(run: RunRecord, system: SystemRecord, piece: int, since: float, state: Doubles) -> bool:
+def _ends(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, state: Doubles
+) -> bool:
     """Return True if a contact that touched the body does so no longer in a state."""
     call(system.rates, (run.system, piece, since, state, run.stages.rate))
     ends = False
     for c in range(system.size):
-        ends = ends or (system.work.covered[c] == 0.0 and not run.output.ended[c] >= 0.0)
+        ends = ends or (
+            system.work.covered[c] == 0.0 and not run.output.ended[c] >= 0.0
+        )
     return ends
 
 
 @kernel
-def share_until_end(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> float:
+def share_until_end(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, step: float
+) -> float:
     """Return the share of a step after which a contact has ended; 1 if all go on."""
-    early, late = 0.0, 1.0
+    early = 0.0
+    late = 1.0
     if not _ends(run, system, piece, since + step, run.stages.new):
         return late
     for _ in range(_HALVINGS):
@@ -46,9 +53,12 @@ def share_until_end(run: RunRecord, system: SystemRecord, piece: int, since: flo
 
 
 @kernel
-def note_ends(run: RunRecord, system: SystemRecord, piece: int, since: float, time: float) -> bool:
+def note_ends(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, time: float
+) -> bool:
     """Write which contacts have ended by now; return True if one did so now and none is left."""
-    ends, left = _ends(run, system, piece, since, run.progress.y), False
+    ends = _ends(run, system, piece, since, run.progress.y)
+    left = False
     for c in range(system.size):
         left = left or system.work.covered[c] > 0.0
         if system.work.covered[c] > 0.0:
@@ -74,7 +84,11 @@ _SWING = 4.0
 def speed_of(system: SystemRecord, velocity: Doubles) -> float:
     """Return the length of a velocity or acceleration of the body [3], its spin times the lever arm."""
     arm = system.motion.stop_radius
-    return math.sqrt(velocity[0] * velocity[0] + velocity[1] * velocity[1] + arm * arm * velocity[2] * velocity[2])
+    return math.sqrt(
+        velocity[0] * velocity[0]
+        + velocity[1] * velocity[1]
+        + arm * arm * velocity[2] * velocity[2]
+    )
 
 
 @entry
@@ -90,56 +104,83 @@ def at_rest(run: Place, piece: int, since: float) -> None:
     """
     run = read_run(run)
     system = read(run.system)
-    y, push, motion, verdict = run.stages.argument, run.stages.time_slope, system.motion, run.stages.verdict
+    y = run.stages.argument
+    push = run.stages.time_slope
+    motion = system.motion
+    verdict = run.stages.verdict
     velocity = at(run.progress.y, system.bristles)
-    speed, change = speed_of(system, velocity), speed_of(system, at(run.stages.start_rate, system.bristles))
+    speed = speed_of(system, velocity)
+    change = speed_of(system, at(run.stages.start_rate, system.bristles))
     verdict[1] = 0.0
-    if motion.breaks[piece] < motion.settled or not speed + motion.stop_time * change < motion.stop_speed:
+    if (
+        motion.breaks[piece] < motion.settled
+        or not speed + motion.stop_time * change < motion.stop_speed
+    ):
         return
     copy(run.progress.y, y, run.states)
     put(push, (0.0, 0.0, 0.0))
     force = _force(run, system, piece, since)
     put(push, three(at(run.stages.rate, system.bristles) if force > 0.0 else velocity))
-    size, energy = speed_of(system, push), 0.5 * speed * speed
+    size = speed_of(system, push)
+    energy = 0.5 * speed * speed
     for way in range(2 if size > 0.0 else 0):
         put(push, times((1.0 if way == 0 else -1.0) / size, three(push)))
         if not _is_held(run, system, piece, since, energy):
             return
-        size, energy = 1.0, 0.0
+        size = 1.0
+        energy = 0.0
     verdict[1] = 1.0
 
 
 @kernel
-def _is_held(run: RunRecord, system: SystemRecord, piece: int, since: float, energy: float) -> bool:
+def _is_held(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, energy: float
+) -> bool:
     """Return True if friction stops the body, given energy per mass, on its way along the direction `time_slope`."""
-    y, rate, motion = run.stages.argument, run.stages.rate, system.motion
+    y = run.stages.argument
+    rate = run.stages.rate
+    motion = system.motion
     most = 0.5 * (_SWING * motion.stop_speed) ** 2
-    way, step, force = 0.0, _FIRST, _force(run, system, piece, since)
+    way = 0.0
+    step = _FIRST
+    force = _force(run, system, piece, since)
     while energy > 0.0 or way == 0.0:
         if way > _FAR or energy > most:
             return False
-        pace, distance = xp.maximum(math.sqrt(2.0 * energy), motion.stop_speed), step * motion.stop_length
+        pace = xp.maximum(math.sqrt(2.0 * energy), motion.stop_speed)
+        distance = step * motion.stop_length
         _move(run, system, pace)
         call(system.rates, (run.system, piece, since, y, rate))
         for i in range(system.bristles - system.pressures):
             y[i] += distance / pace * rate[i]
-        before, force = force, _force(run, system, piece, since)
+        before = force
+        force = _force(run, system, piece, since)
         energy += 0.5 * (before + force) * distance
-        way, step = way + step, xp.minimum(_GROWTH * step, _LARGEST)
+        way = way + step
+        step = xp.minimum(_GROWTH * step, _LARGEST)
     return True
 
 
 @kernel
 def _force(run: RunRecord, system: SystemRecord, piece: int, since: float) -> float:
     """Return the acceleration of the body, if it stood still, along the direction `time_slope`; its size for none."""
-    push, rate, arm = run.stages.time_slope, at(run.stages.rate, system.bristles), system.motion.stop_radius
+    push = run.stages.time_slope
+    rate = at(run.stages.rate, system.bristles)
+    arm = system.motion.stop_radius
     _move(run, system, 0.0)
     call(system.rates, (run.system, piece, since, run.stages.argument, run.stages.rate))
     along = push[0] * rate[0] + push[1] * rate[1] + arm * arm * push[2] * rate[2]
-    return along if push[0] != 0.0 or push[1] != 0.0 or push[2] != 0.0 else speed_of(system, rate)
+    return (
+        along
+        if push[0] != 0.0 or push[1] != 0.0 or push[2] != 0.0
+        else speed_of(system, rate)
+    )
 
 
 @kernel
 def _move(run: RunRecord, system: SystemRecord, factor: float) -> None:
     """Give the body a multiple of the velocity `time_slope`."""
-    put(at(run.stages.argument, system.bristles), times(factor, three(run.stages.time_slope)))
+    put(
+        at(run.stages.argument, system.bristles),
+        times(factor, three(run.stages.time_slope)),
+    )

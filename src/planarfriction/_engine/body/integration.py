@@ -95,7 +95,14 @@ class Stages(NamedTuple):
 
 
 @entry
-def combine(coefficients: Doubles, stages: Doubles, count: int, n: int, base: Doubles, out: Doubles) -> None:
+def combine(
+    coefficients: Doubles,
+    stages: Doubles,
+    count: int,
+    n: int,
+    base: Doubles,
+    out: Doubles,
+) -> None:
     """Write `out = base + sum coefficients_j stages_j` over the first `count` stages [count, n], two at a time."""
     if count % 2 == 1:
         a = coefficients[0]
@@ -105,7 +112,10 @@ def combine(coefficients: Doubles, stages: Doubles, count: int, n: int, base: Do
         for i in range(n):
             out[i] = base[i]
     for j in range(count % 2, count, 2):
-        a, b, first, second = coefficients[j], coefficients[j + 1], at(stages, j * n), at(stages, j * n + n)
+        a = coefficients[j]
+        b = coefficients[j + 1]
+        first = at(stages, j * n)
+        second = at(stages, j * n + n)
         for i in range(n):
             out[i] += a * first[i] + b * second[i]
 
@@ -140,17 +150,30 @@ read_run = reader(RunRecord)
 
 
 @kernel
-def extend(run: RunRecord, share: float, value: float, slope: float, base: Doubles, out: Doubles) -> None:
+def extend(
+    run: RunRecord,
+    share: float,
+    value: float,
+    slope: float,
+    base: Doubles,
+    out: Doubles,
+) -> None:
     """Write `base` plus multiples of the continuous extension, less y, and of its slope in s, at a share s of a step.
 
     It is `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))` with `new = y + sum m_j k_j`: a sum of stages.
     """
-    s, m, dense, coupling = run.stage_count, run.method.m, run.method.dense, run.stages.coupling
+    s = run.stage_count
+    m = run.method.m
+    dense = run.method.dense
+    coupling = run.stages.coupling
     for j in range(s):
-        inner, change = 0.0, 0.0
+        inner = 0.0
+        change = 0.0
         for p in range(run.order_of_dense - 1, -1, -1):
             change = inner + share * change
             inner = dense[p * s + j] + share * inner
         coupling[j] = value * share * (m[j] + (1.0 - share) * inner)
-        coupling[j] += slope * (m[j] + (1.0 - 2.0 * share) * inner + share * (1.0 - share) * change)
+        coupling[j] += slope * (
+            m[j] + (1.0 - 2.0 * share) * inner + share * (1.0 - share) * change
+        )
     call(run.combine, (coupling, run.stages.k, s, run.states, base, out))

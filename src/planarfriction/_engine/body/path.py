@@ -51,29 +51,51 @@ class Tolerances(NamedTuple):
 @jit
 def follow(run: Place, path: Path) -> tuple[int, int]:
     """Go on with the run at an address until it ends or `path` is full; return its number of nodes and the outcome."""
-    integration, count, outcome = read_run(run), 0, PAUSED
-    system, n, progress = read(integration.system), integration.states, integration.progress
-    cursor, clock, counts, breaks = progress.cursor, progress.clock, progress.statistics, system.motion.breaks
+    integration = read_run(run)
+    count = 0
+    outcome = PAUSED
+    system = read(integration.system)
+    n = integration.states
+    progress = integration.progress
+    cursor = progress.cursor
+    clock = progress.clock
+    counts = progress.statistics
+    breaks = system.motion.breaks
     while outcome == PAUSED and count + 2 <= path.piece.shape[0]:
-        piece, since, accepted = cursor[PIECE], clock[SINCE], counts[STEPS]
+        piece = cursor[PIECE]
+        since = clock[SINCE]
+        accepted = counts[STEPS]
         starting = count == 0 or path.piece[count - 1] != piece
         if starting:
             if since == 0.0 and exists(system.motion.velocity):
                 put(at(progress.y, n - 6), three(at(system.motion.velocity, 3 * piece)))
             if since == 0.0:
                 settle_all(system, piece, progress.y)
-            path.piece[count], path.since[count] = piece, since
+            path.piece[count] = piece
+            path.since[count] = since
             copy(progress.y, path.state[count], n)
         outcome = advance(run, 1)
         if counts[STEPS] == accepted:
             continue
         count += starting
         ended = cursor[PIECE] != piece
-        path.piece[count], path.since[count] = piece, breaks[piece + 1] - breaks[piece] if ended else clock[SINCE]
+        path.piece[count] = piece
+        path.since[count] = breaks[piece + 1] - breaks[piece] if ended else clock[SINCE]
         copy(integration.stages.start_rate, path.rate[count - 1], n)
         copy(integration.stages.new, path.state[count], n)
-        if ended or outcome != PAUSED or count + 3 > path.piece.shape[0]:  # else the next trial evaluates it
-            call(system.rates, (integration.system, piece, path.since[count], path.state[count], path.rate[count]))
+        if (
+            ended or outcome != PAUSED or count + 3 > path.piece.shape[0]
+        ):  # else the next trial evaluates it
+            call(
+                system.rates,
+                (
+                    integration.system,
+                    piece,
+                    path.since[count],
+                    path.state[count],
+                    path.rate[count],
+                ),
+            )
         count += 1
     return count, outcome
 
@@ -84,9 +106,14 @@ def interpolate(path: Path, k: int, since: float, state: Doubles) -> None:
     h = path.since[k + 1] - path.since[k]
     right = (since - path.since[k]) / h
     left = 1.0 - right
-    start, end, start_rate, end_rate = path.state[k], path.state[k + 1], path.rate[k], path.rate[k + 1]
+    start = path.state[k]
+    end = path.state[k + 1]
+    start_rate = path.rate[k]
+    end_rate = path.rate[k + 1]
     for m in range(path.state.shape[1]):
-        bend = (left - right) * (end[m] - start[m]) + h * (right * end_rate[m] - left * start_rate[m])
+        bend = (left - right) * (end[m] - start[m]) + h * (
+            right * end_rate[m] - left * start_rate[m]
+        )
         state[m] = left * start[m] + right * end[m] - left * right * bend
 
 
@@ -107,9 +134,12 @@ def node_before(path: Path, k: int, first: int, since: float) -> int:
 
 
 @kernel
-def hold(address: Place, path: Path, k: int, since: float, shift: float, w: Workspace) -> None:
+def hold(
+    address: Place, path: Path, k: int, since: float, shift: float, w: Workspace
+) -> None:
     """Hold the state in the step after node k: interpolate it into `w.state`, linearise there, factor."""
-    system, piece = read(address), path.piece[k]
+    system = read(address)
+    piece = path.piece[k]
     interpolate(path, k, since, w.state)
     call(system.rates, (address, piece, since, w.state, w.rate))
     call(system.linearise, (address, piece, w.state))
@@ -117,6 +147,8 @@ def hold(address: Place, path: Path, k: int, since: float, shift: float, w: Work
 
 
 @jit
-def state_at(path: Path, first: int, last: int, since: float, state: np.ndarray) -> None:
+def state_at(
+    path: Path, first: int, last: int, since: float, state: np.ndarray
+) -> None:
     """Write the state at `since` seconds into the piece whose nodes are `first` to `last` of a path."""
     interpolate(path, node_after(path, first, last, since), since, state)

@@ -17,7 +17,13 @@ from planarfriction._engine.body.body import (
     settle_all,
 )
 from planarfriction._engine.body.contacts import contact_map
-from planarfriction._engine.body.ends import INSTANT, at_rest, note_ends, share_until_end, speed_of
+from planarfriction._engine.body.ends import (
+    INSTANT,
+    at_rest,
+    note_ends,
+    share_until_end,
+    speed_of,
+)
 from planarfriction._engine.body.integration import (
     Method,
     Output,
@@ -31,11 +37,28 @@ from planarfriction._engine.body.integration import (
 from planarfriction._engine.body.springs import spring_drift
 from planarfriction._engine.body.step_control import MOTION, fitted, growth
 from planarfriction._engine.codegen.small_matrices import applied
-from planarfriction._engine.codegen.vectors import Vector, applied_back, clear, copy, norm, plus, put, three, times
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    applied_back,
+    clear,
+    copy,
+    norm,
+    plus,
+    put,
+    three,
+    times,
+)
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import entry, jit, kernel
 from planarfriction._engine.compiler.calls import address_of, call
-from planarfriction._engine.compiler.memory import Doubles, Packed, Place, at, exists, layout
+from planarfriction._engine.compiler.memory import (
+    Doubles,
+    Packed,
+    Place,
+    at,
+    exists,
+    layout,
+)
 
 DONE, PAUSED, STEP_TOO_SMALL, AT_REST, APART = range(5)
 """Outcomes of `advance`."""
@@ -74,10 +97,16 @@ def _error(run: RunRecord, system: SystemRecord) -> float:
 
     Infinite where anything is not finite.
     """
-    y, new, error, atol, rtol = run.progress.y, run.stages.new, run.stages.error, run.atol, run.rtol
-    largest, state = 0.0, system.contacts.state
+    y = run.progress.y
+    new = run.stages.new
+    error = run.stages.error
+    atol = run.atol
+    rtol = run.rtol
+    largest = 0.0
+    state = system.contacts.state
     for c in range(system.size):
-        total, count = 0.0, state[c + 1] - state[c]
+        total = 0.0
+        count = state[c + 1] - state[c]
         for i in range(state[c], state[c + 1]):
             e = error[i] / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i])))
             total += e * e
@@ -94,13 +123,17 @@ def _error(run: RunRecord, system: SystemRecord) -> float:
 
 
 @kernel
-def _record(run: RunRecord, system: SystemRecord, piece: int, since: float, state: Doubles) -> None:
+def _record(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, state: Doubles
+) -> None:
     """Write the next sample from a state."""
-    out, m = run.output, run.progress.cursor[SAMPLE]
+    out = run.output
+    m = run.progress.cursor[SAMPLE]
     call(system.rates, (run.system, piece, since, state, run.stages.rate))
     copy(at(state, system.bristles), at(out.body, 6 * m), 6)
     for c in range(system.size):
-        load, row = load_of(system, piece, since, c), m * system.size + c
+        load = load_of(system, piece, since, c)
+        row = m * system.size + c
         load = load if system.work.covered[c] > 0.0 else 0.0
         out.load[row] = load
         put(at(out.wrench, 3 * row), times(load, three(at(system.work.wrench, 3 * c))))
@@ -114,11 +147,16 @@ def _record(run: RunRecord, system: SystemRecord, piece: int, since: float, stat
 @kernel
 def _time_slope(system: SystemRecord, piece: int, y: Doubles, slope: Doubles) -> None:
     """Write `df/dt` of the body's accelerations [3]: forces, loads and anchors of springs are linear in time."""
-    motion, total = system.motion, three(at(system.motion.force, 6 * piece + 3))
+    motion = system.motion
+    total = three(at(system.motion.force, 6 * piece + 3))
     total = plus(total, 1.0, spring_drift(system, piece, y[system.bristles + 5]))
     for c in range(system.size):
         load = system.contacts.count[c] * motion.load[(2 * piece + 1) * system.size + c]
-        total = plus(total, load, applied_back(maps_of(system, c)[0], at(system.work.wrench, 3 * c)))
+        total = plus(
+            total,
+            load,
+            applied_back(maps_of(system, c)[0], at(system.work.wrench, 3 * c)),
+        )
     for i in range(3):
         slope[i] = motion.inverse_mass[i] * total[i]
 
@@ -134,12 +172,16 @@ def _drifts(system: SystemRecord, piece: int) -> bool:
 
 
 @kernel
-def _drift(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> None:
+def _drift(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, step: float
+) -> None:
     """Write `df/dt` of all states [n] where bristles see the time: a difference over a small share of a step.
 
     The difference is right to `_NUDGE` and costs one evaluation; no model needs a derivative by the time.
     """
-    by, now, rate = _NUDGE * step, run.stages.start_rate, run.stages.rate
+    by = _NUDGE * step
+    now = run.stages.start_rate
+    rate = run.stages.rate
     call(system.rates, (run.system, piece, since + by, run.progress.y, rate))
     for i in range(run.states):
         run.stages.drift[i] = (rate[i] - now[i]) / by
@@ -149,25 +191,48 @@ def _drift(run: RunRecord, system: SystemRecord, piece: int, since: float, step:
 @kernel
 def forget_unloaded(system: SystemRecord, piece: int, y: Doubles) -> None:
     """Clear the bristles of contacts without load on the whole piece: they start again from rest."""
-    load, first, state = system.motion.load, 2 * piece * system.size, system.contacts.state
+    load = system.motion.load
+    first = 2 * piece * system.size
+    state = system.contacts.state
     for c in range(system.size):
         if load[first + c] == 0.0 and load[first + system.size + c] == 0.0:
             clear(at(y, state[c]), state[c + 1] - state[c])
 
 
 @kernel
-def _step(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> None:
+def _step(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, step: float
+) -> None:
     """Go through the stages of one step from `y`: solution into `new`, its error estimate into `error`."""
-    n, s, method, work, y = run.states, run.stage_count, run.method, run.stages, run.progress.y
-    k, right, shift, drifts = work.k, work.right, 1.0 / (step * method.gamma), _drifts(system, piece)
+    n = run.states
+    s = run.stage_count
+    method = run.method
+    work = run.stages
+    y = run.progress.y
+    k = work.k
+    right = work.right
+    shift = 1.0 / (step * method.gamma)
+    drifts = _drifts(system, piece)
     call(system.factor, (run.system, piece, since, y, shift))
     for i in range(s):
         for j in range(i):
             work.coupling[j] = method.c[i * s + j] / step
         if i > 0:
             call(run.combine, (at(method.a, i * s), k, i, n, y, work.argument))
-            call(system.rates, (run.system, piece, since + method.alpha[i] * step, work.argument, work.rate))
-        call(run.combine, (work.coupling, k, i, n, work.rate if i > 0 else work.start_rate, right))
+            call(
+                system.rates,
+                (
+                    run.system,
+                    piece,
+                    since + method.alpha[i] * step,
+                    work.argument,
+                    work.rate,
+                ),
+            )
+        call(
+            run.combine,
+            (work.coupling, k, i, n, work.rate if i > 0 else work.start_rate, right),
+        )
         slope = method.time_gamma[i] * step
         if drifts:
             for p in range(n):
@@ -181,9 +246,13 @@ def _step(run: RunRecord, system: SystemRecord, piece: int, since: float, step: 
 
 
 @kernel
-def _direction(system: SystemRecord, piece: int, since: float, c: int, state: Doubles) -> Vector:
+def _direction(
+    system: SystemRecord, piece: int, since: float, c: int, state: Doubles
+) -> Vector:
     """Return the direction of the twist of contact c in a state; zeros at rest."""
-    a, v, body = system.work.stiffness, system.work.twist, at(state, system.bristles)
+    a = system.work.stiffness
+    v = system.work.twist
+    body = at(state, system.bristles)
     place, seen = place_at(system, piece, since, c, body)
     contact_map(system.contacts.mount[c], place, at(body, 3), a)
     put(v, applied(a, seen))
@@ -193,7 +262,9 @@ def _direction(system: SystemRecord, piece: int, since: float, c: int, state: Do
 
 
 @kernel
-def _turn(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> float:
+def _turn(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, step: float
+) -> float:
     """Return the largest change of direction [rad] of the twist of a contact of few states from `y` to `new`."""
     largest = 0.0
     for c in range(system.size):
@@ -205,19 +276,29 @@ def _turn(run: RunRecord, system: SystemRecord, piece: int, since: float, step: 
 
 
 @kernel
-def _missed_inside(run: RunRecord, system: SystemRecord, piece: int, since: float, step: float) -> float:
+def _missed_inside(
+    run: RunRecord, system: SystemRecord, piece: int, since: float, step: float
+) -> float:
     """Return the error of a step that turns a contact's twist at places on its way, per tolerance.
 
     The residual of the continuous extension, through the matrix of the step, is the share of one more stage there.
     """
     looks = xp.minimum(_LOOKS, int(_turn(run, system, piece, since, step) / _ANGLE))
-    work, shift, largest = run.stages, 1.0 / (step * run.method.gamma), 0.0
+    work = run.stages
+    shift = 1.0 / (step * run.method.gamma)
+    largest = 0.0
     for i in range(looks):
         share = (i + 1.0) / (looks + 1.0)
         extend(run, share, 1.0, 0.0, run.progress.y, work.argument)
-        call(system.rates, (run.system, piece, since + share * step, work.argument, work.rate))
+        call(
+            system.rates,
+            (run.system, piece, since + share * step, work.argument, work.rate),
+        )
         extend(run, share, 0.0, -1.0 / step, work.rate, work.right)
-        call(system.solve, (run.system, piece, since, run.progress.y, shift, work.right, work.error))
+        call(
+            system.solve,
+            (run.system, piece, since, run.progress.y, shift, work.right, work.error),
+        )
         largest = xp.maximum(largest, _error(run, system) / _DOUBT)
     run.progress.statistics[EVALUATIONS] += looks
     return largest
@@ -227,7 +308,10 @@ def _missed_inside(run: RunRecord, system: SystemRecord, piece: int, since: floa
 def attempt(run: Place, piece: int, since: float, step: float, fresh: int) -> None:
     """Try a step, and write its error into `verdict`; `fresh` is 1 if the linearisation is yet to be made at y."""
     run = read_run(run)
-    system, y, statistics, fresh = read(run.system), run.progress.y, run.progress.statistics, fresh == 1
+    system = read(run.system)
+    y = run.progress.y
+    statistics = run.progress.statistics
+    fresh = fresh == 1
     if fresh:
         call(system.rates, (run.system, piece, since, y, run.stages.start_rate))
         call(system.linearise, (run.system, piece, y))
@@ -246,25 +330,38 @@ def attempt(run: Place, piece: int, since: float, step: float, fresh: int) -> No
 @kernel
 def _start(run: RunRecord, system: SystemRecord, piece: int) -> None:
     """Start a piece: the prescribed velocity, a first step, and a sample where the motion begins."""
-    progress, motion = run.progress, system.motion
+    progress = run.progress
+    motion = system.motion
     if exists(motion.velocity):
         put(at(progress.y, run.states - 6), three(at(motion.velocity, 3 * piece)))
     settle_all(system, piece, progress.y)
     progress.clock[STEP] = xp.minimum(progress.clock[STEP], progress.clock[FIRST])
-    if piece == 0 and progress.cursor[SAMPLE] == 0 and run.output.time[0] == motion.breaks[0]:
+    if (
+        piece == 0
+        and progress.cursor[SAMPLE] == 0
+        and run.output.time[0] == motion.breaks[0]
+    ):
         _record(run, system, piece, 0.0, progress.y)
     if exists(run.output.ended):
         note_ends(run, system, piece, 0.0, motion.breaks[piece])
 
 
 @kernel
-def _accept(run: RunRecord, system: SystemRecord, piece: int, step: float, last: bool) -> float:
+def _accept(
+    run: RunRecord, system: SystemRecord, piece: int, step: float, last: bool
+) -> float:
     """Take the new state after a step, and record the samples on its way."""
-    progress, samples, begin = run.progress, run.output.time, system.motion.breaks[piece]
-    since, end = progress.clock[SINCE], system.motion.breaks[piece + 1]
+    progress = run.progress
+    samples = run.output.time
+    begin = system.motion.breaks[piece]
+    since = progress.clock[SINCE]
+    end = system.motion.breaks[piece + 1]
     reached = end - begin if last else since + step
     time = end if last else begin + reached
-    while progress.cursor[SAMPLE] < run.samples and samples[progress.cursor[SAMPLE]] <= time:
+    while (
+        progress.cursor[SAMPLE] < run.samples
+        and samples[progress.cursor[SAMPLE]] <= time
+    ):
         sample = samples[progress.cursor[SAMPLE]]
         instant = reached if sample == time else sample - begin
         extend(run, (instant - since) / step, 1.0, 0.0, progress.y, run.stages.argument)
@@ -281,12 +378,18 @@ def advance(run: Place, max_steps: int) -> int:
 
     The step that ends at a break is recorded (left limit) before the next piece begins. Returns an outcome.
     """
-    address, run = run, read_run(run)
-    system, progress, clock, taken = read(run.system), run.progress, run.progress.clock, 0
+    address = run
+    run = read_run(run)
+    system = read(run.system)
+    progress = run.progress
+    clock = run.progress.clock
+    taken = 0
     while progress.cursor[PIECE] < system.pieces:
         piece = progress.cursor[PIECE]
         begin = system.motion.breaks[piece]
-        span, starting, fresh = system.motion.breaks[piece + 1] - begin, clock[SINCE] == 0.0, True
+        span = system.motion.breaks[piece + 1] - begin
+        starting = clock[SINCE] == 0.0
+        fresh = True
         if starting:
             _start(run, system, piece)
         while clock[SINCE] < span:
@@ -297,9 +400,12 @@ def advance(run: Place, max_steps: int) -> int:
             if step <= _RESOLUTION * xp.maximum(1.0, abs(begin)):
                 return STEP_TOO_SMALL
             call(run.attempt, (address, piece, clock[SINCE], step, 1 if fresh else 0))
-            taken, error = taken + 1, run.stages.verdict[0]
+            taken = taken + 1
+            error = run.stages.verdict[0]
             # no growth right after a rejection, whose reason is still near
-            longer = step * growth(MOTION, error, run.method.order, MOTION.growth if fresh else 1.0)
+            longer = step * growth(
+                MOTION, error, run.method.order, MOTION.growth if fresh else 1.0
+            )
             fresh = error <= 1.0
             if not fresh:
                 progress.statistics[REJECTIONS] += 1
@@ -309,24 +415,35 @@ def advance(run: Place, max_steps: int) -> int:
                 share = share_until_end(run, system, piece, clock[SINCE], step)
                 if (1.0 - share) * step > INSTANT:
                     progress.statistics[REJECTIONS] += 1
-                    clock[STEP], fresh = xp.maximum(share * step, INSTANT), False
+                    clock[STEP] = xp.maximum(share * step, INSTANT)
+                    fresh = False
                     continue
             time = _accept(run, system, piece, step, step == remaining)
             if starting:
-                clock[FIRST], starting = longer, False
-            clock[STEP] = xp.maximum(longer, clock[STEP]) if step == remaining else longer
-            if system.motion.stop_speed > 0.0 and _rests(run, system, address, piece, time):
+                clock[FIRST] = longer
+                starting = False
+            clock[STEP] = (
+                xp.maximum(longer, clock[STEP]) if step == remaining else longer
+            )
+            if system.motion.stop_speed > 0.0 and _rests(
+                run, system, address, piece, time
+            ):
                 return AT_REST
-            if exists(run.output.ended) and note_ends(run, system, piece, clock[SINCE], time):
+            if exists(run.output.ended) and note_ends(
+                run, system, piece, clock[SINCE], time
+            ):
                 _record_last(run, system, piece, time)
                 return APART
         forget_unloaded(system, piece, progress.y)
-        progress.cursor[PIECE], clock[SINCE] = piece + 1, 0.0
+        progress.cursor[PIECE] = piece + 1
+        clock[SINCE] = 0.0
     return DONE
 
 
 @kernel
-def _rests(run: RunRecord, system: SystemRecord, address: Place, piece: int, time: float) -> bool:
+def _rests(
+    run: RunRecord, system: SystemRecord, address: Place, piece: int, time: float
+) -> bool:
     """Return True if the body is at rest, after a sample of its place."""
     call(run.at_rest, (address, piece, run.progress.clock[SINCE]))
     if run.stages.verdict[1] == 0.0:
@@ -352,14 +469,38 @@ class Run(Packed):
     """An integration on which `advance` works: its steps keep their error below `rtol |y| + atol`, `atol` [n]."""
 
     def __init__(
-        self, system: System, method: Method, output: Output, progress: Progress, *, rtol: float, atol: np.ndarray
+        self,
+        system: System,
+        method: Method,
+        output: Output,
+        progress: Progress,
+        *,
+        rtol: float,
+        atol: np.ndarray,
     ) -> None:
-        n, s = len(progress.y), len(method.m)
-        shapes = dict.fromkeys(Stages._fields, n) | {"k": (s, n), "time_slope": 3, "coupling": s, "verdict": 2}
-        stages, sizes = layout(Stages, **shapes), (n, s, len(method.dense), len(output.time))
+        n = len(progress.y)
+        s = len(method.m)
+        shapes = dict.fromkeys(Stages._fields, n) | {
+            "k": (s, n),
+            "time_slope": 3,
+            "coupling": s,
+            "verdict": 2,
+        }
+        stages = layout(Stages, **shapes)
+        sizes = (n, s, len(method.dense), len(output.time))
         self._block = np.zeros(stages.size)
         atol = np.ascontiguousarray(atol, dtype=float)
         rests = address_of(at_rest) if system.motion.stop_speed > 0.0 else 0
-        parts = system.address, method, output, progress, stages.placed(self._block), atol, float(rtol)
-        super().__init__(RunRecord(*parts, *sizes, address_of(combine), address_of(attempt), rests))
+        parts = (
+            system.address,
+            method,
+            output,
+            progress,
+            stages.placed(self._block),
+            atol,
+            float(rtol),
+        )
+        super().__init__(
+            RunRecord(*parts, *sizes, address_of(combine), address_of(attempt), rests)
+        )
         self.system = system

@@ -85,9 +85,21 @@ read_workspace = reader(Workspace)
 
 def workspace_for(count: int, inputs: int, n: int) -> Packed:
     """Return a workspace for `count` derivatives of n states (made outside compiled code, which it would slow down)."""
-    shapes = dict.fromkeys(Workspace._fields, n) | dict.fromkeys(("level", "forcing"), (max(inputs, 1), n))
-    shapes |= {"stages": (count, len(PLACES), n), "new": (count, n), "before": (count, n)}
-    shapes |= {"gain": (len(PLACES), inputs), "gain_before": inputs, "most": inputs, "pace": 1, "left": 1}
+    shapes = dict.fromkeys(Workspace._fields, n) | dict.fromkeys(
+        ("level", "forcing"), (max(inputs, 1), n)
+    )
+    shapes |= {
+        "stages": (count, len(PLACES), n),
+        "new": (count, n),
+        "before": (count, n),
+    }
+    shapes |= {
+        "gain": (len(PLACES), inputs),
+        "gain_before": inputs,
+        "most": inputs,
+        "pace": 1,
+        "left": 1,
+    }
     return Packed(Layout(Workspace, **shapes).made(pace=np.ones(1)))
 
 
@@ -106,15 +118,27 @@ class Variation(NamedTuple):
 def variation_of(w: Workspace, values: Doubles, p: int, u: int, n: int) -> Variation:
     """Return derivative p of `values` [P, n], which goes by input u."""
     return Variation(
-        at(values, p * n), at(w.new, p * n), at(w.before, p * n), at(w.level, u * n), at(w.stages, 5 * p * n)
+        at(values, p * n),
+        at(w.new, p * n),
+        at(w.before, p * n),
+        at(w.level, u * n),
+        at(w.stages, 5 * p * n),
     )
 
 
 @kernel
 def stage_base(i: int, h: float, n: int, d: Variation, base: Doubles) -> None:
     """Write `b_i = s + h sum_{j<i} a_ij G_j` of a derivative s, in one pass."""
-    y, b, k_0, k_1, k_2, k_3 = d.value, base, d.stages, at(d.stages, n), at(d.stages, 2 * n), at(d.stages, 3 * n)
-    a_0, a_1, a_2, a_3 = h * STAGES[i, 0], h * STAGES[i, 1], h * STAGES[i, 2], h * STAGES[i, 3]
+    y = d.value
+    b = base
+    k_0 = d.stages
+    k_1 = at(d.stages, n)
+    k_2 = at(d.stages, 2 * n)
+    k_3 = at(d.stages, 3 * n)
+    a_0 = h * STAGES[i, 0]
+    a_1 = h * STAGES[i, 1]
+    a_2 = h * STAGES[i, 2]
+    a_3 = h * STAGES[i, 3]
     if i == 0:
         for m in range(n):
             b[m] = y[m]
@@ -155,24 +179,44 @@ def write_errors(n: int, d: Variation, known: float) -> None:
     """
     k = d.stages
     for m in range(n):
-        one = ERROR[0] * k[m] + ERROR[1] * k[n + m] + ERROR[2] * k[2 * n + m] + ERROR[4] * k[4 * n + m]
-        other = START * d.before[m] + AGAIN[0] * k[m] + AGAIN[1] * k[n + m] + AGAIN[2] * k[2 * n + m]
+        one = (
+            ERROR[0] * k[m]
+            + ERROR[1] * k[n + m]
+            + ERROR[2] * k[2 * n + m]
+            + ERROR[4] * k[4 * n + m]
+        )
+        other = (
+            START * d.before[m]
+            + AGAIN[0] * k[m]
+            + AGAIN[1] * k[n + m]
+            + AGAIN[2] * k[2 * n + m]
+        )
         k[m] = one
         k[n + m] = known * other
 
 
 @kernel
-def error_of(system: SystemRecord, n: int, d: Variation, h: float, rtol: float, atol: Doubles) -> float:
+def error_of(
+    system: SystemRecord, n: int, d: Variation, h: float, rtol: float, atol: Doubles
+) -> float:
     """Return the larger of the error estimates in the first two rows of `d.stages`, per tolerance."""
-    k, state, largest = d.stages, system.contacts.state, 0.0
+    k = d.stages
+    state = system.contacts.state
+    largest = 0.0
     for c in range(system.size + 6):
-        first, last, mean = system.bristles + c - system.size, system.bristles + c - system.size + 1, 1.0
+        first = system.bristles + c - system.size
+        last = system.bristles + c - system.size + 1
+        mean = 1.0
         if c < system.size:
-            first, last = state[c], state[c + 1]
+            first = state[c]
+            last = state[c + 1]
             mean = 1.0 / xp.where(last > first, last - first, 1)
-        one, other = 0.0, 0.0
+        one = 0.0
+        other = 0.0
         for m in range(first, last):
-            size = xp.maximum(xp.maximum(abs(d.value[m]), abs(d.new[m])), OTHERS * d.level[m])
+            size = xp.maximum(
+                xp.maximum(abs(d.value[m]), abs(d.new[m])), OTHERS * d.level[m]
+            )
             per = h / (atol[m] + rtol * size)
             one += (k[m] * per) * (k[m] * per)
             other += (k[n + m] * per) * (k[n + m] * per)

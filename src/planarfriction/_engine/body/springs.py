@@ -23,22 +23,34 @@ STIFFNESS, DAMPING, TORSION, TORSION_DAMPING, AT_X, AT_Y = range(6)
 @kernel
 def _spring(system: Any, piece: int, i: int) -> tuple[Doubles, Doubles]:
     """Return the constants of spring i, and its anchor on a piece."""
-    return at(system.motion.spring, 6 * i), at(system.motion.anchor, 6 * (piece * system.springs + i))
+    return at(system.motion.spring, 6 * i), at(
+        system.motion.anchor, 6 * (piece * system.springs + i)
+    )
 
 
 @kernel
 def _arm(spring: Doubles, theta: float) -> Vector:
     """Return the lever arm of the point of a spring, world axes."""
-    cos, sin = math.cos(theta), math.sin(theta)
-    return cos * spring[AT_X] - sin * spring[AT_Y], sin * spring[AT_X] + cos * spring[AT_Y]
+    cos = math.cos(theta)
+    sin = math.sin(theta)
+    return cos * spring[AT_X] - sin * spring[AT_Y], sin * spring[AT_X] + cos * spring[
+        AT_Y
+    ]
 
 
 @kernel
-def _force(spring: Doubles, anchor: Doubles, since: float, body: Doubles, rx: float, ry: float) -> Vector:
+def _force(
+    spring: Doubles, anchor: Doubles, since: float, body: Doubles, rx: float, ry: float
+) -> Vector:
     """Return the force of a spring on the body at `body` (velocity and pose)."""
-    x, y = anchor[0] + since * anchor[3], anchor[1] + since * anchor[4]
-    fx = spring[STIFFNESS] * (x - body[3] - rx) + spring[DAMPING] * (anchor[3] - body[0] + body[2] * ry)
-    fy = spring[STIFFNESS] * (y - body[4] - ry) + spring[DAMPING] * (anchor[4] - body[1] - body[2] * rx)
+    x = anchor[0] + since * anchor[3]
+    y = anchor[1] + since * anchor[4]
+    fx = spring[STIFFNESS] * (x - body[3] - rx) + spring[DAMPING] * (
+        anchor[3] - body[0] + body[2] * ry
+    )
+    fy = spring[STIFFNESS] * (y - body[4] - ry) + spring[DAMPING] * (
+        anchor[4] - body[1] - body[2] * rx
+    )
     return fx, fy
 
 
@@ -63,22 +75,35 @@ def spring_drift(system: Any, piece: int, theta: float) -> Vector:
     for i in range(system.springs):
         spring, anchor = _spring(system, piece, i)
         rx, ry = _arm(spring, theta)
-        fx, fy = spring[STIFFNESS] * anchor[3], spring[STIFFNESS] * anchor[4]
-        total = plus(total, 1.0, (fx, fy, rx * fy - ry * fx + spring[TORSION] * anchor[5]))
+        fx = spring[STIFFNESS] * anchor[3]
+        fy = spring[STIFFNESS] * anchor[4]
+        total = plus(
+            total, 1.0, (fx, fy, rx * fy - ry * fx + spring[TORSION] * anchor[5])
+        )
     return total
 
 
 @kernel
 def add_spring_slopes(
-    system: Any, piece: int, since: float, body: Doubles, per_shift: float, to_pose: Doubles, matrix: Doubles
+    system: Any,
+    piece: int,
+    since: float,
+    body: Doubles,
+    per_shift: float,
+    to_pose: Doubles,
+    matrix: Doubles,
 ) -> None:
     """Add the accelerations by pose [3, 3], times `per_shift`, to `to_pose`, and with those by velocity to `matrix`."""
     for i in range(system.springs):
         spring, anchor = _spring(system, piece, i)
-        k, c, (rx, ry), spin = spring[STIFFNESS], spring[DAMPING], _arm(spring, body[5]), body[2]
+        k = spring[STIFFNESS]
+        c = spring[DAMPING]
+        (rx, ry) = _arm(spring, body[5])
+        spin = body[2]
         fx, fy = _force(spring, anchor, since, body, rx, ry)
         # columns: changes of the force and of the torque by a unit of x, y, theta; the arm turns with theta
-        gx, gy = k * ry + c * spin * rx, c * spin * ry - k * rx
+        gx = k * ry + c * spin * rx
+        gy = c * spin * ry - k * rx
         by_pose = (
             (-k, 0.0, k * ry),
             (0.0, -k, -k * rx),
@@ -93,4 +118,6 @@ def add_spring_slopes(
             for m in range(3):
                 weight = system.motion.inverse_mass[m]
                 to_pose[3 * m + j] += weight * per_shift * by_pose[j][m]
-                matrix[3 * m + j] += weight * (by_velocity[j][m] + per_shift * by_pose[j][m])
+                matrix[3 * m + j] += weight * (
+                    by_velocity[j][m] + per_shift * by_pose[j][m]
+                )

@@ -33,7 +33,11 @@ _EXACT = 1e-10
 @kernel
 def fitted(step: float, remaining: float) -> float:
     """Return a length that is stretched to the end, or halves the rest, so that no sliver of a step remains."""
-    return step if 2.0 * step <= remaining else (remaining if step >= remaining else 0.5 * remaining)
+    return (
+        step
+        if 2.0 * step <= remaining
+        else (remaining if step >= remaining else 0.5 * remaining)
+    )
 
 
 @kernel

@@ -50,7 +50,16 @@ from planarfriction._engine.body.sdirk import (
 )
 from planarfriction._engine.body.step_control import fitted, judged
 from planarfriction._engine.codegen.small_matrices import applied
-from planarfriction._engine.codegen.vectors import Vector, applied_back, clear, copy, plus, put, three, times
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    applied_back,
+    clear,
+    copy,
+    plus,
+    put,
+    three,
+    times,
+)
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel
 from planarfriction._engine.compiler.calls import call, pointer
@@ -88,16 +97,32 @@ MOST = 8
 
 @kernel
 def change_of(
-    system: SystemRecord, piece: int, c: int, y: Doubles, dy: Doubles, dz: Doubles, parameter: int, dzdot: Doubles
+    system: SystemRecord,
+    piece: int,
+    c: int,
+    y: Doubles,
+    dy: Doubles,
+    dz: Doubles,
+    parameter: int,
+    dzdot: Doubles,
 ) -> None:
     """Write the change of the bristle rates and of the wrench per unit load of contact c, for one of a parameter.
 
     Pointers to all states, `y` linearised; `system.work.rows` holds V, W and dV and takes dW.
     """
     first = system.contacts.state[c]
-    states = at(y, first), at(dy, first), linearisation_of(system, c), at(dz, first), at(dzdot, first)
+    states = (
+        at(y, first),
+        at(dy, first),
+        linearisation_of(system, c),
+        at(dz, first),
+        at(dzdot, first),
+    )
     by = (1.0 if parameter == FRICTION else 0.0), (1.0 if parameter == SIZE else 0.0)
-    call(functions_of(system, c).change, (record_of(system, piece, c), *states, system.work.rows, *by))
+    call(
+        functions_of(system, c).change,
+        (record_of(system, piece, c), *states, system.work.rows, *by),
+    )
 
 
 @kernel
@@ -109,7 +134,9 @@ def gained_load(parameter: int, place: int, c: int, load: float) -> float:
 
 
 @kernel
-def follow_load(system: SystemRecord, c: int, y: Doubles, load: float, more: float, dy: Doubles) -> None:
+def follow_load(
+    system: SystemRecord, c: int, y: Doubles, load: float, more: float, dy: Doubles
+) -> None:
     """Add to the change `dy` of the bristles of contact c, if their stiffness is fixed, the change by `more` load."""
     reference = system.contacts.reference[c]
     if reference > 0.0 and load > NO_LOAD * reference:
@@ -119,10 +146,17 @@ def follow_load(system: SystemRecord, c: int, y: Doubles, load: float, more: flo
 
 @kernel
 def partial_of(
-    system: SystemRecord, piece: int, since: float, w: Workspace, parameter: int, place: int, out: Doubles
+    system: SystemRecord,
+    piece: int,
+    since: float,
+    w: Workspace,
+    parameter: int,
+    place: int,
+    out: Doubles,
 ) -> None:
     """Write `df/dp` of an input at the state linearised last; of a prescribed velocity, `df/d slope`."""
-    o, inverse_mass = system.bristles, system.motion.inverse_mass
+    o = system.bristles
+    inverse_mass = system.motion.inverse_mass
     clear(out, o + 6)
     if parameter == VELOCITY:
         out[o + place] = 1.0
@@ -138,13 +172,25 @@ def partial_of(
 
 @kernel
 def _partial_of_contacts(
-    system: SystemRecord, piece: int, since: float, w: Workspace, parameter: int, place: int, out: Doubles
+    system: SystemRecord,
+    piece: int,
+    since: float,
+    w: Workspace,
+    parameter: int,
+    place: int,
+    out: Doubles,
 ) -> None:
     total = (0.0, 0.0, 0.0)
     for c in range(system.size):
         if parameter != NORMAL_FORCE or c == place:
-            change = wrench_by_input(system, piece, since, c, w.state, w, parameter, place, out)
-            total = plus(total, system.contacts.count[c], applied_back(maps_of(system, c)[0], change))
+            change = wrench_by_input(
+                system, piece, since, c, w.state, w, parameter, place, out
+            )
+            total = plus(
+                total,
+                system.contacts.count[c],
+                applied_back(maps_of(system, c)[0], change),
+            )
     for i in range(3):
         out[system.bristles + i] = system.motion.inverse_mass[i] * total[i]
 
@@ -158,11 +204,15 @@ def wrench_by_input(
 
     The workspace holds the state, linearised last; `w.right` is scratch.
     """
-    rows, load = arrays_at(ROWS, system.work.rows), load_of(system, piece, since, c)
-    unit, state = three(at(system.work.wrench, 3 * c)), system.contacts.state
+    rows = arrays_at(ROWS, system.work.rows)
+    load = load_of(system, piece, since, c)
+    unit = three(at(system.work.wrench, 3 * c))
+    state = system.contacts.state
     more = gained_load(parameter, place, c, load)
     put(rows.d_wrench, (0.0, 0.0, 0.0))
-    if parameter in (FRICTION, SIZE) or (more > 0.0 and system.contacts.reference[c] > 0.0):
+    if parameter in (FRICTION, SIZE) or (
+        more > 0.0 and system.contacts.reference[c] > 0.0
+    ):
         put(rows.twist, applied(maps_of(system, c)[0], seen_by(system, c, y)))
         put(rows.wrench, unit)
         put(rows.d_twist, (0.0, 0.0, 0.0))
@@ -178,22 +228,44 @@ def _share(drives: Drives, p: int, since: float) -> float:
     kind = drives.kind[p]
     if kind in (NORMAL_FORCE, FORCE):
         return drives.weight[p, 0] + drives.weight[p, 1] * since
-    return drives.weight[p, 1] if kind == VELOCITY else (0.0 if kind == INITIAL else 1.0)
+    return (
+        drives.weight[p, 1] if kind == VELOCITY else (0.0 if kind == INITIAL else 1.0)
+    )
 
 
 @kernel
 def _step(
-    address: Place, path: Path, k: int, last: int, since: float, h: float, slope: Doubles, drives: Drives, w: Workspace
+    address: Place,
+    path: Path,
+    k: int,
+    last: int,
+    since: float,
+    h: float,
+    slope: Doubles,
+    drives: Drives,
+    w: Workspace,
 ) -> None:
     """Carry `slope` over `h` seconds into `w.new`."""
-    system, piece, n, shift = read(address), path.piece[k], path.state.shape[1], 1.0 / (h * GAMMA)
+    system = read(address)
+    piece = path.piece[k]
+    n = path.state.shape[1]
+    shift = 1.0 / (h * GAMMA)
     for i in range(PLACES.shape[0]):
         time = since + h * PLACES[i]
         hold(address, path, node_after(path, k, last, time), time, shift, w)
         for u in range(drives.input_kind.shape[0]):
-            partial_of(system, piece, time, w, drives.input_kind[u], drives.input_place[u], at(w.forcing, u * n))
+            partial_of(
+                system,
+                piece,
+                time,
+                w,
+                drives.input_kind[u],
+                drives.input_place[u],
+                at(w.forcing, u * n),
+            )
         for p in range(drives.kind.shape[0]):
-            d, forcing = variation_of(w, slope, p, drives.input[p], n), at(w.forcing, drives.input[p] * n)
+            d = variation_of(w, slope, p, drives.input[p], n)
+            forcing = at(w.forcing, drives.input[p] * n)
             stage_base(i, h, n, d, w.base)
             share = _share(drives, p, time)
             for m in range(n):
@@ -211,7 +283,10 @@ def _error_of_step(
     w: Workspace,
 ) -> float:  # fmt: skip
     """Return the error of a step that ended at `since`, where the matrix is of, per tolerance (see `sdirk.PLAIN`)."""
-    system, shift, rtol, atol = read(address), 1.0 / (h * GAMMA), tolerances.rtol, pointer(tolerances.atol)
+    system = read(address)
+    shift = 1.0 / (h * GAMMA)
+    rtol = tolerances.rtol
+    atol = pointer(tolerances.atol)
     write_errors(n, d, known)
     error = error_of(system, n, d, h, rtol, atol)
     if error > PLAIN:
@@ -219,7 +294,9 @@ def _error_of_step(
             estimate = at(d.stages, i * n)
             for m in range(n):
                 w.right[m] = shift * estimate[m]
-            call(system.solve, (address, piece, since, w.state, shift, w.right, estimate))
+            call(
+                system.solve, (address, piece, since, w.state, shift, w.right, estimate)
+            )
         error = error_of(system, n, d, h, rtol, atol)
     return error
 
@@ -233,20 +310,32 @@ def propagate(
 
     Each step keeps its error below the tolerances, unless it is one of the shortest.
     """
-    w, n, slope = read_workspace(workspace), slope.shape[1], pointer(slope)
-    last, until = stretch.last, stretch.until
-    taken, k, since = 0, stretch.first, stretch.begin
+    w = read_workspace(workspace)
+    n = slope.shape[1]
+    slope = pointer(slope)
+    last = stretch.last
+    until = stretch.until
+    taken = 0
+    k = stretch.first
+    since = stretch.begin
     while since < until:
         k = node_after(path, k, last, since)
-        local, remaining = path.since[k + 1] - path.since[k], until - since
+        local = path.since[k + 1] - path.since[k]
+        remaining = until - since
         reach = path.since[xp.minimum(k + MOST, last)] - since
         h = fitted(xp.minimum(w.pace[0] * local, reach), remaining)
         _step(address, path, k, last, since, h, slope, drives, w)
         taken += 1
-        error, known = 0.0, 1.0 if since > 0.0 else 0.0
+        error = 0.0
+        known = 1.0 if since > 0.0 else 0.0
         for p in range(drives.kind.shape[0]):
             d = variation_of(w, slope, p, drives.input[p], n)
-            error = xp.maximum(error, _error_of_step(address, path.piece[k], since + h, h, n, d, known, tolerances, w))
+            error = xp.maximum(
+                error,
+                _error_of_step(
+                    address, path.piece[k], since + h, h, n, d, known, tolerances, w
+                ),
+            )
         accepted, w.pace[0] = judged(w.pace[0], error, h, local)
         if accepted:
             since = until if h == remaining else since + h
@@ -266,11 +355,15 @@ def forget(address: Place, piece: int, slope: np.ndarray) -> None:
 @jit
 def settle(address: Place, piece: int, slope: np.ndarray) -> None:
     """Clear the slopes [P, n] of contacts that start a piece with hardly any load (see `body.settle_all`)."""
-    system, state = read(address), read(address).contacts.state
+    system = read(address)
+    state = read(address).contacts.state
     for c in range(system.size):
         if hardly_loaded(system, piece, c):
             for p in range(slope.shape[0]):
-                clear(at(pointer(slope), p * slope.shape[1] + state[c]), state[c + 1] - state[c])
+                clear(
+                    at(pointer(slope), p * slope.shape[1] + state[c]),
+                    state[c + 1] - state[c],
+                )
 
 
 @jit
@@ -282,23 +375,36 @@ def wrench_slopes(
 
     `scratch` [3, n] needs no values.
     """
-    system, n, y, slope = read(address), y.shape[0], pointer(y), pointer(slope)
-    rate, rows = pointer(scratch), arrays_at(ROWS, system.work.rows)
+    system = read(address)
+    n = y.shape[0]
+    y = pointer(y)
+    slope = pointer(slope)
+    rate = pointer(scratch)
+    rows = arrays_at(ROWS, system.work.rows)
     call(system.rates, (address, piece, since, y, rate))
     call(system.linearise, (address, piece, y))
     for c in range(system.size):
-        load, (a, g, _) = load_of(system, piece, since, c), maps_of(system, c)
-        unit, first = three(at(system.work.wrench, 3 * c)), system.contacts.state[c]
+        load = load_of(system, piece, since, c)
+        (a, g, _) = maps_of(system, c)
+        unit = three(at(system.work.wrench, 3 * c))
+        first = system.contacts.state[c]
         put(rows.twist, applied(a, seen_by(system, c, y)))
         put(rows.wrench, unit)
         wrench[c, 0], wrench[c, 1], wrench[c, 2] = times(load, unit)
         for p in range(drives.kind.shape[0]):
-            body, dz = at(slope, p * n + system.bristles), at(rate, 2 * n)
+            body = at(slope, p * n + system.bristles)
+            dz = at(rate, 2 * n)
             put(rows.d_twist, plus(applied(a, body), 1.0, applied(g, at(body, 3))))
             more = gained_load(drives.kind[p], drives.place[p], c, load)
             if drives.kind[p] == NORMAL_FORCE:
                 more *= drives.weight[p, 0] + drives.weight[p, 1] * since
-            copy(at(slope, p * n + first), at(dz, first), system.contacts.state[c + 1] - first)
+            copy(
+                at(slope, p * n + first),
+                at(dz, first),
+                system.contacts.state[c + 1] - first,
+            )
             follow_load(system, c, y, load, more, dz)
             change_of(system, piece, c, y, rate, dz, drives.kind[p], at(rate, n))
-            out[c, 0, p], out[c, 1, p], out[c, 2, p] = plus(times(load, three(rows.d_wrench)), more, unit)
+            out[c, 0, p], out[c, 1, p], out[c, 2, p] = plus(
+                times(load, three(rows.d_wrench)), more, unit
+            )

@@ -40,7 +40,12 @@ def _per_capped(deflection: float, largest: float) -> float:
     return xp.where(capped, 1.0, 0.0) / xp.where(capped, deflection, 1.0)
 
 
-rule(cap, "s", {0: "-{t} * per_capped({0}, {1})", 1: "per_capped({0}, {1})"}, per_capped=_per_capped)
+rule(
+    cap,
+    "s",
+    {0: "-{t} * per_capped({0}, {1})", 1: "per_capped({0}, {1})"},
+    per_capped=_per_capped,
+)
 
 
 @kernel
@@ -73,20 +78,26 @@ def bounded(far: float, start: float, dt: float, deflection: float) -> float:
 
 
 @kernel
-def capped(law: LawNumbers, free: Vector, far: float, deflection: float) -> tuple[Vector, float]:
+def capped(
+    law: LawNumbers, free: Vector, far: float, deflection: float
+) -> tuple[Vector, float]:
     """Return a bristle within its cap, and its deflection; `deflection` is the one at the start of the step."""
     back = cap(far, reachable(deflection, law))
     return times(back, free), far * back
 
 
 @kernel
-def step(law: LawNumbers, z: Vector, u: Vector, v: float, per_h: float, q: float, dt: float) -> tuple[Vector, float]:
+def step(
+    law: LawNumbers, z: Vector, u: Vector, v: float, per_h: float, q: float, dt: float
+) -> tuple[Vector, float]:
     """Return the bristle after dt, and its k."""
     deflection, along = seen(z, norm(z), u, per_h, q)
     start = formulas.bristle_decay(xp, deflection, along, v, q, law)
     ahead = plus(z, dt, u)
     far, along_ahead = seen(ahead, norm(ahead), u, per_h, q)
-    end = formulas.bristle_decay(xp, bounded(far, start, dt, deflection), along_ahead, v, q, law)
+    end = formulas.bristle_decay(
+        xp, bounded(far, start, dt, deflection), along_ahead, v, q, law
+    )
     left, mean = formulas.relaxation(xp, formulas.mean_decay(start, end, dt) * dt)
     free = plus(times(left, z), dt * mean, u)
     beyond, along_free = seen(free, norm(free), u, per_h, q)

@@ -34,7 +34,8 @@ STILL = 1e-100
 @kernel
 def sliding(u: Vector) -> tuple[float, float, float, Vector]:
     """Return `c_t`, `c_s`, the mean speed S, and W."""
-    slide, spin = u[0] * u[0] + u[1] * u[1], 2.0 * u[2] * u[2]
+    slide = u[0] * u[0] + u[1] * u[1]
+    spin = 2.0 * u[2] * u[2]
     c_t, c_s, m = formulas.disc_friction(xp, slide, spin)
     return c_t, c_s, math.sqrt(slide + m * spin), (c_t * u[0], c_t * u[1], c_s * u[2])
 
@@ -64,7 +65,14 @@ def _seen(z: Vector, pull: Vector, per_h: float, q: float) -> Vector:
 
 
 @kernel
-def _decay(law: LawNumbers, deflection: float, along: float, spin_share: float, speed: float, q: float) -> float:
+def _decay(
+    law: LawNumbers,
+    deflection: float,
+    along: float,
+    spin_share: float,
+    speed: float,
+    q: float,
+) -> float:
     """Return k."""
     slipping = formulas.disc_deflection(xp, deflection, spin_share, law.breakaway_ratio)
     return formulas.bristle_decay(xp, slipping, along, speed, q, law)
@@ -83,33 +91,52 @@ def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
     c_t, c_s, speed, pull = sliding(u)
     q = grip(law, speed)
     deflection, along, share = _seen(z, pull, _per_h(speed, pull), q)
-    rate = _rate(u, z, _decay(law, deflection, along, share, speed, q), c_t, c_s, 1.0 / (c_t * c_s))
+    rate = _rate(
+        u,
+        z,
+        _decay(law, deflection, along, share, speed, q),
+        c_t,
+        c_s,
+        1.0 / (c_t * c_s),
+    )
     return rate, traction(law, z, rate, u)
 
 
 @kernel
-def _ahead(z: Vector, u: Vector, k_dt: float, c_t: float, c_s: float, dt: float) -> Vector:
+def _ahead(
+    z: Vector, u: Vector, k_dt: float, c_t: float, c_s: float, dt: float
+) -> Vector:
     """Return the bristle at the predicted end of a step, each component at its own rate."""
-    t, s = c_t + k_dt, c_s + k_dt
+    t = c_t + k_dt
+    s = c_s + k_dt
     per = 1.0 / (t * s)
     t, s = c_t * s * per, c_s * t * per
     return (z[0] + dt * u[0]) * t, (z[1] + dt * u[1]) * t, (z[2] + dt * u[2]) * s
 
 
 @kernel
-def _relaxed(z: Vector, u: Vector, k_dt: float, c_t: float, c_s: float, dt: float) -> Vector:
+def _relaxed(
+    z: Vector, u: Vector, k_dt: float, c_t: float, c_s: float, dt: float
+) -> Vector:
     """Return the bristle at the end of a step, `k_dt` being the mean of k dt over `c_t c_s`."""
     left_t, mean_t = formulas.relaxation(xp, k_dt * c_s)
     left_s, mean_s = formulas.relaxation(xp, k_dt * c_t)
-    mean_t, mean_s = mean_t * dt, mean_s * dt
-    return left_t * z[0] + mean_t * u[0], left_t * z[1] + mean_t * u[1], left_s * z[2] + mean_s * u[2]
+    mean_t = mean_t * dt
+    mean_s = mean_s * dt
+    return (
+        left_t * z[0] + mean_t * u[0],
+        left_t * z[1] + mean_t * u[1],
+        left_s * z[2] + mean_s * u[2],
+    )
 
 
 @kernel
 def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
     """Return the bristle after dt and its traction, by the equations of `bristle_step`."""
     c_t, c_s, speed, pull = sliding(u)
-    q, per_h, per = grip(law, speed), _per_h(speed, pull), 1.0 / (c_t * c_s)
+    q = grip(law, speed)
+    per_h = _per_h(speed, pull)
+    per = 1.0 / (c_t * c_s)
     deflection, along, share = _seen(z, pull, per_h, q)
     start = _decay(law, deflection, along, share, speed, q)
     far, along, share = _seen(_ahead(z, u, start * dt, c_t, c_s, dt), pull, per_h, q)

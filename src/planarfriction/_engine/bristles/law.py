@@ -14,7 +14,16 @@ from planarfriction.formulas import LawNumbers
 LAW = len(LawNumbers._fields)
 """Numbers of a law, with which the row of a contact begins."""
 
-PARAMETERS = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
+PARAMETERS = (
+    "sigma_0",
+    "sigma_1",
+    "sigma_2",
+    "mu_c",
+    "mu_s",
+    "v_s",
+    "gamma",
+    "breakaway_ratio",
+)
 """Numbers of a law that derivatives are taken by."""
 
 law_of = reader(LawNumbers)

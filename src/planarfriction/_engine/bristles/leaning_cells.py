@@ -34,11 +34,14 @@ def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
 
     `out(lean, z)` returns a bristle as seen from the middle of its limit, c at rest; `within` is as in `settle`.
     """
-    rate_of, step_of = plain.evaluate, plain.step
+    rate_of = plain.evaluate
+    step_of = plain.step
 
     @kernel
     def centre(lean: Leaning, u: Vector) -> Vector:
-        return scaled(formulas.stribeck(xp, speed(u), lean.law) / lean.law.sigma_0, lean.a)
+        return scaled(
+            formulas.stribeck(xp, speed(u), lean.law) / lean.law.sigma_0, lean.a
+        )
 
     @kernel
     def middle(lean: Leaning) -> Vector:
@@ -71,4 +74,6 @@ def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
 
 
 out, within, evaluate, step = _leaning(points, norm, times)
-out_of_disc, within_disc, evaluate_disc, step_disc = _leaning(discs, discs.mean_speed, _in_plane)
+out_of_disc, within_disc, evaluate_disc, step_disc = _leaning(
+    discs, discs.mean_speed, _in_plane
+)

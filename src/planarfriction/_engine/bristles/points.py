@@ -20,9 +20,14 @@ from planarfriction.formulas import LawNumbers
 @kernel
 def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
     """Compute z' and the traction of a point that moves at u."""
-    speed, size = norm(u), norm(z)
+    speed = norm(u)
+    size = norm(z)
     q = grip(law, speed)
-    rate = plus(u, -formulas.bristle_decay(xp, size * q, ratio(dot(z, u), size), speed, q, law), z)
+    rate = plus(
+        u,
+        -formulas.bristle_decay(xp, size * q, ratio(dot(z, u), size), speed, q, law),
+        z,
+    )
     return rate, traction(law, z, rate, u)
 
 

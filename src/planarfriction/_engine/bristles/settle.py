@@ -26,7 +26,9 @@ RECOVERY = 1.0
 def factor_at(reference: float, load: float) -> float:
     """Return l; 1 of a published law, whose `reference` is 0."""
     fixed = reference > 0.0
-    return xp.where(fixed, reference, 1.0) / xp.where(fixed, xp.maximum(load, formulas.LIGHTEST * reference), 1.0)
+    return xp.where(fixed, reference, 1.0) / xp.where(
+        fixed, xp.maximum(load, formulas.LIGHTEST * reference), 1.0
+    )
 
 
 @kernel

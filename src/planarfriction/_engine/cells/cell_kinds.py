@@ -8,7 +8,12 @@ from typing import Any
 from planarfriction._engine.bristles.leaning_cells import Leaning
 from planarfriction._engine.cells import cells_rollout, cells_sensitivities
 from planarfriction._engine.cells.cell_blocks import LANES, Kind, Limit
-from planarfriction._engine.cells.cell_passes import KINDS, backward_passes, forward_passes, share_passes
+from planarfriction._engine.cells.cell_passes import (
+    KINDS,
+    backward_passes,
+    forward_passes,
+    share_passes,
+)
 from planarfriction._engine.codegen.derive import derive
 from planarfriction._engine.codegen.forward import forward
 from planarfriction._engine.codegen.vectors import reader_of
@@ -36,8 +41,12 @@ def _leaning_at(first: int) -> Any:
 def rollouts_of_cells(size: int, turned: bool, leans: bool) -> tuple:
     """Return rollout, gradient, sensitivities, tangent and shares of a kind of cells (see `KINDS`)."""
     kind = KINDS[size, turned, leans]
-    path, law = ("lean.law", _leaning_at(LANES * kind.numbers)) if leans else ("law", _shared)
-    step, within, by = kind.element.step, kind.element.within, ("z", f"{path}.sigma_0", f"{path}.mu_s")
+    path, law = (
+        ("lean.law", _leaning_at(LANES * kind.numbers)) if leans else ("law", _shared)
+    )
+    step = kind.element.step
+    within = kind.element.within
+    by = ("z", f"{path}.sigma_0", f"{path}.mu_s")
     limited = derive(within, by, ("z",))
     limit = Limit(within, limited.forth, limited.back, forward(within, by, ("z",)))
     pushed = forward(step, cells_rollout.by_of(path), ("z", "u"))
@@ -46,6 +55,11 @@ def rollouts_of_cells(size: int, turned: bool, leans: bool) -> tuple:
     sensitivities = cells_sensitivities.bound(functions, step, within, path, kind.name)
     rollout, gradient, tangent, shares = (
         cells_rollout.entry_of(each, functions, kind.name)
-        for each in (cells_rollout.rollout, cells_rollout.gradient, cells_rollout.tangent, cells_rollout.shares)
+        for each in (
+            cells_rollout.rollout,
+            cells_rollout.gradient,
+            cells_rollout.tangent,
+            cells_rollout.shares,
+        )
     )
     return rollout, gradient, sensitivities, tangent, shares

@@ -45,9 +45,19 @@ class Element(NamedTuple):
 
 POINT = Element("points", 2, points.evaluate, points.step, slopes=(2, 0))
 DISC = Element("discs", 3, discs.evaluate, discs.step)
-LEANING_POINT = Element("leaning points", 2, leaning_cells.evaluate, leaning_cells.step, leaning_cells.within)
+LEANING_POINT = Element(
+    "leaning points",
+    2,
+    leaning_cells.evaluate,
+    leaning_cells.step,
+    leaning_cells.within,
+)
 LEANING_DISC = Element(
-    "leaning discs", 3, leaning_cells.evaluate_disc, leaning_cells.step_disc, leaning_cells.within_disc
+    "leaning discs",
+    3,
+    leaning_cells.evaluate_disc,
+    leaning_cells.step_disc,
+    leaning_cells.within_disc,
 )
 """Elements whose law is a `Leaning`; the asymmetry stands behind the numbers of the lever."""
 
@@ -79,8 +89,12 @@ KINDS = {
     (2, True, False): CellKind("turned", POINT, cells.LEVERS, 5),
     (3, False, False): CellKind("discs", DISC, cells.DISC_POSITIONS, 3),
     (3, True, False): CellKind("turned_discs", DISC, cells.DISC_LEVERS, 6),
-    (2, True, True): CellKind("leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning), 5, True),
-    (3, True, True): CellKind("leaning_discs", LEANING_DISC, cells.DISC_LEVERS._replace(law=_leaning), 6, True),
+    (2, True, True): CellKind(
+        "leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning), 5, True
+    ),
+    (3, True, True): CellKind(
+        "leaning_discs", LEANING_DISC, cells.DISC_LEVERS._replace(law=_leaning), 6, True
+    ),
 }
 """Kinds of cells by the components of a bristle, and whether there are a metric and an asymmetry."""
 
@@ -102,10 +116,17 @@ class _Symbols:
     def __init__(self, trace: Trace, kind: CellKind) -> None:
         self.trace = trace
         numbers = self.several("c", kind.numbers + 2 * kind.leans)
-        law = kind.law(*(Number(trace, f"{kind.law.__name__}.{name}") for name in kind.law._fields))
+        law = kind.law(
+            *(Number(trace, f"{kind.law.__name__}.{name}") for name in kind.law._fields)
+        )
         self.law = Leaning(law, numbers[-2:]) if kind.leans else law
-        self.cell, self.z, self.v = numbers[: kind.numbers], self.several("z", kind.element.size), self.several("v", 3)
-        self.dt, self.weight = Number(trace, "dt"), Number(trace, "weight")
+        self.cell, self.z, self.v = (
+            numbers[: kind.numbers],
+            self.several("z", kind.element.size),
+            self.several("v", 3),
+        )
+        self.dt = Number(trace, "dt")
+        self.weight = Number(trace, "weight")
         self.u = twin(kind.lever.seen)(self.cell, self.v)
         self.inputs = (self.law, self.z, self.u, self.dt)[: 3 + kind.fixed]
 
@@ -130,19 +151,26 @@ def _shared(kind: CellKind) -> dict[str, str]:
     return {**law, **{f"v{m}": f"v[{m}]" for m in range(3)}, "dt": "shared[0]"}
 
 
-_PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"load": "shared[1]", "keeps": "shared[2]"}
+_PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {
+    "load": "shared[1]",
+    "keeps": "shared[2]",
+}
 """Sources of the cotangent of a wrench, of the load, and of 1, or 0 without load."""
 
 
 def _in_block(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in a block."""
-    vectors = _fields("c", 0, kind.numbers + 2 * kind.leans) | _fields("z", Z, kind.element.size)
+    vectors = _fields("c", 0, kind.numbers + 2 * kind.leans) | _fields(
+        "z", Z, kind.element.size
+    )
     return {**_shared(kind), **vectors, "weight": f"block[{WEIGHT} + i]"}
 
 
 def _in_rows(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in `Rows`."""
-    vectors = _rows("c", "cells", kind.numbers + 2 * kind.leans) | _rows("z", "z", kind.element.size)
+    vectors = _rows("c", "cells", kind.numbers + 2 * kind.leans) | _rows(
+        "z", "z", kind.element.size
+    )
     return {**_shared(kind), **vectors, "weight": "block.weights[0 + i]"}
 
 
@@ -152,7 +180,9 @@ def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
     def step(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
         new, traction = twin(kind.element.step)(s.law, s.z, s.u, s.dt)
-        return new, twin(kind.lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
+        return new, twin(kind.lever.wrench)(
+            s.cell, tuple(s.weight * each for each in traction)
+        )
 
     return step
 
@@ -160,14 +190,27 @@ def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
 def forward_passes(kind: CellKind) -> Passes:
     """Write the step of the cells of a block, in place."""
     stores = list(_fields("z", Z, kind.element.size).values())
-    return passes(kind.element.name, traced(_step_of(kind)), _in_block(kind), stores, kind.element.forward)
+    return passes(
+        kind.element.name,
+        traced(_step_of(kind)),
+        _in_block(kind),
+        stores,
+        kind.element.forward,
+    )
 
 
 def step_passes(kind: CellKind) -> Passes:
     """Write the step of cells in `Rows`; the new bristles may go where the old ones are, so they are written last."""
-    element, stores = kind.element, _rows("new", "out", kind.element.size)
+    element = kind.element
+    stores = _rows("new", "out", kind.element.size)
     sources = _in_rows(kind) | stores
-    return passes(f"steps of {element.name}", traced(_step_of(kind)), sources, list(stores.values()), element.forward)
+    return passes(
+        f"steps of {element.name}",
+        traced(_step_of(kind)),
+        sources,
+        list(stores.values()),
+        element.forward,
+    )
 
 
 def backward_passes(kind: CellKind) -> Passes:
@@ -175,22 +218,40 @@ def backward_passes(kind: CellKind) -> Passes:
 
     These are the cotangents of the twist [3], of the load, and of the law in the order of `cells_rollout.PARAMETERS`.
     """
-    element, lever = kind.element, kind.lever
-    written = derive(element.step, by_of("lean.law" if kind.leans else "law"), ("z", "u"))
+    element = kind.element
+    lever = kind.lever
+    written = derive(
+        element.step, by_of("lean.law" if kind.leans else "law"), ("z", "u")
+    )
 
     def adjoint(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
-        load, keeps, by_load = (Number(trace, name) for name in ("load", "keeps", "by_load"))
+        load, keeps, by_load = (
+            Number(trace, name) for name in ("load", "keeps", "by_load")
+        )
         pulled = twin(lever.seen)(s.cell, s.several("p", 3))
         (_, traction), tape = twin(written.forth)(s.law, s.z, s.u, s.dt)
         state_bar = tuple(keeps * each for each in s.several("b", element.size))
-        z_bar, u_bar, *law_bar = twin(written.back)(tape, (state_bar, tuple(load * s.weight * each for each in pulled)))
+        z_bar, u_bar, *law_bar = twin(written.back)(
+            tape, (state_bar, tuple(load * s.weight * each for each in pulled))
+        )
         along = sum(a * b for a, b in zip(pulled, traction, strict=True))
-        return z_bar, twin(lever.wrench)(s.cell, u_bar), (s.weight + load * by_load) * along, tuple(law_bar)
+        return (
+            z_bar,
+            twin(lever.wrench)(s.cell, u_bar),
+            (s.weight + load * by_load) * along,
+            tuple(law_bar),
+        )
 
     bar = _fields("b", BAR, element.size)
     sources = _in_block(kind) | _PULL | bar | {"by_load": f"block[{BY_LOAD} + i]"}
-    return passes(f"{element.name}_back", traced(adjoint), sources, list(bar.values()), element.backward)
+    return passes(
+        f"{element.name}_back",
+        traced(adjoint),
+        sources,
+        list(bar.values()),
+        element.backward,
+    )
 
 
 def share_passes(kind: CellKind) -> Passes:
@@ -208,7 +269,13 @@ def share_passes(kind: CellKind) -> Passes:
 
     store = f"block[{OUT} + i]"
     sources = {**_in_block(kind), **_PULL, "before": store}
-    return passes(f"{kind.element.name}_shares", traced(share), sources, [store], kind.element.forward)
+    return passes(
+        f"{kind.element.name}_shares",
+        traced(share),
+        sources,
+        [store],
+        kind.element.forward,
+    )
 
 
 def rate_passes(kind: CellKind) -> Passes:
@@ -218,10 +285,14 @@ def rate_passes(kind: CellKind) -> Passes:
     def rate(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
         zdot, traction = twin(element.evaluate)(*s.inputs)
-        return zdot, twin(kind.lever.wrench)(s.cell, tuple(s.weight * each for each in traction))
+        return zdot, twin(kind.lever.wrench)(
+            s.cell, tuple(s.weight * each for each in traction)
+        )
 
     stores = list(_rows("rate", "out", element.size).values())
-    return passes(f"rates of {element.name}", traced(rate), _in_rows(kind), stores, element.rate)
+    return passes(
+        f"rates of {element.name}", traced(rate), _in_rows(kind), stores, element.rate
+    )
 
 
 def slope_passes(kind: CellKind) -> Passes:
@@ -229,14 +300,32 @@ def slope_passes(kind: CellKind) -> Passes:
     element = kind.element
     written = derive(element.evaluate, ("z", "u"), ("z", "u"))
     count = element.size if kind.linear else 2 * element.size
-    units = [tuple(float(m == j) for m in range(2 * element.size)) for j in range(count)]
+    units = [
+        tuple(float(m == j) for m in range(2 * element.size)) for j in range(count)
+    ]
 
     def slopes(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
         _, tape = twin(written.forth)(*s.inputs)
-        rows = [twin(written.back)(tape, (unit[: element.size], unit[element.size :])) for unit in units]
-        halves = [rows[first : first + element.size] for first in range(0, count, element.size)]
-        return tuple(tuple(row[which] for row in half) for half in halves for which in range(2))
+        rows = [
+            twin(written.back)(tape, (unit[: element.size], unit[element.size :]))
+            for unit in units
+        ]
+        halves = [
+            rows[first : first + element.size]
+            for first in range(0, count, element.size)
+        ]
+        return tuple(
+            tuple(row[which] for row in half) for half in halves for which in range(2)
+        )
 
-    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * count * element.size)]  # of a block: that lies apart
-    return passes(f"slopes of {element.name}", traced(slopes), _in_rows(kind), stores, element.slopes)
+    stores = [
+        f"block.out[{m * LANES} + i]" for m in range(2 * count * element.size)
+    ]  # of a block: that lies apart
+    return passes(
+        f"slopes of {element.name}",
+        traced(slopes),
+        _in_rows(kind),
+        stores,
+        element.slopes,
+    )

@@ -29,10 +29,24 @@ from planarfriction._engine.cells.cell_passes import (
     step_passes,
 )
 from planarfriction._engine.cells.cells import CellsContact
-from planarfriction._engine.codegen.vectors import Vector, clear, copy, norm, plus, put, three, times
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    clear,
+    copy,
+    norm,
+    plus,
+    put,
+    three,
+    times,
+)
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, Place, at
-from planarfriction._engine.protocol import ModelFunctions, StepFunctions, functions_of, step_functions
+from planarfriction._engine.protocol import (
+    ModelFunctions,
+    StepFunctions,
+    functions_of,
+    step_functions,
+)
 from planarfriction.formulas import LawNumbers
 
 RESULTS = LANES * 4 * DISC.size**2
@@ -43,9 +57,22 @@ BLOCK = RESULTS + LANES * 12
 
 
 @kernel
-def _in_place(contact: CellsContact, z: Doubles, first: int, lanes: int, out: Doubles, block: Doubles) -> Any:
+def _in_place(
+    contact: CellsContact,
+    z: Doubles,
+    first: int,
+    lanes: int,
+    out: Doubles,
+    block: Doubles,
+) -> Any:
     """Return the rows of cells of a contact from one on, and their number."""
-    rows = Rows(at(contact.cells, first), at(z, first), at(contact.weights, first), out, contact.count)
+    rows = Rows(
+        at(contact.cells, first),
+        at(z, first),
+        at(contact.weights, first),
+        out,
+        contact.count,
+    )
     return rows, min(lanes, contact.count - first)
 
 
@@ -54,31 +81,56 @@ def _filled(numbers: int, size: int) -> Any:
 
     Loops over it need not ask which of their rows overlap: that takes as long as a loop over a few dozen cells.
     """
-    bristle, weight = RESULTS + numbers * LANES, RESULTS + (numbers + size) * LANES
+    bristle = RESULTS + numbers * LANES
+    weight = RESULTS + (numbers + size) * LANES
 
     @kernel
-    def filled(contact: CellsContact, z: Doubles, first: int, lanes: int, out: Doubles, block: Doubles) -> Any:
-        n, count = contact.count, min(lanes, contact.count - first)
+    def filled(
+        contact: CellsContact,
+        z: Doubles,
+        first: int,
+        lanes: int,
+        out: Doubles,
+        block: Doubles,
+    ) -> Any:
+        n = contact.count
+        count = min(lanes, contact.count - first)
         for m in range(numbers + size + 1):
             clear(at(block, RESULTS + m * LANES + count), lanes - count)
         for m in range(numbers):
-            copy(at(contact.cells, m * n + first), at(block, RESULTS + m * LANES), count)
+            copy(
+                at(contact.cells, m * n + first), at(block, RESULTS + m * LANES), count
+            )
         for m in range(size):
             copy(at(z, m * n + first), at(block, bristle + m * LANES), count)
         copy(at(contact.weights, first), at(block, weight), count)
-        return Rows(at(block, RESULTS), at(block, bristle), at(block, weight), out, LANES), lanes
+        return Rows(
+            at(block, RESULTS), at(block, bristle), at(block, weight), out, LANES
+        ), lanes
 
     return filled
 
 
 @kernel
 def _through(
-    record: CellsContact, z: Doubles, v: Vector, shared: Vector, out: Doubles, cell_rows: Any, run: Any, copied: int
+    record: CellsContact,
+    z: Doubles,
+    v: Vector,
+    shared: Vector,
+    out: Doubles,
+    cell_rows: Any,
+    run: Any,
+    copied: int,
 ) -> Vector:
     """Run passes over all cells, which write `copied` rows to `out`, or any number if it is 0; return their sums."""
-    total, block, n, (_, lanes) = (0.0, 0.0, 0.0), scratch(BLOCK), record.count, divided(record.count)
+    total = (0.0, 0.0, 0.0)
+    block = scratch(BLOCK)
+    n = record.count
+    (_, lanes) = divided(record.count)
     for first in range(0, n, lanes):
-        rows, count = cell_rows(record, z, first, lanes, block if copied > 0 else at(out, first), block)
+        rows, count = cell_rows(
+            record, z, first, lanes, block if copied > 0 else at(out, first), block
+        )
         total = plus(total, 1.0, run(record.law, v, shared, rows, count))
         for m in range(copied):
             copy(at(block, m * LANES), at(out, m * n + first), min(lanes, n - first))
@@ -91,7 +143,10 @@ def evaluate(
 ) -> None:  # fmt: skip
     """Write `z'`, and `W`; behind V is the factor of a `fixed` stiffness."""
     factor = v[3] if fixed else 0.0
-    put(w, _through(read(contact), z, three(v), (factor,), zdot, cell_rows, rate, copied))
+    put(
+        w,
+        _through(read(contact), z, three(v), (factor,), zdot, cell_rows, rate, copied),
+    )
 
 
 def linearise(
@@ -99,8 +154,12 @@ def linearise(
     read: Any,
 ) -> None:  # fmt: skip
     """Write A and F of each cell, and C and E unless tractions are linear (see `general_cells`)."""
-    record, twist, factor, block = read(contact), three(v), v[3] if fixed else 0.0, scratch(BLOCK)
-    n, (_, lanes) = record.count, divided(record.count)
+    record = read(contact)
+    twist = three(v)
+    factor = v[3] if fixed else 0.0
+    block = scratch(BLOCK)
+    n = record.count
+    (_, lanes) = divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block, block)
         slope(record.law, twist, (factor,), rows, count)
@@ -115,11 +174,16 @@ def step(
     copied: int, read: Any,
 ) -> None:  # fmt: skip
     """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
-    put(out, _through(read(contact), z, three(v), (dt,), new, cell_rows, advance, copied))
+    put(
+        out,
+        _through(read(contact), z, three(v), (dt,), new, cell_rows, advance, copied),
+    )
 
 
 @functools.cache
-def functions_of_cells(size: int, turned: bool, leans: bool) -> tuple[ModelFunctions, StepFunctions]:
+def functions_of_cells(
+    size: int, turned: bool, leans: bool
+) -> tuple[ModelFunctions, StepFunctions]:
     """Return the functions of contacts of a kind of cells (see `KINDS`); they are written on first use."""
     kind = KINDS[size, turned, leans]
     return rates_of(kind, cells.read), steps_of(kind, cells.read)
@@ -127,24 +191,42 @@ def functions_of_cells(size: int, turned: bool, leans: bool) -> tuple[ModelFunct
 
 def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
     """Return the arguments of templates that rates and steps of a kind of cells share."""
-    size, numbers = kind.element.size, kind.numbers + 2 * kind.leans
+    size = kind.element.size
+    numbers = kind.numbers + 2 * kind.leans
     copied = size if size == DISC.size else 0  # points come by the hundred
     cell_rows = _filled(numbers, size) if copied else _in_place
     bristle = general_cells.bristle(size, kind.linear)
-    return {"lever": kind.lever, "bristle": bristle, "read": read, "copied": copied, "cell_rows": cell_rows}
+    return {
+        "lever": kind.lever,
+        "bristle": bristle,
+        "read": read,
+        "copied": copied,
+        "cell_rows": cell_rows,
+    }
 
 
 def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
     """Return the functions of the solver for contacts of a kind of cells whose records `read` reads."""
-    loops = {"rate": rate_passes(kind).run, "slope": slope_passes(kind).run, "fixed": kind.fixed}
-    return functions_of(kind.name, (evaluate, linearise, *general_cells.FUNCTIONS), **_model_of(kind, read), **loops)
+    loops = {
+        "rate": rate_passes(kind).run,
+        "slope": slope_passes(kind).run,
+        "fixed": kind.fixed,
+    }
+    return functions_of(
+        kind.name,
+        (evaluate, linearise, *general_cells.FUNCTIONS),
+        **_model_of(kind, read),
+        **loops,
+    )
 
 
 def steps_of(kind: CellKind, read: Any) -> StepFunctions:
     """Return the steps of contacts of a kind of cells whose records `read` reads."""
     slopes = general_cells.slopes_of(kind.element.step, kind.element.size)
     loops = {"advance": step_passes(kind).run, "linearise": slopes}
-    return step_functions(kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops)
+    return step_functions(
+        kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops
+    )
 
 
 # ---------------------------------------------------------------------- of a fixed stiffness
@@ -167,15 +249,21 @@ def _bent(law: LawNumbers, z: Vector) -> Vector:
 
 def _recovering(kind: CellKind) -> Element:
     """Return the bristle that recovers from beyond its limit, from the rate and the traction of the published one."""
-    published, numbers, out = kind.element.evaluate, _itself, _bent  # seen from the middle of its limit
+    published = kind.element.evaluate
+    numbers = _itself
+    out = _bent  # seen from the middle of its limit
     if kind.leans:
-        numbers, out = _law_of, leaning_cells.out if kind.element.size == 2 else leaning_cells.out_of_disc
+        numbers = _law_of
+        out = leaning_cells.out if kind.element.size == 2 else leaning_cells.out_of_disc
 
     @kernel
-    def evaluate(law: LawNumbers | Leaning, z: Vector, u: Vector, factor: float) -> tuple[Vector, Vector]:
+    def evaluate(
+        law: LawNumbers | Leaning, z: Vector, u: Vector, factor: float
+    ) -> tuple[Vector, Vector]:
         bent = times(factor, z)
         rate, traction = published(law, bent, u)
-        plain, beyond = numbers(law), out(law, bent)
+        plain = numbers(law)
+        beyond = out(law, bent)
         k = recovery(plain, beyond, norm(u))
         return plus(rate, -k, beyond), plus(traction, plain.sigma_1 * k, beyond)
 
@@ -186,5 +274,7 @@ def _recovering(kind: CellKind) -> Element:
 def fixed_rates_of(size: int, turned: bool, leans: bool) -> ModelFunctions:
     """Return the functions of the solver for contacts of a kind of cells (see `KINDS`) with a fixed stiffness."""
     kind = KINDS[size, turned, leans]
-    fixed = kind._replace(name=f"fixed_{kind.name}", element=_recovering(kind), linear=False, fixed=True)
+    fixed = kind._replace(
+        name=f"fixed_{kind.name}", element=_recovering(kind), linear=False, fixed=True
+    )
     return rates_of(fixed, cells.read)

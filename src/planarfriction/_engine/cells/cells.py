@@ -84,16 +84,24 @@ def _of_points(count: int, seen: Any, wrench: Any) -> Lever:
     """Return the lever of points with so many numbers."""
 
     @kernel
-    def around(cell: Vector, p: Vector) -> Vector:  # of the columns of P, then of the rows of `B' P`
-        a, b = wrench(cell, (p[0], p[2])), wrench(cell, (p[1], p[3]))
-        return (*wrench(cell, (a[0], b[0])), *wrench(cell, (a[1], b[1])), *wrench(cell, (a[2], b[2])))
+    def around(
+        cell: Vector, p: Vector
+    ) -> Vector:  # of the columns of P, then of the rows of `B' P`
+        a = wrench(cell, (p[0], p[2]))
+        b = wrench(cell, (p[1], p[3]))
+        return (
+            *wrench(cell, (a[0], b[0])),
+            *wrench(cell, (a[1], b[1])),
+            *wrench(cell, (a[2], b[2])),
+        )
 
     return Lever(reader_of(count), seen, wrench, around, _law_of_all)
 
 
 def _of_discs(count: int, points: Lever) -> Lever:
     """Return the lever of discs with so many numbers, whose last is kappa times the radius, from that of points."""
-    seen_by_point, pull_of_point = points.seen, points.wrench
+    seen_by_point = points.seen
+    pull_of_point = points.wrench
 
     @kernel
     def seen(cell: Vector, v: Vector) -> Vector:
@@ -106,7 +114,8 @@ def _of_discs(count: int, points: Lever) -> Lever:
 
     @kernel
     def around(cell: Vector, p: Vector) -> Vector:
-        a, b = wrench(cell, (p[0], p[3], p[6])), wrench(cell, (p[1], p[4], p[7]))
+        a = wrench(cell, (p[0], p[3], p[6]))
+        b = wrench(cell, (p[1], p[4], p[7]))
         c = wrench(cell, (p[2], p[5], p[8]))
         rows = (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
         return (*wrench(cell, rows[0]), *wrench(cell, rows[1]), *wrench(cell, rows[2]))
@@ -114,5 +123,8 @@ def _of_discs(count: int, points: Lever) -> Lever:
     return _of_points(count, seen, wrench)._replace(around=around)
 
 
-POSITIONS, LEVERS = _of_points(2, _seen, _wrench), _of_points(5, _seen_by_map, _wrench_by_map)
+POSITIONS, LEVERS = (
+    _of_points(2, _seen, _wrench),
+    _of_points(5, _seen_by_map, _wrench_by_map),
+)
 DISC_POSITIONS, DISC_LEVERS = _of_discs(3, POSITIONS), _of_discs(6, LEVERS)

@@ -12,10 +12,30 @@ import numpy as np
 
 from planarfriction._engine.bristles.law import PARAMETERS, law_of
 from planarfriction._engine.bristles.settle import factor_at, softening, stiffened
-from planarfriction._engine.cells.cell_blocks import BAR, BLOCK, BY_LOAD, LANES, OUT, WEIGHT, Kind, Z, divided, totals
+from planarfriction._engine.cells.cell_blocks import (
+    BAR,
+    BLOCK,
+    BY_LOAD,
+    LANES,
+    OUT,
+    WEIGHT,
+    Kind,
+    Z,
+    divided,
+    totals,
+)
 from planarfriction._engine.cells.rollouts import Bars, Inputs, row_of
 from planarfriction._engine.codegen.definitions import bind
-from planarfriction._engine.codegen.vectors import Vector, add, clear, copy, plus, scatter, three, times
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    add,
+    clear,
+    copy,
+    plus,
+    scatter,
+    three,
+    times,
+)
 from planarfriction._engine.compiler import jit, kernel
 from planarfriction._engine.compiler.calls import pointer
 from planarfriction._engine.compiler.memory import Doubles, at
@@ -43,22 +63,28 @@ def _lay(w: Doubles, blocks: int, levers: np.ndarray, numbers: int = BLOCK) -> N
 
 
 @kernel
-def _write(w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers: int = BLOCK) -> None:
+def _write(
+    w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers: int = BLOCK
+) -> None:
     """Write vectors [size n] to a field of all blocks, which have so many numbers."""
     blocks, lanes = divided(n)
     for k in range(blocks):
-        block, first = at(w, k * numbers + field), k * lanes
+        block = at(w, k * numbers + field)
+        first = k * lanes
         for i in range(min(lanes, n - first)):
             for m in range(size):
                 block[m * LANES + i] = values[m * n + first + i]
 
 
 @kernel
-def _read(w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers: int = BLOCK) -> None:
+def _read(
+    w: Doubles, field: int, values: np.ndarray, n: int, size: int, numbers: int = BLOCK
+) -> None:
     """Read vectors [size n] from a field of all blocks."""
     blocks, lanes = divided(n)
     for k in range(blocks):
-        block, first = at(w, k * numbers + field), k * lanes
+        block = at(w, k * numbers + field)
+        first = k * lanes
         for i in range(min(lanes, n - first)):
             for m in range(size):
                 values[m * n + first + i] = block[m * LANES + i]
@@ -71,34 +97,46 @@ def _forget(w: Doubles, blocks: int, field: int, size: int) -> None:
 
 
 @kernel
-def _weigh(w: Doubles, blocks: int, lanes: int, weights: np.ndarray, by_load: np.ndarray) -> None:
+def _weigh(
+    w: Doubles, blocks: int, lanes: int, weights: np.ndarray, by_load: np.ndarray
+) -> None:
     for k in range(blocks):
-        block, first = at(w, k * BLOCK), k * lanes
+        block = at(w, k * BLOCK)
+        first = k * lanes
         for i in range(lanes):
-            block[WEIGHT + i], block[BY_LOAD + i] = weights[first + i], by_load[first + i]
+            block[WEIGHT + i] = weights[first + i]
+            block[BY_LOAD + i] = by_load[first + i]
 
 
 # ---------------------------------------------------------------------- limits of a fixed stiffness
 
 
 @kernel
-def _bring_back(kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int) -> None:
+def _bring_back(
+    kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int
+) -> None:
     """Bring bristles back onto their limits (see `settle`)."""
     for k in range(blocks):
         block = at(w, k * BLOCK)
         for i in range(lanes):
-            new = kind.limit.within(kind.law(law, block, i), kind.vector(block, Z + i, LANES))
+            new = kind.limit.within(
+                kind.law(law, block, i), kind.vector(block, Z + i, LANES)
+            )
             scatter(block, Z + i, LANES, new)
 
 
 @kernel
-def _bring_back_pull(kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int) -> Vector:
+def _bring_back_pull(
+    kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int
+) -> Vector:
     """Carry the cotangents of bristles back over `_bring_back`; return the cotangents of sigma_0 and mu_s."""
     total = (0.0, 0.0)
     for k in range(blocks):
         block = at(w, k * BLOCK)
         for i in range(lanes):
-            _, tape = kind.limit.forth(kind.law(law, block, i), kind.vector(block, Z + i, LANES))
+            _, tape = kind.limit.forth(
+                kind.law(law, block, i), kind.vector(block, Z + i, LANES)
+            )
             bars = kind.limit.back(tape, (kind.vector(block, BAR + i, LANES),))
             scatter(block, BAR + i, LANES, bars[0])
             total = plus(total, 1.0, bars[1:])
@@ -119,11 +157,15 @@ class Interval(NamedTuple):
 
 
 @kernel
-def _bring_back_push(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
+def _bring_back_push(
+    kind: Kind, interval: Interval, block: Doubles, lanes: int
+) -> None:
     """Bring bristles back onto their limits, with their changes."""
     for i in range(lanes):
-        z, change = kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
-        law, changes = kind.law(interval.law, block, i), (interval.d_law[0], interval.d_law[4])
+        z = kind.vector(block, Z + i, LANES)
+        change = kind.vector(block, BAR + i, LANES)
+        law = kind.law(interval.law, block, i)
+        changes = (interval.d_law[0], interval.d_law[4])
         z, change = kind.limit.pushed(law, z, change, *changes)
         scatter(block, Z + i, LANES, z)
         scatter(block, BAR + i, LANES, change)
@@ -134,18 +176,31 @@ def _bring_back_push(kind: Kind, interval: Interval, block: Doubles, lanes: int)
 
 @kernel
 def _roll(
-    kind: Kind, law: LawNumbers, inputs: Inputs, b: int, n: int, w: Doubles, wrench: np.ndarray, states: np.ndarray
+    kind: Kind,
+    law: LawNumbers,
+    inputs: Inputs,
+    b: int,
+    n: int,
+    w: Doubles,
+    wrench: np.ndarray,
+    states: np.ndarray,
 ) -> None:
-    twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shape.weights, -1
-    (blocks, lanes), kept = divided(weights.shape[1]), states.shape[0] > 0
+    twists = inputs.twist[row_of(inputs.twist, b)]
+    loads = inputs.load[row_of(inputs.load, b)]
+    which = inputs.which[row_of(inputs.which, b)]
+    weights = inputs.shape.weights
+    last = -1
+    (blocks, lanes) = divided(weights.shape[1])
+    kept = states.shape[0] > 0
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
             _weigh(w, blocks, lanes, weights[last], inputs.shape.by_load[last])
         if kept:
             _read(w, Z, states[t], n, kind.size)
-        load, twist, dt = loads[t], three(twists[t]), inputs.dt[t]
+        load = loads[t]
+        twist = three(twists[t])
+        dt = inputs.dt[t]
         if load == 0.0:
             _forget(w, blocks, Z, kind.size)
         else:
@@ -154,7 +209,11 @@ def _roll(
                 _bring_back(kind, stiff, w, blocks, lanes)
             total = (0.0, 0.0, 0.0)
             for k in range(blocks):
-                total = plus(total, 1.0, kind.advance(stiff, twist, (dt,), at(w, k * BLOCK), lanes))
+                total = plus(
+                    total,
+                    1.0,
+                    kind.advance(stiff, twist, (dt,), at(w, k * BLOCK), lanes),
+                )
             add(wrench[t], times(load, total))
 
 
@@ -167,7 +226,9 @@ def rollout(
 
     The state before each step goes into `states` [B, T, size n], unless that is empty.
     """
-    w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
+    w = pointer(scratch)
+    n = z.shape[1] // kind.size
+    rows = inputs.rows
     blocks, _ = divided(inputs.shape.weights.shape[1])
     for b in range(span[0], span[1]):
         law = law_of(rows[row_of(rows, b)])
@@ -182,21 +243,36 @@ def rollout(
 
 @kernel
 def _pull(
-    kind: Kind, law: LawNumbers, inputs: Any, b: int, w: Doubles, states: np.ndarray, pulls: np.ndarray, bars: Any
+    kind: Kind,
+    law: LawNumbers,
+    inputs: Any,
+    b: int,
+    w: Doubles,
+    states: np.ndarray,
+    pulls: np.ndarray,
+    bars: Any,
 ) -> Vector:
     """Carry the cotangents of the rollout of contact b back, and return the cotangent of the law."""
-    n, twist_bar, load_bar = bars.state.shape[1] // kind.size, bars.twist[b], bars.load[b]
-    twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-    which, weights, last = inputs.which[row_of(inputs.which, b)], inputs.shape.weights, -1
-    (blocks, lanes), by_law = divided(weights.shape[1]), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    n = bars.state.shape[1] // kind.size
+    twist_bar = bars.twist[b]
+    load_bar = bars.load[b]
+    twists = inputs.twist[row_of(inputs.twist, b)]
+    loads = inputs.load[row_of(inputs.load, b)]
+    which = inputs.which[row_of(inputs.which, b)]
+    weights = inputs.shape.weights
+    last = -1
+    (blocks, lanes) = divided(weights.shape[1])
+    by_law = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for t in range(inputs.dt.shape[0] - 1, -1, -1):
         if which[t] != last:
             last = which[t]
             _weigh(w, blocks, lanes, weights[last], inputs.shape.by_load[last])
         _write(w, Z, states[t], n, kind.size)
-        load, twist = loads[t], three(twists[t])
+        load = loads[t]
+        twist = three(twists[t])
         shared = inputs.dt[t], load, 0.0 if load == 0.0 else 1.0, *three(pulls[t])
-        stiff, by_stiff = stiffened(law, inputs.reference, load), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        stiff = stiffened(law, inputs.reference, load)
+        by_stiff = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if inputs.reference > 0.0:
             _bring_back(kind, stiff, w, blocks, lanes)
         for k in range(blocks):
@@ -207,9 +283,15 @@ def _pull(
         if inputs.reference > 0.0:
             _write(w, Z, states[t], n, kind.size)
             spring, limit = _bring_back_pull(kind, stiff, w, blocks, lanes)
-            by_stiff = plus(by_stiff, 1.0, (spring, 0.0, 0.0, 0.0, limit, 0.0, 0.0, 0.0))
+            by_stiff = plus(
+                by_stiff, 1.0, (spring, 0.0, 0.0, 0.0, limit, 0.0, 0.0, 0.0)
+            )
             load_bar[t] += by_stiff[0] * softening(stiff, inputs.reference, load)
-        by_law = plus(by_law, 1.0, (by_stiff[0] * factor_at(inputs.reference, load), *by_stiff[1:]))
+        by_law = plus(
+            by_law,
+            1.0,
+            (by_stiff[0] * factor_at(inputs.reference, load), *by_stiff[1:]),
+        )
     return by_law
 
 
@@ -219,11 +301,16 @@ def gradient(
     scratch: np.ndarray,
 ) -> None:  # fmt: skip
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
-    w, n, rows = pointer(scratch), bars.state.shape[1] // kind.size, inputs.rows
+    w = pointer(scratch)
+    n = bars.state.shape[1] // kind.size
+    rows = inputs.rows
     blocks, _ = divided(inputs.shape.weights.shape[1])
     for b in range(span[0], span[1]):
-        law, before, pulls = law_of(rows[row_of(rows, b)]), states, wrench_bar[row_of(wrench_bar, b)]
-        before, row_bar = before[row_of(before, b)], bars.rows[b]
+        law = law_of(rows[row_of(rows, b)])
+        before = states
+        pulls = wrench_bar[row_of(wrench_bar, b)]
+        before = before[row_of(before, b)]
+        row_bar = bars.rows[b]
         _lay(w, blocks, inputs.shape.data)
         _write(w, BAR, bars.state[b], n, kind.size)
         by_law = _pull(kind, law, inputs, b, w, before, pulls, bars)
@@ -241,14 +328,21 @@ def shares(
 
     Bristles do not see the weights: they are the `states` before each step [B or 1, T, size n], and stay.
     """
-    w, n, rows = pointer(scratch), states.shape[2] // kind.size, inputs.rows
+    w = pointer(scratch)
+    n = states.shape[2] // kind.size
+    rows = inputs.rows
     blocks, lanes = divided(inputs.shape.weights.shape[1])
     for b in range(span[0], span[1]):
-        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        law, pulls, before = law_of(rows[row_of(rows, b)]), wrench_bar[row_of(wrench_bar, b)], states[row_of(states, b)]
+        twists = inputs.twist[row_of(inputs.twist, b)]
+        loads = inputs.load[row_of(inputs.load, b)]
+        law = law_of(rows[row_of(rows, b)])
+        pulls = wrench_bar[row_of(wrench_bar, b)]
+        before = states[row_of(states, b)]
         _lay(w, blocks, inputs.shape.data)
         for t in range(inputs.dt.shape[0]):
-            load, twist, shared = loads[t], three(twists[t]), (inputs.dt[t], loads[t], 1.0, *three(pulls[t]))
+            load = loads[t]
+            twist = three(twists[t])
+            shared = (inputs.dt[t], loads[t], 1.0, *three(pulls[t]))
             if load == 0.0:
                 continue
             stiff = stiffened(law, inputs.reference, load)
@@ -266,16 +360,28 @@ def shares(
 @kernel
 def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
     """Step a cell and its change."""
-    lever, weight, load = kind.lever, block[WEIGHT + i], interval.load
-    one, z, change = lever.read(block, i, LANES), kind.vector(block, Z + i, LANES), kind.vector(block, BAR + i, LANES)
-    u, d_u = lever.seen(one, interval.twist), lever.seen(one, interval.d_twist)
+    lever = kind.lever
+    weight = block[WEIGHT + i]
+    load = interval.load
+    one = lever.read(block, i, LANES)
+    z = kind.vector(block, Z + i, LANES)
+    change = kind.vector(block, BAR + i, LANES)
+    u = lever.seen(one, interval.twist)
+    d_u = lever.seen(one, interval.d_twist)
     law = kind.law(interval.law, block, i)
-    new, traction, d_new, d_traction = kind.pushed(law, z, u, interval.dt, change, d_u, *interval.d_law)
+    new, traction, d_new, d_traction = kind.pushed(
+        law, z, u, interval.dt, change, d_u, *interval.d_law
+    )
     scatter(block, Z + i, LANES, new)
     scatter(block, BAR + i, LANES, d_new)
     heavier = (weight + load * block[BY_LOAD + i]) * interval.d_load
     change = plus(times(load * weight, d_traction), heavier, traction)
-    scatter(block, OUT + i, LANES, (times(weight, lever.wrench(one, traction)), lever.wrench(one, change)))
+    scatter(
+        block,
+        OUT + i,
+        LANES,
+        (times(weight, lever.wrench(one, traction)), lever.wrench(one, change)),
+    )
 
 
 @kernel
@@ -293,14 +399,22 @@ def tangent(
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; the change of the state is in place.
     """
-    w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
-    weights, all_by_load = inputs.shape.weights, inputs.shape.by_load
+    w = pointer(scratch)
+    n = z.shape[1] // kind.size
+    rows = inputs.rows
+    weights = inputs.shape.weights
+    all_by_load = inputs.shape.by_load
     blocks, lanes = divided(weights.shape[1])
     for b in range(span[0], span[1]):
-        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
-        law, d_law, which = law_of(rows[row_of(rows, b)]), law_of(changes.rows[row_of(changes.rows, b)]), inputs.which
-        which, last = which[row_of(which, b)], -1
+        twists = inputs.twist[row_of(inputs.twist, b)]
+        loads = inputs.load[row_of(inputs.load, b)]
+        turns = changes.twist[row_of(changes.twist, b)]
+        pushes = changes.load[row_of(changes.load, b)]
+        law = law_of(rows[row_of(rows, b)])
+        d_law = law_of(changes.rows[row_of(changes.rows, b)])
+        which = inputs.which
+        which = which[row_of(which, b)]
+        last = -1
         _lay(w, blocks, inputs.shape.data)
         _write(w, Z, z[b], n, kind.size)
         _write(w, BAR, changes.state[b], n, kind.size)
@@ -309,10 +423,14 @@ def tangent(
                 last = which[t]
                 _weigh(w, blocks, lanes, weights[last], all_by_load[last])
             load = loads[t]
-            stiff, stiffer = stiffened(law, inputs.reference, load), d_law.sigma_0 * factor_at(inputs.reference, load)
+            stiff = stiffened(law, inputs.reference, load)
+            stiffer = d_law.sigma_0 * factor_at(inputs.reference, load)
             stiffer += pushes[t] * softening(stiff, inputs.reference, load)
-            by_law, turn = (stiffer, *d_law[1:7], d_law.breakaway_ratio), three(turns[t])
-            interval = Interval(stiff, by_law, three(twists[t]), turn, load, pushes[t], inputs.dt[t])
+            by_law = (stiffer, *d_law[1:7], d_law.breakaway_ratio)
+            turn = three(turns[t])
+            interval = Interval(
+                stiff, by_law, three(twists[t]), turn, load, pushes[t], inputs.dt[t]
+            )
             for k in range(blocks):
                 if inputs.reference > 0.0:
                     _bring_back_push(kind, interval, at(w, k * BLOCK), lanes)
@@ -329,12 +447,21 @@ def tangent(
 # ---------------------------------------------------------------------- bound to kinds of cells
 
 
-def _entry(inputs: Inputs, *arguments: Any, loop: Any, kind: Kind, numbers: int) -> None:
+def _entry(
+    inputs: Inputs, *arguments: Any, loop: Any, kind: Kind, numbers: int
+) -> None:
     """Run a loop in new scratch memory."""
-    loop(kind, inputs, *arguments, np.empty(divided(inputs.shape.weights.shape[1])[0] * numbers))
+    loop(
+        kind,
+        inputs,
+        *arguments,
+        np.empty(divided(inputs.shape.weights.shape[1])[0] * numbers),
+    )
 
 
 def entry_of(loop: Any, kind: Kind, name: str, numbers: int = BLOCK) -> Any:
     """Return the entry point of a loop for a kind of cells, whose blocks have so many numbers; it takes the inputs and
     the arguments between these and the scratch memory."""
-    return bind(_entry, f"{name}_{loop.__name__}", jit, loop=loop, kind=kind, numbers=numbers)
+    return bind(
+        _entry, f"{name}_{loop.__name__}", jit, loop=loop, kind=kind, numbers=numbers
+    )

@@ -12,11 +12,25 @@ import numpy as np
 
 from planarfriction._engine.bristles.law import law_of
 from planarfriction._engine.bristles.settle import factor_at, stiffened
-from planarfriction._engine.cells.cell_blocks import BLOCK, LANES, WEIGHT, Kind, Z, divided
+from planarfriction._engine.cells.cell_blocks import (
+    BLOCK,
+    LANES,
+    WEIGHT,
+    Kind,
+    Z,
+    divided,
+)
 from planarfriction._engine.cells.cells_rollout import _lay, _read, _write, entry_of
 from planarfriction._engine.cells.rollouts import Derivatives, row_of
 from planarfriction._engine.codegen.forward import forwards
-from planarfriction._engine.codegen.vectors import Vector, add, clear, plus, scatter, three
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    add,
+    clear,
+    plus,
+    scatter,
+    three,
+)
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.calls import pointer
 from planarfriction._engine.compiler.memory import Doubles, at
@@ -26,7 +40,9 @@ _MOVING = "sigma_0", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 PARAMETERS = (*_MOVING, "sigma_1", "sigma_2")
 """Numbers of the law; the numbers that move bristles come first."""
 
-_PLACES = tuple(PARAMETERS.index(name) if name in PARAMETERS else -1 for name in LawNumbers._fields)
+_PLACES = tuple(
+    PARAMETERS.index(name) if name in PARAMETERS else -1 for name in LawNumbers._fields
+)
 """Place in `PARAMETERS` of each column of a row."""
 
 _CHANGE, _PULL = BLOCK, BLOCK + 3 * LANES * len(_MOVING)
@@ -55,27 +71,41 @@ def _change(kind: Kind, block: Doubles, n: int, i: int) -> Vector:
 @kernel
 def _changes(kind: Kind, block: Doubles, i: int) -> tuple[Vector, ...]:
     """Return the changes of bristle i, in the order of `_MOVING`."""
-    first = _change(kind, block, 0, i), _change(kind, block, 1, i), _change(kind, block, 2, i)
-    return (*first, _change(kind, block, 3, i), _change(kind, block, 4, i), _change(kind, block, 5, i))
+    first = (
+        _change(kind, block, 0, i),
+        _change(kind, block, 1, i),
+        _change(kind, block, 2, i),
+    )
+    return (
+        *first,
+        _change(kind, block, 3, i),
+        _change(kind, block, 4, i),
+        _change(kind, block, 5, i),
+    )
 
 
 @kernel
 def _bring_back(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
     """Bring bristles back onto their limits (see `settle`), with their changes."""
     for i in range(lanes):
-        z, (a, b, c, d, e, f) = kind.vector(block, Z + i, LANES), _changes(kind, block, i)
-        bristles = kind.limit.pushed(kind.law(interval.law, block, i), z, interval.stiffer, a, b, 1.0, c, d, e, f)
+        z = kind.vector(block, Z + i, LANES)
+        (a, b, c, d, e, f) = _changes(kind, block, i)
+        bristles = kind.limit.pushed(
+            kind.law(interval.law, block, i), z, interval.stiffer, a, b, 1.0, c, d, e, f
+        )
         scatter(block, Z + i, LANES, bristles[0])
         scatter(block, _CHANGE + i, LANES, bristles[1:])
 
 
 @kernel
 def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
-    z, u = kind.vector(block, Z + i, LANES), kind.lever.seen(kind.lever.read(block, i, LANES), interval.twist)
+    z = kind.vector(block, Z + i, LANES)
+    u = kind.lever.seen(kind.lever.read(block, i, LANES), interval.twist)
     a, b, c, d, e, f = _changes(kind, block, i)
     changes = interval.stiffer, a, 1.0, b, 1.0, c, 1.0, d, 1.0, e, 1.0, f, 1.0, 1.0
     results = kind.pushed(kind.law(interval.law, block, i), z, u, interval.dt, *changes)
-    bristles, tractions = results[::2], results[1::2]
+    bristles = results[::2]
+    tractions = results[1::2]
     scatter(block, Z + i, LANES, bristles[0])
     scatter(block, _CHANGE + i, LANES, bristles[1:7])
     scatter(block, _PULL + i, LANES, tractions)
@@ -96,7 +126,11 @@ def _total(kind: Kind, block: Doubles, lanes: int, load: float, n: int) -> Vecto
     total = (0.0, 0.0, 0.0)
     for i in range(lanes):
         pull = kind.vector(block, _PULL + kind.size * n * LANES + i, LANES)
-        total = plus(total, load * block[WEIGHT + i], kind.lever.wrench(kind.lever.read(block, i, LANES), pull))
+        total = plus(
+            total,
+            load * block[WEIGHT + i],
+            kind.lever.wrench(kind.lever.read(block, i, LANES), pull),
+        )
     return total
 
 
@@ -108,11 +142,22 @@ def _forget(block: Doubles) -> None:
 
 @kernel
 def _follow(
-    kind: Kind, inputs: Any, b: int, law: LawNumbers, k: int, lanes: int, block: Doubles, out: Derivatives
+    kind: Kind,
+    inputs: Any,
+    b: int,
+    law: LawNumbers,
+    k: int,
+    lanes: int,
+    block: Doubles,
+    out: Derivatives,
 ) -> None:
     """Step block k of contact b through all steps: one block fits into the cache."""
-    twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-    which, last, wrench, slopes = inputs.which[row_of(inputs.which, b)], -1, out.wrenches[b], out.slopes[b]
+    twists = inputs.twist[row_of(inputs.twist, b)]
+    loads = inputs.load[row_of(inputs.load, b)]
+    which = inputs.which[row_of(inputs.which, b)]
+    last = -1
+    wrench = out.wrenches[b]
+    slopes = out.slopes[b]
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
@@ -122,7 +167,8 @@ def _follow(
         if load == 0.0:
             _forget(block)
             continue
-        stiff, stiffer = stiffened(law, inputs.reference, load), factor_at(inputs.reference, load)
+        stiff = stiffened(law, inputs.reference, load)
+        stiffer = factor_at(inputs.reference, load)
         interval = Interval(stiff, three(twists[t]), inputs.dt[t], stiffer)
         if inputs.reference > 0.0:
             _bring_back(kind, interval, block, lanes)
@@ -135,9 +181,18 @@ def _follow(
 
 
 @kernel
-def sensitivities(kind: Kind, inputs: Any, span: tuple, z: np.ndarray, out: Derivatives, scratch: np.ndarray) -> None:
+def sensitivities(
+    kind: Kind,
+    inputs: Any,
+    span: tuple,
+    z: np.ndarray,
+    out: Derivatives,
+    scratch: np.ndarray,
+) -> None:
     """Run rollouts with their derivatives by numbers of the law; `z` [B, size n] in place."""
-    w, n, rows = pointer(scratch), z.shape[1] // kind.size, inputs.rows
+    w = pointer(scratch)
+    n = z.shape[1] // kind.size
+    rows = inputs.rows
     blocks, lanes = divided(inputs.shape.weights.shape[1])
     for b in range(span[0], span[1]):
         _lay(w, blocks, inputs.shape.data, _SIZE)
@@ -151,7 +206,9 @@ def sensitivities(kind: Kind, inputs: Any, span: tuple, z: np.ndarray, out: Deri
 def bound(kind: Kind, step: Any, within: Any, path: str, name: str) -> Any:
     """Return the entry point of a kind of cells, from the step of one and its limit; `path` leads to their law."""
     by = tuple((f"{path}.{each}", "z")[: 1 + (each in _MOVING)] for each in PARAMETERS)
-    limited = tuple((f"{path}.{each}", "z")[each not in ("sigma_0", "mu_s") :] for each in _MOVING)
+    limited = tuple(
+        (f"{path}.{each}", "z")[each not in ("sigma_0", "mu_s") :] for each in _MOVING
+    )
     limit = kind.limit._replace(pushed=forwards(within, limited, ("z",)).pushed)
     kind = kind._replace(pushed=forwards(step, by, ("z", "u")).pushed, limit=limit)
     return entry_of(sensitivities, kind, name, _SIZE)

@@ -20,7 +20,9 @@ _STOPS = 1e-9
 
 
 @jit
-def seeds(points: np.ndarray, weights: np.ndarray, first: int, centres: np.ndarray) -> None:
+def seeds(
+    points: np.ndarray, weights: np.ndarray, first: int, centres: np.ndarray
+) -> None:
     """Write `centres [k, 2]` far from each other: points drawn by weight times squared distance from earlier centres.
 
     Draws are multiples of the golden ratio from number `first` on.
@@ -38,8 +40,10 @@ def seeds(points: np.ndarray, weights: np.ndarray, first: int, centres: np.ndarr
                 chosen = i
             if draw <= 0.0:
                 break
-        x, y = points[chosen, 0], points[chosen, 1]
-        centres[j, 0], centres[j, 1] = x, y
+        x = points[chosen, 0]
+        y = points[chosen, 1]
+        centres[j, 0] = x
+        centres[j, 1] = y
         for i in range(points.shape[0]):
             square = (points[i, 0] - x) ** 2 + (points[i, 1] - y) ** 2
             distance[i] = square if j == 0 else min(square, distance[i])
@@ -57,23 +61,36 @@ def lloyd(
     Coordinates of centres are 0 where `on_axes [k, 2]`.
     """
     count = centres.shape[0]
-    share, sums = np.empty(count), np.empty((count, 2))
-    cost, last = np.inf, np.inf
+    share = np.empty(count)
+    sums = np.empty((count, 2))
+    cost = np.inf
+    last = np.inf
     for _ in range(steps):
-        share[:], sums[:], cost = 0.0, 0.0, 0.0
+        share[:] = 0.0
+        sums[:] = 0.0
+        cost = 0.0
         for i in range(points.shape[0]):
-            x, y, nearest = points[i, 0], points[i, 1], np.inf
-            label, back = 0, False
+            x = points[i, 0]
+            y = points[i, 1]
+            nearest = np.inf
+            label = 0
+            back = False
             for j in range(count):
-                cx, cy = centres[j, 0], centres[j, 1]
+                cx = centres[j, 0]
+                cy = centres[j, 1]
                 square = (x - cx) ** 2 + (y - cy) ** 2
                 if square < nearest * (1.0 - _TIE):
-                    nearest, label, back = square, j, False
+                    nearest = square
+                    label = j
+                    back = False
                 if both:
                     square = (x + cx) ** 2 + (y + cy) ** 2
                     if square < nearest * (1.0 - _TIE):
-                        nearest, label, back = square, j, True
-            labels[i], turned[i] = label, back
+                        nearest = square
+                        label = j
+                        back = True
+            labels[i] = label
+            turned[i] = back
             weight = -weights[i] if back else weights[i]
             share[label] += weights[i]
             sums[label, 0] += weight * x

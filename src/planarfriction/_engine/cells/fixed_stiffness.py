@@ -13,10 +13,14 @@ from planarfriction._engine.compiler.memory import Doubles, Place, at, exists
 @kernel
 def _middle(contact: CellsContact, factor: float, i: int) -> Vector:
     """Return the middle of the limit of bristle i: not zero where friction differs forwards and backwards."""
-    n, lean, x, y = contact.count, contact.lean, 0.0, 0.0
+    n = contact.count
+    lean = contact.lean
+    x = 0.0
+    y = 0.0
     if exists(lean):
         largest = contact.law.mu_s / (factor * contact.law.sigma_0)
-        x, y = largest * lean[i], largest * lean[n + i]
+        x = largest * lean[i]
+        y = largest * lean[n + i]
     return x, y, 0.0
 
 
@@ -25,7 +29,8 @@ def bring_back(contact: CellsContact, size: int, z: Doubles, factor: float) -> N
     """Bring bristles of so many components back onto their limits at a load, and leave others as they are."""
     n = contact.count
     for i in range(n):
-        beyond, middle = _beyond(contact, size, z, factor, i), _middle(contact, factor, i)
+        beyond = _beyond(contact, size, z, factor, i)
+        middle = _middle(contact, factor, i)
         if beyond > ROUNDING:
             for m in range(size):
                 z[m * n + i] = middle[m] + (z[m * n + i] - middle[m]) / beyond
@@ -35,13 +40,24 @@ def bring_back(contact: CellsContact, size: int, z: Doubles, factor: float) -> N
 def _out(contact: CellsContact, size: int, z: Doubles, factor: float, i: int) -> Vector:
     """Return bristle i as seen from the middle of its limit."""
     n = contact.count
-    return plus((z[i], z[n + i], z[2 * n + i] if size == 3 else 0.0), -1.0, _middle(contact, factor, i))
+    return plus(
+        (z[i], z[n + i], z[2 * n + i] if size == 3 else 0.0),
+        -1.0,
+        _middle(contact, factor, i),
+    )
 
 
 @kernel
-def _beyond(contact: CellsContact, size: int, z: Doubles, factor: float, i: int) -> float:
+def _beyond(
+    contact: CellsContact, size: int, z: Doubles, factor: float, i: int
+) -> float:
     """Return the deflection of bristle i over its limit."""
-    return factor * norm(_out(contact, size, z, factor, i)) * contact.law.sigma_0 / contact.law.mu_s
+    return (
+        factor
+        * norm(_out(contact, size, z, factor, i))
+        * contact.law.sigma_0
+        / contact.law.mu_s
+    )
 
 
 @kernel
@@ -64,7 +80,13 @@ def stepped(
 
 @kernel
 def unscale(
-    record: Place, size: int, z: Doubles, factor: float, by_twist: Doubles, of_wrench: Doubles, by_state: Doubles
+    record: Place,
+    size: int,
+    z: Doubles,
+    factor: float,
+    by_twist: Doubles,
+    of_wrench: Doubles,
+    by_state: Doubles,
 ) -> None:
     """Turn derivatives of a published step into derivatives of `stepped`, in place.
 
@@ -76,17 +98,21 @@ def unscale(
         by_twist[m] = by_twist[m] / factor
         of_wrench[m] = of_wrench[m] * factor
     for i in range(n):
-        beyond, out = _beyond(contact, size, z, factor, i), _out(contact, size, z, factor, i)
+        beyond = _beyond(contact, size, z, factor, i)
+        out = _out(contact, size, z, factor, i)
         if beyond > ROUNDING:
             _turn_rows(out, size, n, i, beyond, 3, of_wrench)
             _turn_rows(out, size, n, i, beyond, size, by_state)
 
 
 @kernel
-def _turn_rows(out: Vector, size: int, n: int, i: int, beyond: float, rows: int, by_state: Doubles) -> None:
+def _turn_rows(
+    out: Vector, size: int, n: int, i: int, beyond: float, rows: int, by_state: Doubles
+) -> None:
     """Multiply rows of derivatives by a bristle with its derivatives by the bristle before it was brought back."""
     for k in range(rows):
-        row, along = at(by_state, k * size * n), 0.0
+        row = at(by_state, k * size * n)
+        along = 0.0
         for m in range(size):
             along += row[m * n + i] * out[m]
         for m in range(size):

@@ -22,7 +22,14 @@ from planarfriction._engine.codegen.vectors import Vector, plus, put, three, tim
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import entry, kernel
 from planarfriction._engine.compiler.calls import call
-from planarfriction._engine.compiler.memory import Doubles, Layout, Place, arrays_at, at, reader
+from planarfriction._engine.compiler.memory import (
+    Doubles,
+    Layout,
+    Place,
+    arrays_at,
+    at,
+    reader,
+)
 from planarfriction._engine.protocol import ROWS, Addresses, ModelFunctions
 
 
@@ -100,8 +107,11 @@ def _centre(record: FollowingContact, z: Doubles) -> Vector:
 @kernel
 def _press(record: FollowingContact, z: Doubles, out: Doubles) -> bool:
     """Write the weights; return True if some cells lift."""
-    n, (x, y), lowest = record.count, _centre(record, z), 1.0
-    dx, dy = x - record.middle[0], y - record.middle[1]
+    n = record.count
+    (x, y) = _centre(record, z)
+    lowest = 1.0
+    dx = x - record.middle[0]
+    dy = y - record.middle[1]
     for i in range(n):
         share = 1.0 + record.slope_x[i] * dx + record.slope_y[i] * dy
         lowest = xp.minimum(lowest, share)
@@ -112,20 +122,36 @@ def _press(record: FollowingContact, z: Doubles, out: Doubles) -> bool:
 
 
 @kernel
-def _slopes(record: FollowingContact, w: Doubles, along_x: float, along_y: float, out: Doubles) -> None:
+def _slopes(
+    record: FollowingContact, w: Doubles, along_x: float, along_y: float, out: Doubles
+) -> None:
     """Write the slopes of weights w, some of which are 0, by their centre of pressure along a direction."""
-    n, pressing, mx, my = record.count, 0.0, 0.0, 0.0
+    n = record.count
+    pressing = 0.0
+    mx = 0.0
+    my = 0.0
     for i in range(n):
         share = record.weights[i] if w[i] > 0.0 else 0.0
-        pressing, mx, my = pressing + share, mx + share * record.x[i], my + share * record.y[i]
-    mx, my, least = mx / pressing, my / pressing, SOFTNESS * record.radius * record.radius
-    xx, xy, yy = least, 0.0, least
+        pressing = pressing + share
+        mx = mx + share * record.x[i]
+        my = my + share * record.y[i]
+    mx = mx / pressing
+    my = my / pressing
+    least = SOFTNESS * record.radius * record.radius
+    xx = least
+    xy = 0.0
+    yy = least
     for i in range(n):
-        share, dx, dy = record.weights[i] if w[i] > 0.0 else 0.0, record.x[i] - mx, record.y[i] - my
-        xx, xy, yy = xx + share * dx * dx, xy + share * dx * dy, yy + share * dy * dy
+        share = record.weights[i] if w[i] > 0.0 else 0.0
+        dx = record.x[i] - mx
+        dy = record.y[i] - my
+        xx = xx + share * dx * dx
+        xy = xy + share * dx * dy
+        yy = yy + share * dy * dy
     one = xx * yy - xy * xy
     per = 1.0 / one if one > 0.0 else 0.0
-    a, b = per * (yy * along_x - xy * along_y), per * (xx * along_y - xy * along_x)
+    a = per * (yy * along_x - xy * along_y)
+    b = per * (xx * along_y - xy * along_x)
     for i in range(n):
         share = record.weights[i] if w[i] > 0.0 else 0.0
         out[i] = share * (a * (record.x[i] - mx) + b * (record.y[i] - my))
@@ -135,7 +161,8 @@ def _slopes(record: FollowingContact, w: Doubles, along_x: float, along_y: float
 def _pulls_to(record: FollowingContact, z: Doubles, w: Doubles, zdot: Doubles) -> None:
     """Write the rate of the two states of the pressure under a wrench."""
     n = record.states
-    zdot[n], zdot[n + 1] = -(z[n] + record.height * w[0]) / record.lag, -(z[n + 1] + record.height * w[1]) / record.lag
+    zdot[n] = -(z[n] + record.height * w[0]) / record.lag
+    zdot[n + 1] = -(z[n + 1] + record.height * w[1]) / record.lag
 
 
 @kernel
@@ -145,9 +172,12 @@ def _by_pressure(m: Linear, a: float, b: float) -> Vector:
 
 
 @kernel
-def _solved(record: FollowingContact, m: Linear, r: Doubles, x: float, y: float) -> Vector:
+def _solved(
+    record: FollowingContact, m: Linear, r: Doubles, x: float, y: float
+) -> Vector:
     """Return `N^-1 (T r_e - h (x, y))`."""
-    x, y = record.lag * r[record.states] - record.height * x, record.lag * r[record.states + 1] - record.height * y
+    x = record.lag * r[record.states] - record.height * x
+    y = record.lag * r[record.states + 1] - record.height * y
     return m.inverse[0] * x + m.inverse[1] * y, m.inverse[2] * x + m.inverse[3] * y
 
 
@@ -163,7 +193,8 @@ def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) 
 @entry
 def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
     """Hold the weights, write K and p, and linearise the cells; a wrench is linear in the weights."""
-    record, m = read(contact), arrays_at(_PLACES, lin)
+    record = read(contact)
+    m = arrays_at(_PLACES, lin)
     lifts = _press(record, z, record.pressed)
     for j in range(2):
         slope = record.slope_x if j == 0 else record.slope_y
@@ -172,46 +203,70 @@ def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
         else:
             for i in range(record.count):
                 record.trial[i] = record.weights[i] * slope[i]
-        call(record.calls.evaluate, (record.trial_cells, z, v, record.scratch, m.by_x if j == 0 else m.by_y))
+        call(
+            record.calls.evaluate,
+            (record.trial_cells, z, v, record.scratch, m.by_x if j == 0 else m.by_y),
+        )
     m.centre[0], m.centre[1] = _centre(record, z)
     call(record.calls.linearise, (record.cells, z, v, at(lin, OWN)))
 
 
 @entry
-def factor(contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles) -> None:
+def factor(
+    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles
+) -> None:
     """Prepare D, and write the stiffness."""
-    record, m, s = read(contact), arrays_at(_PLACES, lin), stiffness
+    record = read(contact)
+    m = arrays_at(_PLACES, lin)
+    s = stiffness
     call(record.calls.factor, (record.cells, z, shift, at(lin, OWN), s))
-    h, one = record.height, 1.0 + shift * record.lag
-    xx, xy, yx, yy = one + h * m.by_x[0], h * m.by_y[0], h * m.by_x[1], one + h * m.by_y[1]
+    h = record.height
+    one = 1.0 + shift * record.lag
+    xx = one + h * m.by_x[0]
+    xy = h * m.by_y[0]
+    yx = h * m.by_x[1]
+    yy = one + h * m.by_y[1]
     per = xx * yy - xy * yx
     per = 1.0 / (per if per != 0.0 else 1.0)
-    m.inverse[0], m.inverse[1], m.inverse[2], m.inverse[3] = per * yy, -per * xy, -per * yx, per * xx
+    m.inverse[0] = per * yy
+    m.inverse[1] = -per * xy
+    m.inverse[2] = -per * yx
+    m.inverse[3] = per * xx
     for j in range(3):
-        m.stiffness[j], m.stiffness[3 + j] = s[j], s[3 + j]
+        m.stiffness[j] = s[j]
+        m.stiffness[3 + j] = s[3 + j]
         a, b = _solved(record, m, record.zero, s[j], s[3 + j])
         for i in range(3):
             s[3 * i + j] += m.by_x[i] * a + m.by_y[i] * b
 
 
 @entry
-def eliminate(contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles) -> None:
+def eliminate(
+    contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles
+) -> None:
     """Write the wrench that a residual causes."""
-    record, m = read(contact), arrays_at(_PLACES, lin)
+    record = read(contact)
+    m = arrays_at(_PLACES, lin)
     call(record.calls.eliminate, (record.cells, z, shift, r, at(lin, OWN), w))
-    m.residual[0], m.residual[1] = w[0], w[1]
+    m.residual[0] = w[0]
+    m.residual[1] = w[1]
     a, b = _solved(record, m, r, w[0], w[1])
     put(w, plus(three(w), 1.0, _by_pressure(m, a, b)))
 
 
 @entry
-def back_substitute(contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles) -> None:
+def back_substitute(
+    contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles
+) -> None:
     """Solve for the states, after `eliminate` of the same residual."""
-    record, m = read(contact), arrays_at(_PLACES, lin)
+    record = read(contact)
+    m = arrays_at(_PLACES, lin)
     call(record.calls.back_substitute, (record.cells, z, r, dv, at(lin, OWN), out))
-    x, y = m.residual[0], m.residual[1]
+    x = m.residual[0]
+    y = m.residual[1]
     for j in range(3):
-        x, y = x + m.stiffness[j] * dv[j], y + m.stiffness[3 + j] * dv[j]
+        x = x + m.stiffness[j] * dv[j]
+        y = y + m.stiffness[3 + j] * dv[j]
     out[record.states], out[record.states + 1] = _solved(record, m, r, x, y)
 
 
@@ -221,42 +276,87 @@ def change(
     friction: float, size: float,
 ) -> None:  # fmt: skip
     """Write the changes of z' and of the wrench; in a patch that has grown, p is nearer to the middle."""
-    record, changes, m = read(contact), arrays_at(ROWS, rows), arrays_at(_PLACES, lin)
-    call(record.calls.change, (record.cells, z, zdot, at(lin, OWN), dz, dzdot, rows, friction, size))
+    record = read(contact)
+    changes = arrays_at(ROWS, rows)
+    m = arrays_at(_PLACES, lin)
+    call(
+        record.calls.change,
+        (record.cells, z, zdot, at(lin, OWN), dz, dzdot, rows, friction, size),
+    )
     n = record.states
-    by_pressure = _by_pressure(m, dz[n] - size * m.centre[0], dz[n + 1] - size * m.centre[1])
+    by_pressure = _by_pressure(
+        m, dz[n] - size * m.centre[0], dz[n + 1] - size * m.centre[1]
+    )
     put(changes.d_wrench, plus(three(changes.d_wrench), 1.0, by_pressure))
     _pulls_to(record, dz, changes.d_wrench, dzdot)
 
 
 @entry
-def solve_transposed(contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: Doubles) -> None:
+def solve_transposed(
+    contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: Doubles
+) -> None:
     """Solve `D' out = r`: first for the pressure, then for the bristles that it sees."""
-    record, m, rows = read(contact), arrays_at(_PLACES, lin), arrays_at(ROWS, read(contact).rows)
+    record = read(contact)
+    m = arrays_at(_PLACES, lin)
+    rows = arrays_at(ROWS, read(contact).rows)
     n = record.states
-    a, b = r[n], r[n + 1]
-    a, b = record.lag * (m.inverse[0] * a + m.inverse[2] * b), record.lag * (m.inverse[1] * a + m.inverse[3] * b)
+    a = r[n]
+    b = r[n + 1]
+    a, b = (
+        record.lag * (m.inverse[0] * a + m.inverse[2] * b),
+        record.lag * (m.inverse[1] * a + m.inverse[3] * b),
+    )
     put(rows.d_wrench, times(-record.height / record.lag, (a, b, 0.0)))
-    call(record.calls.pull_back, (record.cells, z, at(lin, OWN), record.zero, record.rows, record.scratch))
+    call(
+        record.calls.pull_back,
+        (record.cells, z, at(lin, OWN), record.zero, record.rows, record.scratch),
+    )
     for i in range(n):
         record.scratch[i] += r[i]
-    call(record.calls.solve_transposed, (record.cells, z, record.scratch, at(lin, OWN), out))
-    out[n], out[n + 1] = a, b
+    call(
+        record.calls.solve_transposed,
+        (record.cells, z, record.scratch, at(lin, OWN), out),
+    )
+    out[n] = a
+    out[n + 1] = b
 
 
 @entry
-def pull_back(contact: Place, z: Doubles, lin: Doubles, dzdot: Doubles, rows: Doubles, out: Doubles) -> None:
+def pull_back(
+    contact: Place,
+    z: Doubles,
+    lin: Doubles,
+    dzdot: Doubles,
+    rows: Doubles,
+    out: Doubles,
+) -> None:
     """Write the transpose of `change`."""
-    record, changes, m = read(contact), arrays_at(ROWS, rows), arrays_at(_PLACES, lin)
-    n, d_wrench = record.states, three(changes.d_wrench)
+    record = read(contact)
+    changes = arrays_at(ROWS, rows)
+    m = arrays_at(_PLACES, lin)
+    n = record.states
+    d_wrench = three(changes.d_wrench)
     per = 1.0 / record.lag
     wrench = plus(d_wrench, -per * record.height, (dzdot[n], dzdot[n + 1], 0.0))
     put(changes.d_wrench, wrench)
     call(record.calls.pull_back, (record.cells, z, at(lin, OWN), dzdot, rows, out))
     put(changes.d_wrench, d_wrench)
-    out[n], out[n + 1] = -per * dzdot[n], -per * dzdot[n + 1]
+    out[n] = -per * dzdot[n]
+    out[n + 1] = -per * dzdot[n + 1]
     for i in range(3):
-        out[n], out[n + 1] = out[n] + m.by_x[i] * wrench[i], out[n + 1] + m.by_y[i] * wrench[i]
+        out[n], out[n + 1] = (
+            out[n] + m.by_x[i] * wrench[i],
+            out[n + 1] + m.by_y[i] * wrench[i],
+        )
 
 
-FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)
+FUNCTIONS = ModelFunctions(
+    evaluate,
+    linearise,
+    factor,
+    eliminate,
+    back_substitute,
+    change,
+    solve_transposed,
+    pull_back,
+)

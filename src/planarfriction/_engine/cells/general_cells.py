@@ -73,13 +73,16 @@ def bristle(size: int, linear: bool) -> Bristle:
     """Return the functions of a bristle of two or three components."""
     identity = tuple(float(i % (size + 1) == 0) for i in range(size * size))
     readers = reader_of(size), reader_of(size * size)
-    return Bristle(size, *readers, identity, inverse if size == 3 else _inverse_2, linear)
+    return Bristle(
+        size, *readers, identity, inverse if size == 3 else _inverse_2, linear
+    )
 
 
 def slopes_of(function: Any, size: int) -> Any:
     """Return a function that returns two vectors with their derivatives by z and u, as `CellSlopes`."""
     written = derive(function, ("z", "u"), ("z", "u"))
-    forth, rows_of = written.forth, _rows_of(written.back, size)
+    forth = written.forth
+    rows_of = _rows_of(written.back, size)
 
     @kernel
     def slopes(*arguments: Any) -> CellSlopes:
@@ -94,16 +97,23 @@ def _rows_of(back: Any, size: int) -> Any:
     lines = []
     for m in range(2 * size):
         bars = [float(m == j) for j in range(2 * size)]
-        lines.append(f"z{m}, u{m} = back(tape, ({tuple(bars[:size])}, {tuple(bars[size:])}))")
+        lines.append(
+            f"z{m}, u{m} = back(tape, ({tuple(bars[:size])}, {tuple(bars[size:])}))"
+        )
     halves = range(size), range(size, 2 * size)
     rows = [", ".join(f"*{by}{m}" for m in half) for half in halves for by in "zu"]
-    source = text_of("rows(tape)", [*lines, f"return {', '.join(f'({row})' for row in rows)}"])
+    source = text_of(
+        "rows(tape)", [*lines, f"return {', '.join(f'({row})' for row in rows)}"]
+    )
     return kernel(run_source("slopes", source, {"back": back})["rows"])
 
 
 @kernel
 def _inverse_2(shift: float, m: Vector) -> Vector:
-    a, b, c, d = shift - m[0], -m[1], -m[2], shift - m[3]
+    a = shift - m[0]
+    b = -m[1]
+    c = -m[2]
+    d = shift - m[3]
     per = 1.0 / (a * d - b * c)
     return per * d, -per * b, -per * c, per * a
 
@@ -119,7 +129,8 @@ def factor(
     read: Any,
 ) -> None:  # fmt: skip
     """Invert D, write `sum w B' (C D^-1 F + E) B`."""
-    record, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    record = read(contact)
+    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     n = record.count
     for i in range(n):
         inverse = bristle.inverse(shift, _matrix(bristle, lin, A, i, n))
@@ -129,8 +140,14 @@ def factor(
             pull = record.law.sigma_0 + record.law.sigma_1 * shift
             p = plus(times(-pull, driven), -record.law.sigma_2, bristle.identity)
         else:
-            p = plus(matrix_product(_matrix(bristle, lin, C, i, n), driven), 1.0, _matrix(bristle, lin, E, i, n))
-        total = plus(total, record.weights[i], lever.around(lever.read(record.cells, i, n), p))
+            p = plus(
+                matrix_product(_matrix(bristle, lin, C, i, n), driven),
+                1.0,
+                _matrix(bristle, lin, E, i, n),
+            )
+        total = plus(
+            total, record.weights[i], lever.around(lever.read(record.cells, i, n), p)
+        )
     put_all(stiffness, total)
 
 
@@ -139,16 +156,23 @@ def eliminate(
     read: Any,
 ) -> None:  # fmt: skip
     """Write `sum w B' C D^-1 r`."""
-    record, total = read(contact), (0.0, 0.0, 0.0)
+    record = read(contact)
+    total = (0.0, 0.0, 0.0)
     n = record.count
     for i in range(n):
         residual = bristle.vector(r, i, n)
         solved = matrix_applied(_matrix(bristle, lin, INVERSE, i, n), residual)
         if bristle.linear:
-            t = plus(times(record.law.sigma_1, residual), -record.law.sigma_0 - record.law.sigma_1 * shift, solved)
+            t = plus(
+                times(record.law.sigma_1, residual),
+                -record.law.sigma_0 - record.law.sigma_1 * shift,
+                solved,
+            )
         else:
             t = matrix_applied(_matrix(bristle, lin, C, i, n), solved)
-        total = plus(total, record.weights[i], lever.wrench(lever.read(record.cells, i, n), t))
+        total = plus(
+            total, record.weights[i], lever.wrench(lever.read(record.cells, i, n), t)
+        )
     put(w, total)
 
 
@@ -157,10 +181,14 @@ def back_substitute(
     bristle: Bristle, read: Any,
 ) -> None:  # fmt: skip
     """Solve `D out = r + F B dV`."""
-    record, twist = read(contact), three(dv)
+    record = read(contact)
+    twist = three(dv)
     n = record.count
     for i in range(n):
-        driven = matrix_applied(_matrix(bristle, lin, F, i, n), lever.seen(lever.read(record.cells, i, n), twist))
+        driven = matrix_applied(
+            _matrix(bristle, lin, F, i, n),
+            lever.seen(lever.read(record.cells, i, n), twist),
+        )
         driven = plus(driven, 1.0, bristle.vector(r, i, n))
         scatter(out, i, n, matrix_applied(_matrix(bristle, lin, INVERSE, i, n), driven))
 
@@ -170,19 +198,31 @@ def change(
     friction: float, size: float, *, lever: Lever, bristle: Bristle, read: Any,
 ) -> None:  # fmt: skip
     """Write the changes of `z'` and of the wrench; bristles and their limits grow with friction."""
-    record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
-    n, twist = record.count, (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
+    record = read(contact)
+    rows = arrays_at(ROWS, rows)
+    total = (0.0, 0.0, 0.0)
+    n = record.count
+    twist = (rows.d_twist[0], rows.d_twist[1], rows.d_twist[2] + size * rows.twist[2])
     for i in range(n):
-        cell, dz_i = lever.read(record.cells, i, n), bristle.vector(dz, i, n)
+        cell = lever.read(record.cells, i, n)
+        dz_i = bristle.vector(dz, i, n)
         grown = times(friction, bristle.vector(z, i, n))
-        u, a, by_z = lever.seen(cell, twist), plus(dz_i, -1.0, grown), _matrix(bristle, lin, A, i, n)
-        rate = plus(matrix_applied(by_z, a), 1.0, matrix_applied(_matrix(bristle, lin, F, i, n), u))
+        u = lever.seen(cell, twist)
+        a = plus(dz_i, -1.0, grown)
+        by_z = _matrix(bristle, lin, A, i, n)
+        rate = plus(
+            matrix_applied(by_z, a),
+            1.0,
+            matrix_applied(_matrix(bristle, lin, F, i, n), u),
+        )
         scatter(dzdot, i, n, rate)
         if bristle.linear:
             t = plus(traction(record.law, a, rate, u), -record.law.sigma_0, grown)
         else:  # the traction sees the bristle as it is, and only its rate as that of a smaller one
             t = plus(
-                matrix_applied(_matrix(bristle, lin, C, i, n), dz_i), record.law.sigma_1, matrix_applied(by_z, grown)
+                matrix_applied(_matrix(bristle, lin, C, i, n), dz_i),
+                record.law.sigma_1,
+                matrix_applied(by_z, grown),
             )
             t = plus(t, 1.0, matrix_applied(_matrix(bristle, lin, E, i, n), u))
         total = plus(total, record.weights[i], lever.wrench(cell, t))
@@ -190,12 +230,26 @@ def change(
 
 
 def solve_transposed(
-    contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: Doubles, *, bristle: Bristle, read: Any
+    contact: Place,
+    z: Doubles,
+    r: Doubles,
+    lin: Doubles,
+    out: Doubles,
+    *,
+    bristle: Bristle,
+    read: Any,
 ) -> None:
     """Solve `D' out = r`."""
     n = read(contact).count
     for i in range(n):
-        scatter(out, i, n, matrix_applied_back(_matrix(bristle, lin, INVERSE, i, n), bristle.vector(r, i, n)))
+        scatter(
+            out,
+            i,
+            n,
+            matrix_applied_back(
+                _matrix(bristle, lin, INVERSE, i, n), bristle.vector(r, i, n)
+            ),
+        )
 
 
 def pull_back(
@@ -203,34 +257,62 @@ def pull_back(
     bristle: Bristle, read: Any,
 ) -> None:  # fmt: skip
     """Write the transpose of `change`."""
-    record, rows, total = read(contact), arrays_at(ROWS, rows), (0.0, 0.0, 0.0)
-    n, wrench = record.count, three(rows.d_wrench)
+    record = read(contact)
+    rows = arrays_at(ROWS, rows)
+    total = (0.0, 0.0, 0.0)
+    n = record.count
+    wrench = three(rows.d_wrench)
     for i in range(n):
-        cell, rate = lever.read(record.cells, i, n), bristle.vector(dzdot, i, n)
+        cell = lever.read(record.cells, i, n)
+        rate = bristle.vector(dzdot, i, n)
         t = times(record.weights[i], lever.seen(cell, wrench))
         if bristle.linear:
             rate = plus(rate, -record.law.sigma_1, t)
-            by_z, by_u = times(-record.law.sigma_0, t), times(-record.law.sigma_2, t)
+            by_z = times(-record.law.sigma_0, t)
+            by_u = times(-record.law.sigma_2, t)
         else:
             by_z = matrix_applied_back(_matrix(bristle, lin, C, i, n), t)
             by_u = matrix_applied_back(_matrix(bristle, lin, E, i, n), t)
-        scatter(out, i, n, plus(by_z, 1.0, matrix_applied_back(_matrix(bristle, lin, A, i, n), rate)))
-        by_u = plus(by_u, 1.0, matrix_applied_back(_matrix(bristle, lin, F, i, n), rate))
+        scatter(
+            out,
+            i,
+            n,
+            plus(by_z, 1.0, matrix_applied_back(_matrix(bristle, lin, A, i, n), rate)),
+        )
+        by_u = plus(
+            by_u, 1.0, matrix_applied_back(_matrix(bristle, lin, F, i, n), rate)
+        )
         total = plus(total, 1.0, lever.wrench(cell, by_u))
     put(rows.d_twist, total)
 
 
 @kernel
 def _put_cell(
-    lever: Lever, bristle: Bristle, cell: Vector, weight: float, linear: CellSlopes, i: int, n: int, out: Doubles
+    lever: Lever,
+    bristle: Bristle,
+    cell: Vector,
+    weight: float,
+    linear: CellSlopes,
+    i: int,
+    n: int,
+    out: Doubles,
 ) -> None:
     """Write the derivatives of cell i to its places in d new/dV [d, n, 3], dW/dz [3, d, n] and d new/dz [d, d, n]."""
     d = bristle.size
     for j in range(3):
-        unit = (1.0 if j == 0 else 0.0), (1.0 if j == 1 else 0.0), (1.0 if j == 2 else 0.0)
+        unit = (
+            (1.0 if j == 0 else 0.0),
+            (1.0 if j == 1 else 0.0),
+            (1.0 if j == 2 else 0.0),
+        )
         u = lever.seen(cell, unit)
         scatter(out, 3 * i + j, 3 * n, matrix_applied(linear.new_u, u))
-        scatter(out, (3 + j) * d * n + i, n, times(weight, matrix_applied_back(linear.traction_z, u)))
+        scatter(
+            out,
+            (3 + j) * d * n + i,
+            n,
+            times(weight, matrix_applied_back(linear.traction_z, u)),
+        )
     scatter(out, 6 * d * n + i, n, linear.new_z)
 
 
@@ -239,16 +321,25 @@ def slopes(
     linearise: Any, read: Any, whole: bool,
 ) -> None:  # fmt: skip
     """Step with the slopes of the wrench, or with all derivatives."""
-    record, twist, total = read(contact), three(v), (0.0, 0.0, 0.0)
-    n, by_twist = record.count, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    record = read(contact)
+    twist = three(v)
+    total = (0.0, 0.0, 0.0)
+    n = record.count
+    by_twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
         cell = lever.read(record.cells, i, n)
-        linear = linearise(lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt)
+        linear = linearise(
+            lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt
+        )
         scatter(new, i, n, linear.new)
         total = plus(total, record.weights[i], lever.wrench(cell, linear.traction))
-        by_twist = plus(by_twist, record.weights[i], lever.around(cell, linear.traction_u))
+        by_twist = plus(
+            by_twist, record.weights[i], lever.around(cell, linear.traction_u)
+        )
         if whole:
-            _put_cell(lever, bristle, cell, record.weights[i], linear, i, n, at(out, SLOPES))
+            _put_cell(
+                lever, bristle, cell, record.weights[i], linear, i, n, at(out, SLOPES)
+            )
     put(out, total)
     put_all(at(out, 3), by_twist)
 

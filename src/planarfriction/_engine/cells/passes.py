@@ -23,7 +23,15 @@ from planarfriction._engine.codegen.vectors import plus
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 
-COSTS = {"exp(": 16, "sin(": 14, "cos(": 14, "log(": 16, "pow(": 30, "sqrt(": 8, " / ": 8}
+COSTS = {
+    "exp(": 16,
+    "sin(": 14,
+    "cos(": 14,
+    "log(": 16,
+    "pow(": 30,
+    "sqrt(": 8,
+    " / ": 8,
+}
 """Costs of operations, in sums and products."""
 
 SQUARE = "LawNumbers.gamma"
@@ -53,7 +61,11 @@ class Part(NamedTuple):
 
 
 def passes(
-    name: str, block: Block, inputs: Mapping[str, str], stores: Sequence[str], division: tuple[int, int]
+    name: str,
+    block: Block,
+    inputs: Mapping[str, str],
+    stores: Sequence[str],
+    division: tuple[int, int],
 ) -> Passes:
     """Write a traced function of a cell as passes.
 
@@ -63,20 +75,36 @@ def passes(
     """
     parts = _parts(block, inputs, stores, *division)
     places, rows = _places(parts)
-    texts, calls = [], []
+    texts = []
+    calls = []
     for k, part in enumerate(parts):
-        lines = [f"{_name(each)} = {places.get(each) or inputs[each]}" for each in sorted(part.reads)]
+        lines = [
+            f"{_name(each)} = {places.get(each) or inputs[each]}"
+            for each in sorted(part.reads)
+        ]
         for each in part.operations:
             lines.append(f"{each.name} = {_text(each)}")
             if each.name in places:
                 lines.append(f"{places[each.name]} = {each.name}")
-        lines += [f"{stores[each]} = {_name(block.results[each])}" for each in part.ends if each < len(stores)]
+        lines += [
+            f"{stores[each]} = {_name(block.results[each])}"
+            for each in part.ends
+            if each < len(stores)
+        ]
         summed = [each for each in part.ends if each >= len(stores)]
         total = "".join(f"{_name(block.results[each])}, " for each in summed)
-        texts += _loop(k, [*lines, f"return ({total})" if total else "return"], len(summed))
-        calls += _call(k, summed, any(SQUARE in each.arguments for each in part.operations))
+        texts += _loop(
+            k, [*lines, f"return ({total})" if total else "return"], len(summed)
+        )
+        calls += _call(
+            k, summed, any(SQUARE in each.arguments for each in part.operations)
+        )
     sums = "".join(f"sum_{each}, " for each in range(len(stores), len(block.results)))
-    lines = [f"work = scratch({rows * LANES})", *calls, f"return ({sums})" if sums else "return"]
+    lines = [
+        f"work = scratch({rows * LANES})",
+        *calls,
+        f"return ({sums})" if sums else "return",
+    ]
     texts.append(text_of("run(law, v, shared, block, lanes)", lines))
     source = "\n\n".join(texts)
     return Passes(_compiled(name, source, len(parts)), rows, source)
@@ -86,11 +114,18 @@ def _loop(k: int, body: list[str], sums: int) -> list[str]:
     """Return the source of a pass; its body apart, kernel later, leaves the compiler a loop that it can count."""
     call = f"body_{k}({ARGUMENTS}, i)"
     if sums:
-        lines = [f"total = ({'0.0, ' * sums})", "for i in range(lanes):", f"    total = plus(total, 1.0, {call})"]
+        lines = [
+            f"total = ({'0.0, ' * sums})",
+            "for i in range(lanes):",
+            f"    total = plus(total, 1.0, {call})",
+        ]
         lines.append("return total")
     else:
         lines = ["for i in range(lanes):", f"    {call}"]
-    return [text_of(f"body_{k}({ARGUMENTS}, i)", body), text_of(f"pass_{k}({ARGUMENTS}, lanes)", lines)]
+    return [
+        text_of(f"body_{k}({ARGUMENTS}, i)", body),
+        text_of(f"pass_{k}({ARGUMENTS}, lanes)", lines),
+    ]
 
 
 def _call(k: int, sums: list[int], power: bool) -> list[str]:
@@ -99,37 +134,68 @@ def _call(k: int, sums: list[int], power: bool) -> list[str]:
     call = f"{take}pass_{k}({ARGUMENTS}, lanes)"
     if not power:
         return [call]
-    return ["if law.gamma == 2.0:", f"    {call.replace('(law', '(squared(law)')}", "else:", f"    {call}"]
+    return [
+        "if law.gamma == 2.0:",
+        f"    {call.replace('(law', '(squared(law)')}",
+        "else:",
+        f"    {call}",
+    ]
 
 
 def _compiled(name: str, source: str, count: int) -> Any:
     known = {"xp": xp, "math": math, "inf": math.inf, "nan": math.nan}
-    space = run_source(name, source, {**known, "plus": plus, "scratch": scratch, "squared": squared})
+    space = run_source(
+        name, source, {**known, "plus": plus, "scratch": scratch, "squared": squared}
+    )
     for k in range(count):
-        space[f"body_{k}"], space[f"pass_{k}"] = kernel(space[f"body_{k}"]), kernel(space[f"pass_{k}"])
+        space[f"body_{k}"], space[f"pass_{k}"] = (
+            kernel(space[f"body_{k}"]),
+            kernel(space[f"pass_{k}"]),
+        )
     return kernel(space["run"])
 
 
 # ---------------------------------------------------------------------- division among passes
 
 
-def _parts(block: Block, inputs: Mapping[str, str], stores: Sequence[str], count: int, short: int) -> list[Part]:
+def _parts(
+    block: Block,
+    inputs: Mapping[str, str],
+    stores: Sequence[str],
+    count: int,
+    short: int,
+) -> list[Part]:
     """Divide the operations of a function among passes; results in the place of an input are stored by the last one."""
     operations = _used(block)
     again = _done_again(operations, inputs, short)
     kept = [each for each in operations if each.name not in again]
     cuts = _cuts(kept, again, block, count)
     spans = list(itertools.pairwise(cuts))
-    part_of = {each.name: k for k, span in enumerate(spans) for each in kept[slice(*span)]}
-    made = [max((part_of.get(name, 0) for name in _needed([each], again)), default=0) for each in block.results]
+    part_of = {
+        each.name: k for k, span in enumerate(spans) for each in kept[slice(*span)]
+    }
+    made = [
+        max((part_of.get(name, 0) for name in _needed([each], again)), default=0)
+        for each in block.results
+    ]
     for k, place in enumerate(stores):
         made[k] = len(spans) - 1 if place in inputs.values() else made[k]
     parts = []
     for k, span in enumerate(spans):
-        span_operations, ends = kept[slice(*span)], [each for each, part in enumerate(made) if part == k]
-        names = _names_needed([*span_operations, *_as_operations([block.results[each] for each in ends])], again)
+        span_operations = kept[slice(*span)]
+        ends = [each for each, part in enumerate(made) if part == k]
+        names = _names_needed(
+            [*span_operations, *_as_operations([block.results[each] for each in ends])],
+            again,
+        )
         inside = {each.name for each in span_operations} | (names & again.keys())
-        parts.append(Part([each for each in operations if each.name in inside], names - inside, ends))
+        parts.append(
+            Part(
+                [each for each in operations if each.name in inside],
+                names - inside,
+                ends,
+            )
+        )
     return parts
 
 
@@ -139,7 +205,8 @@ def _as_operations(results: Sequence[Any]) -> list[Operation]:
 
 def _used(block: Block) -> list[Operation]:
     """Return the operations that the results of a block depend on."""
-    used, needed = {each for each in block.results if isinstance(each, str)}, []
+    used = {each for each in block.results if isinstance(each, str)}
+    needed = []
     for each in reversed(block.operations):
         if each.name in used:
             used.update(_arguments(each))
@@ -151,7 +218,9 @@ def _arguments(operation: Operation) -> Iterator[str]:
     return (each for each in operation.arguments if isinstance(each, str))
 
 
-def _done_again(operations: Sequence[Operation], inputs: Mapping[str, str], short: int) -> dict[str, Operation]:
+def _done_again(
+    operations: Sequence[Operation], inputs: Mapping[str, str], short: int
+) -> dict[str, Operation]:
     """Return operations that passes repeat: short ones, comparisons, and all of numbers that cells share."""
     steps = dict.fromkeys(inputs, 0)
     alike = {name for name, source in inputs.items() if not source.endswith("+ i]")}
@@ -161,7 +230,9 @@ def _done_again(operations: Sequence[Operation], inputs: Mapping[str, str], shor
         if alike.issuperset(names):
             alike.add(each.name)
             steps[each.name] = 0
-        elif each.kind == "bool" or not re.fullmatch(r"\{0\} [-+*] \{1\}|-\{0\}", each.text):
+        elif each.kind == "bool" or not re.fullmatch(
+            r"\{0\} [-+*] \{1\}|-\{0\}", each.text
+        ):
             steps[each.name] = short + (each.kind != "bool")
         else:
             steps[each.name] = 1 + sum(steps[name] for name in names)
@@ -174,7 +245,8 @@ def _done_again(operations: Sequence[Operation], inputs: Mapping[str, str], shor
 
 def _needed(names: Sequence[Any], again: Mapping[str, Operation]) -> set[str]:
     """Return the names that others follow from, through operations that are done again."""
-    needed, left = set(), [each for each in names if isinstance(each, str)]
+    needed = set()
+    left = [each for each in names if isinstance(each, str)]
     while left:
         name = left.pop()
         if name not in needed:
@@ -183,15 +255,23 @@ def _needed(names: Sequence[Any], again: Mapping[str, Operation]) -> set[str]:
     return needed
 
 
-def _names_needed(operations: Sequence[Operation], again: Mapping[str, Operation]) -> set[str]:
+def _names_needed(
+    operations: Sequence[Operation], again: Mapping[str, Operation]
+) -> set[str]:
     return _needed([name for each in operations for name in _arguments(each)], again)
 
 
-def _cuts(kept: Sequence[Operation], again: Mapping[str, Operation], block: Block, count: int) -> list[int]:
+def _cuts(
+    kept: Sequence[Operation], again: Mapping[str, Operation], block: Block, count: int
+) -> list[int]:
     """Return where passes begin: about evenly by cost, where few numbers are handed on."""
-    costs = [next((cost for text, cost in COSTS.items() if text in each.text), 1) for each in kept]
+    costs = [
+        next((cost for text, cost in COSTS.items() if text in each.text), 1)
+        for each in kept
+    ]
     reached = [sum(costs[:k]) / sum(costs) * count for k in range(len(kept))]
-    made, last = {each.name: k for k, each in enumerate(kept)}, [0] * len(kept)
+    made = {each.name: k for k, each in enumerate(kept)}
+    last = [0] * len(kept)
     for k, each in enumerate([*kept, *_as_operations(block.results)]):
         for name in _needed(list(_arguments(each)), again) & made.keys():
             last[made[name]] = k
@@ -238,5 +318,10 @@ def _text(operation: Operation) -> str:
     if " ? " in text:
         condition, _, rest = text.partition(" ? ")
         text = f"xp.where({condition}, {', '.join(rest.split(' : '))})"
-    text = text.replace("&&", "and").replace("||", "or").replace("$sqrt", "math.sqrt").replace("$fabs", "abs")
+    text = (
+        text.replace("&&", "and")
+        .replace("||", "or")
+        .replace("$sqrt", "math.sqrt")
+        .replace("$fabs", "abs")
+    )
     return re.sub(r"[$@]", "xp.", text).replace("xp.pow(", "xp.power(")

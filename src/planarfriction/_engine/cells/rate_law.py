@@ -51,19 +51,27 @@ def traction(xp: Any, law: Any, z: Vector, zdot: Vector, u: Vector) -> Vector:
 def _within(z: Vector, largest: float) -> Vector:
     """Bring a bristle back to its largest deflection."""
     size = norm(z)
-    return times(xp.where(size > largest, largest, 1.0) / xp.where(size > largest, size, 1.0), z)
+    return times(
+        xp.where(size > largest, largest, 1.0) / xp.where(size > largest, size, 1.0), z
+    )
 
 
 @kernel
-def _solved(a: float, b: float, c: float, d: float, per_determinant: float, r: Vector) -> Vector:
+def _solved(
+    a: float, b: float, c: float, d: float, per_determinant: float, r: Vector
+) -> Vector:
     """Solve a system [2, 2] with the rows (a, b) and (c, d)."""
-    return per_determinant * (d * r[0] - b * r[1]), per_determinant * (a * r[1] - c * r[0])
+    return per_determinant * (d * r[0] - b * r[1]), per_determinant * (
+        a * r[1] - c * r[0]
+    )
 
 
 @functools.cache
 def element_of(name: str, rate: Callable, pull: Callable = traction) -> Element:
     """Return the element of a bristle from `rate(xp, law, z, u)` and its traction `pull(xp, law, z, z', u)`."""
-    rate, pull = (each if hasattr(each, "py_func") else kernel(each) for each in (rate, pull))
+    rate, pull = (
+        each if hasattr(each, "py_func") else kernel(each) for each in (rate, pull)
+    )
     z_name, u_name = list(inspect.signature(rate.py_func).parameters)[2:4]
     pushed = forward(rate, (z_name,), (z_name, u_name))
 
@@ -77,7 +85,10 @@ def element_of(name: str, rate: Callable, pull: Callable = traction) -> Element:
         start, x = pushed(xp, law, z, u, (1.0, 0.0))
         start, y = pushed(xp, law, z, u, (0.0, 1.0))
         g = _SHARE * dt
-        a, b, c, d = 1.0 - g * x[0], -g * y[0], -g * x[1], 1.0 - g * y[1]
+        a = 1.0 - g * x[0]
+        b = -g * y[0]
+        c = -g * x[1]
+        d = 1.0 - g * y[1]
         # without subtracting large numbers: the bristles of a law that dissipates have no negative determinant
         apart = xp.maximum(g * x[0] * (g * y[1]) - g * x[1] * (g * y[0]), 0.0)
         per = 1.0 / xp.maximum(1.0 - g * (x[0] + y[1]) + apart, _LEAST)
@@ -104,7 +115,9 @@ def cell_functions(element: Element, law: Any, lever: Lever) -> CellFunctions:
     """Bind the functions of contacts to an element, the record of its law's numbers and a lever; compile none yet."""
     fields = [("law", law), ("count", int), ("cells", Doubles), ("weights", Doubles)]
     record = NamedTuple(f"{law.__name__}Cells", fields)
-    kind = CellKind(element.name, element, lever, 5 if lever is LEVERS else 2, law=law, linear=False)
+    kind = CellKind(
+        element.name, element, lever, 5 if lever is LEVERS else 2, law=law, linear=False
+    )
     read = reader(record)
     return CellFunctions(record, rates_of(kind, read), steps_of(kind, read))
 
@@ -122,7 +135,11 @@ def fingerprint(names: Sequence[str], *functions: Callable) -> str:
 
 def _note(value: Any, sources: dict[Any, str]) -> None:
     value = getattr(value, "py_func", value)
-    home = value.__name__ if inspect.ismodule(value) else getattr(value, "__module__", None)
+    home = (
+        value.__name__
+        if inspect.ismodule(value)
+        else getattr(value, "__module__", None)
+    )
     if value in sources or (home or "").split(".")[0] in _KNOWN:
         return
     if inspect.ismodule(value):

@@ -63,21 +63,35 @@ class Scaled(NamedTuple):
 @kernel
 def centre(mx: float, my: float, load: float) -> Vector:
     """Return the centre of pressure `(-m_y, m_x)/f_N` of a load > 0."""
-    return xp.minimum(xp.maximum(-my / load, -REACH), REACH), xp.minimum(xp.maximum(mx / load, -REACH), REACH)
+    return xp.minimum(xp.maximum(-my / load, -REACH), REACH), xp.minimum(
+        xp.maximum(mx / load, -REACH), REACH
+    )
 
 
 @kernel
-def _scaled(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, cx: float, cy: float) -> Scaled:
-    x0, y0, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0
+def _scaled(
+    x: Doubles, y: Doubles, w: Doubles, n: int, total: float, cx: float, cy: float
+) -> Scaled:
+    x0 = 0.0
+    y0 = 0.0
+    xx = 0.0
+    xy = 0.0
+    yy = 0.0
     for i in range(n):
-        x0, y0 = x0 + w[i] * x[i], y0 + w[i] * y[i]
-    x0, y0 = x0 / total, y0 / total
+        x0 = x0 + w[i] * x[i]
+        y0 = y0 + w[i] * y[i]
+    x0 = x0 / total
+    y0 = y0 / total
     for i in range(n):
-        u, v = x[i] - x0, y[i] - y0
-        xx, xy, yy = xx + w[i] * u * u, xy + w[i] * u * v, yy + w[i] * v * v
+        u = x[i] - x0
+        v = y[i] - y0
+        xx = xx + w[i] * u * u
+        xy = xy + w[i] * u * v
+        yy = yy + w[i] * v * v
     per_length = math.sqrt(total / (xx + yy)) if xx + yy > 0.0 else 0.0
     narrow = 0.0 if xx * yy - xy * xy > NARROW * (xx + yy) ** 2 else 1.0
-    u, v = (cx - x0) * per_length, (cy - y0) * per_length
+    u = (cx - x0) * per_length
+    v = (cy - y0) * per_length
     far = math.sqrt(u * u + v * v)
     back = FARTHEST / far if far > FARTHEST else 1.0
     return Scaled(x0, y0, per_length, back * u, back * v, narrow)
@@ -89,35 +103,77 @@ def _at(plane: Plane, s: Scaled, x: float, y: float) -> float:
 
 
 @kernel
-def _fitted(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled, plane: Plane, soft: float) -> Plane:
+def _fitted(
+    x: Doubles,
+    y: Doubles,
+    w: Doubles,
+    n: int,
+    total: float,
+    s: Scaled,
+    plane: Plane,
+    soft: float,
+) -> Plane:
     """Return the plane that has total and centre with the cells that press under another one."""
-    pressing, mx, my, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    pressing = 0.0
+    mx = 0.0
+    my = 0.0
+    xx = 0.0
+    xy = 0.0
+    yy = 0.0
     for i in range(n):
         if _at(plane, s, x[i], y[i]) > 0.0:
-            u, v = (x[i] - s.x0) * s.per_length, (y[i] - s.y0) * s.per_length
-            pressing, mx, my = pressing + w[i], mx + w[i] * u, my + w[i] * v
+            u = (x[i] - s.x0) * s.per_length
+            v = (y[i] - s.y0) * s.per_length
+            pressing = pressing + w[i]
+            mx = mx + w[i] * u
+            my = my + w[i] * v
     if not pressing > 0.0:
         return plane
-    mx, my = mx / pressing, my / pressing
+    mx = mx / pressing
+    my = my / pressing
     for i in range(n):
         if _at(plane, s, x[i], y[i]) > 0.0:
-            u, v = (x[i] - s.x0) * s.per_length - mx, (y[i] - s.y0) * s.per_length - my
-            xx, xy, yy = xx + w[i] * u * u, xy + w[i] * u * v, yy + w[i] * v * v
-    xx, xy, yy = xx / total + soft, xy / total, yy / total + soft
-    right, up, one = s.x - mx, s.y - my, xx * yy - xy * xy
-    a, b = (yy * right - xy * up) / one, (xx * up - xy * right) / one
+            u = (x[i] - s.x0) * s.per_length - mx
+            v = (y[i] - s.y0) * s.per_length - my
+            xx = xx + w[i] * u * u
+            xy = xy + w[i] * u * v
+            yy = yy + w[i] * v * v
+    xx = xx / total + soft
+    xy = xy / total
+    yy = yy / total + soft
+    right = s.x - mx
+    up = s.y - my
+    one = xx * yy - xy * xy
+    a = (yy * right - xy * up) / one
+    b = (xx * up - xy * right) / one
     return Plane(total / pressing - a * mx - b * my, a, b)
 
 
 @kernel
-def _slopes(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled, plane: Plane, step: Plane) -> Vector:
+def _slopes(
+    x: Doubles,
+    y: Doubles,
+    w: Doubles,
+    n: int,
+    total: float,
+    s: Scaled,
+    plane: Plane,
+    step: Plane,
+) -> Vector:
     """Return the slope of the dual along a step at a plane, and how the slope rises."""
-    slope = SOFTNESS * (plane.x * step.x + plane.y * step.y) - step.height - step.x * s.x - step.y * s.y
+    slope = (
+        SOFTNESS * (plane.x * step.x + plane.y * step.y)
+        - step.height
+        - step.x * s.x
+        - step.y * s.y
+    )
     rise = SOFTNESS * (step.x * step.x + step.y * step.y)
     for i in range(n):
-        level, along = _at(plane, s, x[i], y[i]), _at(step, s, x[i], y[i])
+        level = _at(plane, s, x[i], y[i])
+        along = _at(step, s, x[i], y[i])
         carried = w[i] / total * along if level > 0.0 else 0.0
-        slope, rise = slope + carried * level, rise + carried * along
+        slope = slope + carried * level
+        rise = rise + carried * along
     return slope, rise
 
 
@@ -125,19 +181,35 @@ def _slopes(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled,
 def _same(x: Doubles, y: Doubles, n: int, s: Scaled, one: Plane, other: Plane) -> bool:
     same = True
     for i in range(n):
-        same = same and (_at(one, s, x[i], y[i]) > 0.0) == (_at(other, s, x[i], y[i]) > 0.0)
+        same = same and (_at(one, s, x[i], y[i]) > 0.0) == (
+            _at(other, s, x[i], y[i]) > 0.0
+        )
     return same
 
 
 @kernel
 def _stepped(plane: Plane, far: float, step: Plane) -> Plane:
-    return Plane(plane.height + far * step.height, plane.x + far * step.x, plane.y + far * step.y)
+    return Plane(
+        plane.height + far * step.height, plane.x + far * step.x, plane.y + far * step.y
+    )
 
 
 @kernel
-def _share_of(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled, plane: Plane, step: Plane) -> float:
+def _share_of(
+    x: Doubles,
+    y: Doubles,
+    w: Doubles,
+    n: int,
+    total: float,
+    s: Scaled,
+    plane: Plane,
+    step: Plane,
+) -> float:
     """Return the share of a step to go: all, or to about where the dual is least along the step."""
-    first, low, high, far = _slopes(x, y, w, n, total, s, plane, step)[0], 0.0, 1.0, 1.0
+    first = _slopes(x, y, w, n, total, s, plane, step)[0]
+    low = 0.0
+    high = 1.0
+    far = 1.0
     for _ in range(SHORTENINGS):
         slope, rise = _slopes(x, y, w, n, total, s, _stepped(plane, far, step), step)
         if not (abs(slope) > OVERSHOT * abs(first)) or (far == 1.0 and slope < 0.0):
@@ -149,11 +221,15 @@ def _share_of(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scale
 
 
 @kernel
-def _plane(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled) -> Plane:
+def _plane(
+    x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled
+) -> Plane:
     """Return the plane."""
     plane = Plane(1.0, 0.0, 0.0)
     for i in range(STEPS):
-        whole = _fitted(x, y, w, n, total, s, plane, SOFTNESS if i > 0 or s.narrow > 0.0 else 0.0)
+        whole = _fitted(
+            x, y, w, n, total, s, plane, SOFTNESS if i > 0 or s.narrow > 0.0 else 0.0
+        )
         if _same(x, y, n, s, plane, whole):
             return whole
         step = Plane(whole.height - plane.height, whole.x - plane.x, whole.y - plane.y)
@@ -162,13 +238,16 @@ def _plane(x: Doubles, y: Doubles, w: Doubles, n: int, total: float, s: Scaled) 
 
 
 @kernel
-def tilt(x: Doubles, y: Doubles, w: Doubles, n: int, cx: float, cy: float, out: Doubles) -> None:
+def tilt(
+    x: Doubles, y: Doubles, w: Doubles, n: int, cx: float, cy: float, out: Doubles
+) -> None:
     """Write the weights of n cells at x, y, of weights w, with their centre of pressure at (cx, cy) if cells reach it.
 
     A centre beyond all cells comes to the nearest point that they reach: the load goes to an edge, or to one cell. The
     total stays. Cells without weight get none. `out` may be w.
     """
-    total, pressed = 0.0, 0.0
+    total = 0.0
+    pressed = 0.0
     for i in range(n):
         total += w[i]
     if not total > 0.0:
@@ -184,16 +263,34 @@ def tilt(x: Doubles, y: Doubles, w: Doubles, n: int, cx: float, cy: float, out: 
 
 
 @jit
-def tilt_many(x: np.ndarray, y: np.ndarray, weights: np.ndarray, centres: np.ndarray, out: np.ndarray) -> None:
+def tilt_many(
+    x: np.ndarray,
+    y: np.ndarray,
+    weights: np.ndarray,
+    centres: np.ndarray,
+    out: np.ndarray,
+) -> None:
     """Tilt the rows of weights `[B, N]` to the centres `[B, 2]`; x, y are `[N]` or rows of their own, as `[B, N]`."""
     for b in range(weights.shape[0]):
         row = b if x.shape[0] > 1 else 0
-        tilt(x[row], y[row], weights[b], weights.shape[1], centres[b, 0], centres[b, 1], out[b])
+        tilt(
+            x[row],
+            y[row],
+            weights[b],
+            weights.shape[1],
+            centres[b, 0],
+            centres[b, 1],
+            out[b],
+        )
 
 
-def tilted(positions: np.ndarray, weights: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def tilted(
+    positions: np.ndarray, weights: np.ndarray, centre: np.ndarray
+) -> np.ndarray:
     """Return weights `[B, N]` of cells at `positions` `[N, 2]` times planes that bring their centres to `[B, 2]`."""
-    x, y = (np.array(each)[None] for each in positions.T)  # writable, all of them: compiled once
+    x, y = (
+        np.array(each)[None] for each in positions.T
+    )  # writable, all of them: compiled once
     out = np.empty(weights.shape)
     tilt_many(x, y, np.array(weights, order="C"), np.array(centre, order="C"), out)
     return out

@@ -14,8 +14,15 @@ from typing import Any
 @functools.lru_cache(maxsize=256)
 def _definitions(source: str) -> dict[int, ast.FunctionDef]:
     """Return the functions of a file by their first line, decorators included."""
-    nodes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
-    return {min([node.lineno, *(each.lineno for each in node.decorator_list)]): node for node in nodes}
+    nodes = (
+        node
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef)
+    )
+    return {
+        min([node.lineno, *(each.lineno for each in node.decorator_list)]): node
+        for node in nodes
+    }
 
 
 def definition_of(function: Callable) -> ast.FunctionDef:
@@ -32,7 +39,9 @@ def definition_of(function: Callable) -> ast.FunctionDef:
         return ast.increment_lineno(definition, code.co_firstlineno - 1)  # type: ignore[return-value]
 
 
-def bind(template: Callable, name: str, compiled: Callable[[Any], Any], **constants: Any) -> Any:
+def bind(
+    template: Callable, name: str, compiled: Callable[[Any], Any], **constants: Any
+) -> Any:
     """Return the entry point of a template for one model, `compiled` by `jit` or `entry`.
 
     Arguments that the template, a plain function, takes by keyword only become `constants`, of which it may leave some;
@@ -41,8 +50,13 @@ def bind(template: Callable, name: str, compiled: Callable[[Any], Any], **consta
     """
     definition = definition_of(template)
     bound = {each.arg: constants[each.arg] for each in definition.args.kwonlyargs}
-    arguments = ast.arguments(**{**vars(definition.args), "kwonlyargs": [], "kw_defaults": []})
+    arguments = ast.arguments(
+        **{**vars(definition.args), "kwonlyargs": [], "kw_defaults": []}
+    )
     function = ast.FunctionDef(**{**vars(definition), "name": name, "args": arguments})
     space = {**template.__globals__, **bound}
-    exec(compile(ast.Module([function], []), template.__code__.co_filename, "exec"), space)
+    exec(
+        compile(ast.Module([function], []), template.__code__.co_filename, "exec"),
+        space,
+    )
     return compiled(space[name])

@@ -29,8 +29,11 @@ class Rewriting:
         finished: Callable[[FunctionType], Any] = lambda twin: twin,
     ) -> None:  # fmt: skip
         # an `id` is that of an object that is kept
-        self._twins = {id(_plain(original)): (twin, original) for original, twin in known}
-        self._names, self._finished = names or {}, finished
+        self._twins = {
+            id(_plain(original)): (twin, original) for original, twin in known
+        }
+        self._names = names or {}
+        self._finished = finished
         self._begun: dict[int, tuple[Any, Any]] = {}
         self._lock = threading.RLock()
 
@@ -56,9 +59,18 @@ class Rewriting:
             return like(original, [self(each) for each in original])
         if not isinstance(original, FunctionType):
             return original
-        space: dict[str, Any] = {"__builtins__": original.__globals__.get("__builtins__"), **self._names}
+        space: dict[str, Any] = {
+            "__builtins__": original.__globals__.get("__builtins__"),
+            **self._names,
+        }
         cells = [CellType() for _ in original.__closure__ or ()]
-        made = FunctionType(original.__code__, space, original.__name__, original.__defaults__, tuple(cells))
+        made = FunctionType(
+            original.__code__,
+            space,
+            original.__name__,
+            original.__defaults__,
+            tuple(cells),
+        )
         twin = self._finished(made)
         self._begun[id(original)] = twin, original
         names = _global_names(original.__code__)
@@ -75,7 +87,8 @@ class _Module:
     """A module whose functions are twins."""
 
     def __init__(self, original: ModuleType, rewriting: Rewriting) -> None:
-        self._module, self._rewriting = original, rewriting
+        self._module = original
+        self._rewriting = rewriting
 
     def look_up(self, names: Iterable[str]) -> None:
         """Hold what the module has under these names: `torch.compile` reads attributes, but makes no twins."""

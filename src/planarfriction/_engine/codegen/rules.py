@@ -54,7 +54,9 @@ def ratio(x: float, y: float) -> float:
 @kernel
 def _power_slope(x: float, exponent: float, raised: float) -> float:
     """Return the derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
-    return xp.where(x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0))
+    return xp.where(
+        x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0)
+    )
 
 
 @kernel
@@ -70,13 +72,17 @@ def slip_slope(deflection: float, breakaway: float) -> float:
     It is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection.
     """
     partly = (deflection > breakaway) & (deflection < 1.0)
-    return xp.where(partly, formulas.slip_fraction_slope(xp, deflection, breakaway), 0.0)
+    return xp.where(
+        partly, formulas.slip_fraction_slope(xp, deflection, breakaway), 0.0
+    )
 
 
 @kernel
 def _slip_by_breakaway(deflection: float, breakaway: float) -> float:
     """Return the derivative of `formulas.slip_fraction` by the breakaway ratio."""
-    return formulas.bristle_decay_by_breakaway(xp, slip_slope(deflection, breakaway), deflection, breakaway)
+    return formulas.bristle_decay_by_breakaway(
+        xp, slip_slope(deflection, breakaway), deflection, breakaway
+    )
 
 
 NAMES: dict[str, Any] = {
@@ -90,7 +96,9 @@ RULES: dict[Any, Rule] = {
     ast.Add: Rule("s", {0: "1.0", 1: "1.0"}),
     ast.Sub: Rule("s", {0: "1.0", 1: "-1.0"}),
     ast.Mult: Rule("s", {0: "{1}", 1: "{0}"}),
-    ast.Div: Rule("s", {0: "1.0 / {1}"}),  # only the numerator: `derive` writes other quotients as products
+    ast.Div: Rule(
+        "s", {0: "1.0 / {1}"}
+    ),  # only the numerator: `derive` writes other quotients as products
     ast.USub: Rule("s", {0: "-1.0"}),
     plus: Rule(
         "v",
@@ -98,27 +106,53 @@ RULES: dict[Any, Rule] = {
         {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"},
         {0: "{d}", 1: "times({d}, {2})", 2: "times({1}, {d})"},
     ),
-    times: Rule("v", {}, {0: "dot({b}, {1})", 1: "times({0}, {b})"}, {0: "times({d}, {1})", 1: "times({0}, {d})"}),
-    dot: Rule("s", {}, {0: "times({b}, {1})", 1: "times({b}, {0})"}, {0: "dot({d}, {1})", 1: "dot({0}, {d})"}),
-    vectors.square: Rule("s", {}, {0: "times(2.0 * {b}, {0})"}, {0: "2.0 * dot({0}, {d})"}),
+    times: Rule(
+        "v",
+        {},
+        {0: "dot({b}, {1})", 1: "times({0}, {b})"},
+        {0: "times({d}, {1})", 1: "times({0}, {d})"},
+    ),
+    dot: Rule(
+        "s",
+        {},
+        {0: "times({b}, {1})", 1: "times({b}, {0})"},
+        {0: "dot({d}, {1})", 1: "dot({0}, {d})"},
+    ),
+    vectors.square: Rule(
+        "s", {}, {0: "times(2.0 * {b}, {0})"}, {0: "2.0 * dot({0}, {d})"}
+    ),
     # times the unit vector: one over a norm of 1e-160 leaves no room for another factor
     vectors.norm: Rule(
-        "s", {"per": "per({t})"}, {0: "times({b}, times({per}, {0}))"}, {0: "ratio(dot({0}, {d}), {t})"}
+        "s",
+        {"per": "per({t})"},
+        {0: "times({b}, times({per}, {0}))"},
+        {0: "ratio(dot({0}, {d}), {t})"},
     ),
     math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
     per: Rule("s", {0: "-{t} * {t}"}),
-    ratio: Rule("s", {0: "per({1})", 1: "-{t} * per({1})"}),  # no square of `per`, which 1e-160 takes out of range
+    ratio: Rule(
+        "s", {0: "per({1})", 1: "-{t} * per({1})"}
+    ),  # no square of `per`, which 1e-160 takes out of range
     xp.where: Rule("s", {1: "xp.where({0}, 1.0, 0.0)", 2: "xp.where({0}, 0.0, 1.0)"}),
     # of equal numbers the slope is that of the first
-    xp.maximum: Rule("s", {0: "xp.where({0} >= {1}, 1.0, 0.0)", 1: "xp.where({0} >= {1}, 0.0, 1.0)"}),
-    xp.minimum: Rule("s", {0: "xp.where({0} <= {1}, 1.0, 0.0)", 1: "xp.where({0} <= {1}, 0.0, 1.0)"}),
+    xp.maximum: Rule(
+        "s", {0: "xp.where({0} >= {1}, 1.0, 0.0)", 1: "xp.where({0} >= {1}, 0.0, 1.0)"}
+    ),
+    xp.minimum: Rule(
+        "s", {0: "xp.where({0} <= {1}, 1.0, 0.0)", 1: "xp.where({0} <= {1}, 0.0, 1.0)"}
+    ),
     xp.exp: Rule("s", {0: "{t}"}),
     xp.log: Rule("s", {0: "1.0 / {0}"}),
     xp.sin: Rule("s", {0: "xp.cos({0})"}),
     xp.cos: Rule("s", {0: "-xp.sin({0})"}),
     xp.power: Rule("s", {0: "power_slope({0}, {1}, {t})", 1: "{t} * log_or_0({0})"}),
-    formulas.relaxation: Rule("ss", {(0, 1): "-{t0}", (1, 1): "formulas.relaxation_slope(xp, {1}, {t0}, {t1})"}),
-    formulas.slip_fraction: Rule("s", {1: "slip_slope({1}, {2})", 2: "slip_by_breakaway({1}, {2})"}),
+    formulas.relaxation: Rule(
+        "ss",
+        {(0, 1): "-{t0}", (1, 1): "formulas.relaxation_slope(xp, {1}, {t0}, {t1})"},
+    ),
+    formulas.slip_fraction: Rule(
+        "s", {1: "slip_slope({1}, {2})", 2: "slip_by_breakaway({1}, {2})"}
+    ),
 }
 """Rules by function or operator."""
 

@@ -27,9 +27,29 @@ def applied(m: Doubles, a: Any) -> Vector:
 @kernel
 def inverse(shift: float, m: Doubles) -> Vector:
     """Return `(shift I - M)^-1` of a matrix [3, 3] in memory, nine numbers."""
-    a, b, c, d, e, f, g, h, i = shift - m[0], -m[1], -m[2], -m[3], shift - m[4], -m[5], -m[6], -m[7], shift - m[8]
-    r, p, w = e * i - f * h, f * g - d * i, d * h - e * g
-    cofactors = r, c * h - b * i, b * f - c * e, p, a * i - c * g, c * d - a * f, w, b * g - a * h, a * e - b * d
+    a = shift - m[0]
+    b = -m[1]
+    c = -m[2]
+    d = -m[3]
+    e = shift - m[4]
+    f = -m[5]
+    g = -m[6]
+    h = -m[7]
+    i = shift - m[8]
+    r = e * i - f * h
+    p = f * g - d * i
+    w = d * h - e * g
+    cofactors = (
+        r,
+        c * h - b * i,
+        b * f - c * e,
+        p,
+        a * i - c * g,
+        c * d - a * f,
+        w,
+        b * g - a * h,
+        a * e - b * d,
+    )
     return times(1.0 / (a * r + b * p + c * w), cofactors)
 
 
@@ -38,18 +58,26 @@ def _rotate(s: Doubles, q: Doubles, i: int, j: int) -> None:
     """Rotate the symmetric matrix s [3, 3], so that `s_ij = 0`; its axes are the columns of q."""
     off = s[3 * i + j]
     half = 0.5 * (s[4 * j] - s[4 * i]) / (off if off != 0.0 else 1.0)
-    tangent = (1.0 if half >= 0.0 else -1.0) / (abs(half) + math.sqrt(half * half + 1.0))
+    tangent = (1.0 if half >= 0.0 else -1.0) / (
+        abs(half) + math.sqrt(half * half + 1.0)
+    )
     tangent = tangent if off != 0.0 else 0.0
     cosine = 1.0 / math.sqrt(tangent * tangent + 1.0)
     sine = tangent * cosine
     for m in range(3):
-        one, other = s[3 * m + i], s[3 * m + j]
-        s[3 * m + i], s[3 * m + j] = cosine * one - sine * other, sine * one + cosine * other
-        one, other = q[3 * m + i], q[3 * m + j]
-        q[3 * m + i], q[3 * m + j] = cosine * one - sine * other, sine * one + cosine * other
+        one = s[3 * m + i]
+        other = s[3 * m + j]
+        s[3 * m + i] = cosine * one - sine * other
+        s[3 * m + j] = sine * one + cosine * other
+        one = q[3 * m + i]
+        other = q[3 * m + j]
+        q[3 * m + i] = cosine * one - sine * other
+        q[3 * m + j] = sine * one + cosine * other
     for m in range(3):
-        one, other = s[3 * i + m], s[3 * j + m]
-        s[3 * i + m], s[3 * j + m] = cosine * one - sine * other, sine * one + cosine * other
+        one = s[3 * i + m]
+        other = s[3 * j + m]
+        s[3 * i + m] = cosine * one - sine * other
+        s[3 * j + m] = sine * one + cosine * other
 
 
 @kernel
@@ -65,7 +93,9 @@ def leave_out_rising(p: Doubles, scale: Doubles, s: Doubles, q: Doubles) -> None
         rise = xp.maximum(s[4 * m], 0.0)
         for i in range(3):
             for j in range(3):
-                p[3 * i + j] -= rise * q[3 * i + m] * q[3 * j + m] / (scale[i] * scale[j])
+                p[3 * i + j] -= (
+                    rise * q[3 * i + m] * q[3 * j + m] / (scale[i] * scale[j])
+                )
 
 
 @kernel

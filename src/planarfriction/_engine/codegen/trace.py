@@ -62,7 +62,9 @@ class Number:
     __slots__ = ("kind", "name", "trace")
 
     def __init__(self, trace: Trace, name: str, kind: str = "real") -> None:
-        self.trace, self.name, self.kind = trace, name, kind
+        self.trace = trace
+        self.name = name
+        self.kind = kind
 
     def __bool__(self) -> bool:
         return self.trace.decide(self)
@@ -100,17 +102,30 @@ class Number:
     def __abs__(self) -> Number:
         return self._noted("$fabs({0})", self)
 
-    __lt__, __le__ = _asking("{0} < {1}"), _asking("{0} <= {1}")
-    __gt__, __ge__ = _asking("{0} > {1}"), _asking("{0} >= {1}")
-    __eq__, __ne__ = _asking("{0} == {1}"), _asking("{0} != {1}")  # type: ignore[assignment]
+    __lt__ = _asking("{0} < {1}")
+    __le__ = _asking("{0} <= {1}")
+    __gt__ = _asking("{0} > {1}")
+    __ge__ = _asking("{0} >= {1}")
+    __eq__ = _asking("{0} == {1}")
+    __ne__ = _asking("{0} != {1}")  # type: ignore[assignment]
 
     def __and__(self, other: Any) -> Any:
-        return _asking("{0} && {1}")(self, other) if isinstance(other, Number) else other and self
+        return (
+            _asking("{0} && {1}")(self, other)
+            if isinstance(other, Number)
+            else other and self
+        )
 
     def __or__(self, other: Any) -> Any:
-        return _asking("{0} || {1}")(self, other) if isinstance(other, Number) else other or self
+        return (
+            _asking("{0} || {1}")(self, other)
+            if isinstance(other, Number)
+            else other or self
+        )
 
-    __rand__, __ror__, __hash__ = __and__, __or__, None  # type: ignore[assignment]
+    __rand__ = __and__
+    __ror__ = __or__
+    __hash__ = None  # type: ignore[assignment]
 
     def __lshift__(self, other: Any) -> Any:
         return self._noted("{0} << {1}", self, other)
@@ -125,7 +140,11 @@ def _key(argument: Any) -> Any:
         return tuple(map(_key, argument))
     if isinstance(argument, Number):
         return argument.name
-    return (type(argument), argument) if isinstance(argument, (int, float)) else id(argument)
+    return (
+        (type(argument), argument)
+        if isinstance(argument, (int, float))
+        else id(argument)
+    )
 
 
 def _is(value: Any, constant: float) -> bool:
@@ -137,7 +156,10 @@ def kind_of(arguments: tuple) -> str:
     if any(isinstance(each, Number) and each.kind == "wide" for each in arguments):
         return "wide"
     wholes = ("index", "bool")
-    whole = all(each.kind in wholes if isinstance(each, Number) else isinstance(each, int) for each in arguments)
+    whole = all(
+        each.kind in wholes if isinstance(each, Number) else isinstance(each, int)
+        for each in arguments
+    )
     return "index" if whole else "real"
 
 
@@ -157,13 +179,20 @@ class Trace:
 
     def note(self, text: str, kind: str, *arguments: Any) -> Number:
         """Return the result of an operation."""
-        names = tuple(each.name if isinstance(each, Number) else each for each in arguments)
+        names = tuple(
+            each.name if isinstance(each, Number) else each for each in arguments
+        )
         key = text, *((type(each), each) for each in names)
         if key not in self._known:
             self._known[key] = self._new(kind)
             if kind == "real" and "[" not in text:  # indices of tables stay whole
                 kinds = [getattr(each, "kind", "") for each in arguments]
-                text = text.format(*(f"(real){{{i}}}" if one == "index" else f"{{{i}}}" for i, one in enumerate(kinds)))
+                text = text.format(
+                    *(
+                        f"(real){{{i}}}" if one == "index" else f"{{{i}}}"
+                        for i, one in enumerate(kinds)
+                    )
+                )
             self.operations.append(Operation(self._known[key].name, kind, text, names))
         return self._known[key]
 
@@ -202,26 +231,43 @@ class Trace:
         result, *contents = self._merged(if_so, if_not, outcomes, inside)
         for row, numbers in zip(rows, contents, strict=True):
             row[:] = numbers
-        blocks = [Block(block, tuple(each)) for block, each in zip((yes, no), inside, strict=True)]
-        self.operations.append(Branch(tuple((each.name, each.kind) for each in outcomes), condition, *blocks))
+        blocks = [
+            Block(block, tuple(each))
+            for block, each in zip((yes, no), inside, strict=True)
+        ]
+        self.operations.append(
+            Branch(
+                tuple((each.name, each.kind) for each in outcomes), condition, *blocks
+            )
+        )
         self._called[key] = result, contents, arguments
         return result
 
-    def _side(self, function: Callable, arguments: tuple, condition: str, answer: bool) -> tuple[list[Any], Any]:
+    def _side(
+        self, function: Callable, arguments: tuple, condition: str, answer: bool
+    ) -> tuple[list[Any], Any]:
         """Return the operations of a function after an answer, and its result."""
-        before, known, called = len(self.operations), dict(self._known), dict(self._called)
+        before = len(self.operations)
+        known = dict(self._known)
+        called = dict(self._called)
         self._answers[condition] = answer
         result = self.call(function, arguments)
         del self._answers[condition]
         block = self.operations[before:]
         del self.operations[before:]
-        self._known, self._called = known, called
+        self._known = known
+        self._called = called
         return block, result
 
-    def _merged(self, yes: Any, no: Any, outcomes: list[Number], inside: list[list]) -> Any:
+    def _merged(
+        self, yes: Any, no: Any, outcomes: list[Number], inside: list[list]
+    ) -> Any:
         """Return a result that has new names where its two forms differ."""
         if isinstance(yes, tuple):
-            items = [self._merged(a, b, outcomes, inside) for a, b in zip(yes, no, strict=True)]
+            items = [
+                self._merged(a, b, outcomes, inside)
+                for a, b in zip(yes, no, strict=True)
+            ]
             return type(yes)(*items) if hasattr(yes, "_fields") else tuple(items)
         a, b = (each.name if isinstance(each, Number) else each for each in (yes, no))
         if type(a) is type(b) and a == b:
@@ -237,7 +283,9 @@ class Table:
     """An array that stands in the source; if its numbers are given, those at known places are known."""
 
     def __init__(self, trace: Trace, name: str, numbers: Any = None) -> None:
-        self.trace, self.name, self.numbers = trace, name, numbers
+        self.trace = trace
+        self.name = name
+        self.numbers = numbers
 
     def __getitem__(self, place: Any) -> Any:
         if self.numbers is not None and not isinstance(place, Number):
@@ -249,7 +297,12 @@ def traced(function: Callable[[Trace], Any]) -> Block:
     """Return the operations of a function of a `Trace`; its results are numbers or tuples, one after another."""
     trace = Trace()
     results = flat(trace.call(function, (trace,)))
-    return Block(trace.operations, tuple(each.name if isinstance(each, Number) else float(each) for each in results))
+    return Block(
+        trace.operations,
+        tuple(
+            each.name if isinstance(each, Number) else float(each) for each in results
+        ),
+    )
 
 
 def flat(results: Any) -> Iterator[Any]:
@@ -264,12 +317,18 @@ def flat(results: Any) -> Iterator[Any]:
 # ---------------------------------------------------------------------- mathematics of symbols
 
 
-def _function(text: str, plain: Callable[..., Any], kind: str | None = "real") -> Callable[..., Any]:
+def _function(
+    text: str, plain: Callable[..., Any], kind: str | None = "real"
+) -> Callable[..., Any]:
     """Return a function that notes its call, or computes it where all arguments are known; None: of their own kind."""
 
     def call(*arguments: Any) -> Any:
         symbols = [each for each in arguments if isinstance(each, Number)]
-        return symbols[0].trace.note(text, kind or kind_of(arguments), *arguments) if symbols else plain(*arguments)
+        return (
+            symbols[0].trace.note(text, kind or kind_of(arguments), *arguments)
+            if symbols
+            else plain(*arguments)
+        )
 
     return call
 
@@ -292,8 +351,10 @@ _pow = _function("$pow({0}, {1})", math.pow)
 class Mathematics:
     """Functions for symbols in place of `math` and of the functions that kernels take from NumPy."""
 
-    pi, inf = math.pi, math.inf
-    where, power = staticmethod(_where), staticmethod(_power)
+    pi = math.pi
+    inf = math.inf
+    where = staticmethod(_where)
+    power = staticmethod(_power)
     sqrt = staticmethod(_function("$sqrt({0})", math.sqrt))
     exp = staticmethod(_function("$exp({0})", math.exp))
     expm1 = staticmethod(_function("$expm1({0})", math.expm1))

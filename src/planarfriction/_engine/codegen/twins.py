@@ -17,7 +17,13 @@ import numpy as np
 
 from planarfriction._engine.codegen import vectors
 from planarfriction._engine.codegen.rewriting import Rewriting, like
-from planarfriction._engine.codegen.trace import CompiledMathematics, Mathematics, Number, Table, flat
+from planarfriction._engine.codegen.trace import (
+    CompiledMathematics,
+    Mathematics,
+    Number,
+    Table,
+    flat,
+)
 from planarfriction._engine.compiler import compiled_math, memory
 
 
@@ -26,14 +32,17 @@ def _plus(a: Any, c: Any, b: Any) -> Any:
 
 
 def _dot(a: Any, b: Any) -> Any:
-    return functools.reduce(lambda total, pair: total + pair[0] * pair[1], zip(a, b, strict=True), 0.0)
+    return functools.reduce(
+        lambda total, pair: total + pair[0] * pair[1], zip(a, b, strict=True), 0.0
+    )
 
 
 class _At:
     """View of a list from a place on, as a pointer would be."""
 
     def __init__(self, row: Any, first: int) -> None:
-        self._row, self._first = row, first
+        self._row = row
+        self._first = first
 
     def __getitem__(self, i: int) -> Any:
         return self._row[self._first + i]
@@ -60,16 +69,27 @@ def _placed(a: Any, i: int, x: Any) -> tuple:
 def finished(function: FunctionType) -> Callable[..., Any]:
     """Let a twin with jumps join its ways."""
     jumps = {*dis.hasjrel, *dis.hasjabs}
-    return joined(function) if any(each.opcode in jumps for each in dis.get_instructions(function)) else function
+    return (
+        joined(function)
+        if any(each.opcode in jumps for each in dis.get_instructions(function))
+        else function
+    )
 
 
 def joined(function: Callable[..., Any]) -> Callable[..., Any]:
     """Return a function that joins the ways through it where it asks its symbols (see `Trace.call`)."""
 
     def call(*arguments: Any, **constants: Any) -> Any:
-        symbol = next((each for each in flat(arguments) if isinstance(each, (Number, Table))), None)
+        symbol = next(
+            (each for each in flat(arguments) if isinstance(each, (Number, Table))),
+            None,
+        )
         called = functools.partial(function, **constants) if constants else function
-        return called(*arguments) if symbol is None else symbol.trace.call(called, arguments)
+        return (
+            called(*arguments)
+            if symbol is None
+            else symbol.trace.call(called, arguments)
+        )
 
     return call
 

@@ -25,7 +25,9 @@ def dot(typingctx: Any, a: types.Type, b: types.Type) -> Any:
     """Return `a . b`."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        parts = zip(*(cgutils.unpack_tuple(builder, vector) for vector in args), strict=True)
+        parts = zip(
+            *(cgutils.unpack_tuple(builder, vector) for vector in args), strict=True
+        )
         products = [builder.fmul(x, y, flags=_FLAGS) for x, y in parts]
         total = products[0]
         for product in products[1:]:
@@ -42,7 +44,9 @@ def times(typingctx: Any, c: types.Type, a: types.Type) -> Any:
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         parts = cgutils.unpack_tuple(builder, args[1])
         return context.make_tuple(
-            builder, signature.return_type, [builder.fmul(args[0], x, flags=_FLAGS) for x in parts]
+            builder,
+            signature.return_type,
+            [builder.fmul(args[0], x, flags=_FLAGS) for x in parts],
         )
 
     return types.UniTuple(types.float64, len(a))(types.float64, a), generate
@@ -53,11 +57,22 @@ def plus(typingctx: Any, a: types.Type, c: types.Type, b: types.Type) -> Any:
     """Return `a + c b`, a record if a is one."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        parts = zip(cgutils.unpack_tuple(builder, args[0]), cgutils.unpack_tuple(builder, args[2]), strict=True)
-        sums = [builder.fadd(x, builder.fmul(args[1], y, flags=_FLAGS), flags=_FLAGS) for x, y in parts]
+        parts = zip(
+            cgutils.unpack_tuple(builder, args[0]),
+            cgutils.unpack_tuple(builder, args[2]),
+            strict=True,
+        )
+        sums = [
+            builder.fadd(x, builder.fmul(args[1], y, flags=_FLAGS), flags=_FLAGS)
+            for x, y in parts
+        ]
         return context.make_tuple(builder, signature.return_type, sums)
 
-    result = a if isinstance(a, types.BaseNamedTuple) else types.UniTuple(types.float64, len(a))
+    result = (
+        a
+        if isinstance(a, types.BaseNamedTuple)
+        else types.UniTuple(types.float64, len(a))
+    )
     return result(a, types.float64, b), generate
 
 
@@ -96,10 +111,16 @@ def _spread(add: bool) -> Callable[..., Any]:
         return [number for each in parts for number in numbers(builder, *each)]
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        first, at = pointer_to(context, builder, signature.args[0], args[0], types.float64), args[1]
+        first = pointer_to(context, builder, signature.args[0], args[0], types.float64)
+        at = args[1]
         for number in numbers(builder, signature.args[3], args[3]):
             place = builder.gep(first, [at])
-            builder.store(builder.fadd(builder.load(place), number, flags=_FLAGS) if add else number, place)
+            builder.store(
+                builder.fadd(builder.load(place), number, flags=_FLAGS)
+                if add
+                else number,
+                place,
+            )
             at = builder.add(at, args[2], flags=("nsw",))
         return context.get_dummy_value()
 
@@ -107,7 +128,13 @@ def _spread(add: bool) -> Callable[..., Any]:
 
 
 @intrinsic
-def accumulate(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type, record: types.Type) -> Any:
+def accumulate(
+    typingctx: Any,
+    row: types.Type,
+    at: types.Type,
+    stride: types.Type,
+    record: types.Type,
+) -> Any:
     """Add the numbers of a record, which may hold records, one by one to `row[at]`, `row[at + stride]`, ...
 
     `row` is an array or a pointer.
@@ -116,20 +143,34 @@ def accumulate(typingctx: Any, row: types.Type, at: types.Type, stride: types.Ty
 
 
 @intrinsic
-def scatter(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type, record: types.Type) -> Any:
+def scatter(
+    typingctx: Any,
+    row: types.Type,
+    at: types.Type,
+    stride: types.Type,
+    record: types.Type,
+) -> Any:
     """Write the numbers of a record as `accumulate` adds them."""
     return types.void(row, types.intp, types.intp, record), _spread(add=False)
 
 
 @intrinsic(prefer_literal=True)
-def gathered(typingctx: Any, row: types.Type, at: types.Type, stride: types.Type, count: types.Type) -> Any:
+def gathered(
+    typingctx: Any,
+    row: types.Type,
+    at: types.Type,
+    stride: types.Type,
+    count: types.Type,
+) -> Any:
     """Return `row[at]`, `row[at + stride]`, ... of an array or a pointer as a tuple of a constant count."""
     if not isinstance(count, types.IntegerLiteral):
         return None
     result = types.UniTuple(types.float64, count.literal_value)
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        first, at, numbers = pointer_to(context, builder, signature.args[0], args[0], types.float64), args[1], []
+        first = pointer_to(context, builder, signature.args[0], args[0], types.float64)
+        at = args[1]
+        numbers = []
         for _ in range(result.count):
             numbers.append(builder.load(builder.gep(first, [at])))
             at = builder.add(at, args[2], flags=("nsw",))
@@ -148,7 +189,9 @@ def reader_of(count: int) -> Any:
     return taken
 
 
-def _products(rows: int, inner: int, columns: int, place: Callable[[int, int], int]) -> Callable[..., Any]:
+def _products(
+    rows: int, inner: int, columns: int, place: Callable[[int, int], int]
+) -> Callable[..., Any]:
     """Return the code of a product; number (i, j) of the first factor is at `place(i, j)`."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -156,7 +199,10 @@ def _products(rows: int, inner: int, columns: int, place: Callable[[int, int], i
         numbers = []
         for i in range(rows):
             for k in range(columns):
-                terms = [builder.fmul(m[place(i, j)], a[j * columns + k], flags=_FLAGS) for j in range(inner)]
+                terms = [
+                    builder.fmul(m[place(i, j)], a[j * columns + k], flags=_FLAGS)
+                    for j in range(inner)
+                ]
                 total = terms[0]
                 for term in terms[1:]:
                     total = builder.fadd(total, term, flags=_FLAGS)
@@ -170,21 +216,27 @@ def _products(rows: int, inner: int, columns: int, place: Callable[[int, int], i
 def matrix_applied(typingctx: Any, m: types.Type, a: types.Type) -> Any:
     """Return `M a` of a square matrix, row by row."""
     d = len(a)
-    return types.UniTuple(types.float64, d)(m, a), _products(d, d, 1, lambda i, j: i * d + j)
+    return types.UniTuple(types.float64, d)(m, a), _products(
+        d, d, 1, lambda i, j: i * d + j
+    )
 
 
 @intrinsic
 def matrix_applied_back(typingctx: Any, m: types.Type, a: types.Type) -> Any:
     """Return `M' a` of a square matrix, row by row."""
     d = len(a)
-    return types.UniTuple(types.float64, d)(m, a), _products(d, d, 1, lambda i, j: j * d + i)
+    return types.UniTuple(types.float64, d)(m, a), _products(
+        d, d, 1, lambda i, j: j * d + i
+    )
 
 
 @intrinsic
 def matrix_product(typingctx: Any, m: types.Type, a: types.Type) -> Any:
     """Return `M A` of square matrices, row by row."""
     d = math.isqrt(len(m))
-    return types.UniTuple(types.float64, d * d)(m, a), _products(d, d, d, lambda i, j: i * d + j)
+    return types.UniTuple(types.float64, d * d)(m, a), _products(
+        d, d, d, lambda i, j: i * d + j
+    )
 
 
 @kernel

@@ -19,10 +19,18 @@ from planarfriction._engine.compiler.sources import Sources
 Inner: Any = part("planarfriction._engine.compiler.inner", "Inner", Compiler)
 """Numba's compiler for inner functions, or its own for all."""
 
-kept: Any = part("planarfriction._engine.compiler.machine_code", "kept", lambda dispatcher, sources: dispatcher)
+kept: Any = part(
+    "planarfriction._engine.compiler.machine_code",
+    "kept",
+    lambda dispatcher, sources: dispatcher,
+)
 """Function that keeps the machine code of a dispatcher on disk, as far as Numba lets it."""
 
-missing: Any = part("planarfriction._engine.compiler.machine_code", "missing", lambda dispatcher, signature: False)
+missing: Any = part(
+    "planarfriction._engine.compiler.machine_code",
+    "missing",
+    lambda dispatcher, signature: False,
+)
 """Function that tells if something has yet to be compiled that can be kept on disk."""
 
 FOLDERS = (
@@ -44,7 +52,12 @@ FOLDERS = (
 
 def sources_of(package: Path) -> Sources:
     """Return all sources of the machine code of the package in a folder: the formulas and the files of `FOLDERS`."""
-    compiled = [file for name in FOLDERS for end in (".py", "/*.py") for file in package.glob(name + end)]
+    compiled = [
+        file
+        for name in FOLDERS
+        for end in (".py", "/*.py")
+        for file in package.glob(name + end)
+    ]
     return Sources(package, [package / "formulas.py", *compiled])
 
 
@@ -68,7 +81,9 @@ _INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 # Inlined everywhere: what stands alone is optimised by itself and again in the module of each caller, and rounds in
 # the process that compiles otherwise than from the cache. It is faster too, a third in the solver on three states.
-kernel: Any = functools.partial(njit, forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS)
+kernel: Any = functools.partial(
+    njit, forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS
+)
 """Compile an inner function into each of its callers: no allocation, no closures, no array assignments that copy."""
 
 
@@ -79,8 +94,12 @@ def entry(function: Any) -> Any:
 
 def callback(function: Any) -> Any:
     """Compile a function that C libraries call by its address (see `calls.c_address_of`), and keep it on disk."""
-    return kept(njit(_nrt=False, no_cpython_wrapper=True, **_OPTIONS)(function), SOURCES)
+    return kept(
+        njit(_nrt=False, no_cpython_wrapper=True, **_OPTIONS)(function), SOURCES
+    )
 
 
 for _name, _formula in inspect.getmembers(formulas, inspect.isfunction):
-    register_jitable(forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS)(_formula)
+    register_jitable(forceinline=True, pipeline_class=Inner, **_INNER, **_OPTIONS)(
+        _formula
+    )

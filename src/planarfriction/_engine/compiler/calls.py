@@ -20,7 +20,12 @@ from planarfriction._engine.compiler.memory import Doubles, place_of
 
 _POINTER = types.CPointer(types.float64)
 _KINDS = {int: types.int64, Doubles: _POINTER, float: types.float64}
-_NAMES = {"Place": types.int64, "int": types.int64, "Doubles": _POINTER, "float": types.float64}
+_NAMES = {
+    "Place": types.int64,
+    "int": types.int64,
+    "Doubles": _POINTER,
+    "float": types.float64,
+}
 _ARGUMENTS: dict[Any, types.Type] = {**_KINDS, **_NAMES}
 """Types of arguments by their annotations, which may be names."""
 
@@ -28,7 +33,10 @@ _ARGUMENTS: dict[Any, types.Type] = {**_KINDS, **_NAMES}
 def signature_of(function: Any) -> tuple:
     """Return the types of the arguments of a compiled function, which its annotations declare; none is an address."""
     annotations = function.py_func.__annotations__
-    return tuple(_ARGUMENTS[annotations.get(name, "Place")] for name in inspect.signature(function.py_func).parameters)
+    return tuple(
+        _ARGUMENTS[annotations.get(name, "Place")]
+        for name in inspect.signature(function.py_func).parameters
+    )
 
 
 def _compiled(function: Any, signature: tuple) -> Any:
@@ -46,13 +54,18 @@ def address_of(function: Any) -> int:
 def c_address_of(function: Any, count: int) -> int:
     """Return the address of a compiled `kernels.callback` for C libraries, which give it `count` addresses."""
     compiled = _compiled(function, (types.int64,) * count)
-    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+    return compiled.library.get_pointer_to_function(
+        compiled.fndesc.llvm_cfunc_wrapper_name
+    )
 
 
 @intrinsic
 def call(typingctx: Any, address: types.Type, arguments: types.Type) -> Any:
     """Call the function at `address` with a tuple of arguments; an array passes the address of its first number."""
-    if any(isinstance(argument, types.Array) and argument.layout != "C" for argument in arguments):
+    if any(
+        isinstance(argument, types.Array) and argument.layout != "C"
+        for argument in arguments
+    ):
         return None
 
     def type_of(argument: types.Type) -> types.Type:
@@ -96,7 +109,10 @@ def pointer(typingctx: Any, array: types.Type) -> Any:
 @intrinsic
 def call_c(typingctx: Any, address: types.Type, arguments: types.Type) -> Any:
     """Call the function of a C library at `address` with a tuple of integers, doubles and pointers; return its word."""
-    if any(not isinstance(argument, (types.Integer, types.Float, types.CPointer)) for argument in arguments):
+    if any(
+        not isinstance(argument, (types.Integer, types.Float, types.CPointer))
+        for argument in arguments
+    ):
         return None
     word = ir.IntType(64)
 
@@ -107,7 +123,11 @@ def call_c(typingctx: Any, address: types.Type, arguments: types.Type) -> Any:
             wanted = types.float64 if isinstance(argument, types.Float) else types.int64
             value = builder.extract_value(packed, i)
             pointer = isinstance(argument, types.CPointer)
-            values.append(builder.ptrtoint(value, word) if pointer else context.cast(builder, value, argument, wanted))
+            values.append(
+                builder.ptrtoint(value, word)
+                if pointer
+                else context.cast(builder, value, argument, wanted)
+            )
         kind = ir.FunctionType(word, [value.type for value in values])
         return builder.call(builder.inttoptr(target, kind.as_pointer()), values)
 
@@ -122,7 +142,9 @@ def shared_word(name: str) -> tuple[np.ndarray, Any]:
     @intrinsic
     def read_word(typingctx: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            place = builder.module.globals.get(name) or ir.GlobalVariable(builder.module, ir.IntType(64), name)
+            place = builder.module.globals.get(name) or ir.GlobalVariable(
+                builder.module, ir.IntType(64), name
+            )
             place.linkage = "external"
             return builder.load(place)
 

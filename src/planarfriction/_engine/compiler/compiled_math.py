@@ -31,7 +31,9 @@ _inline = njit(
 )
 
 _LOG2_E = 1.4426950408889634
-_LN2_HIGH = 6.93147180369123816490e-01  # the first 33 bits of ln 2: k * _LN2_HIGH is exact
+_LN2_HIGH = (
+    6.93147180369123816490e-01  # the first 33 bits of ln 2: k * _LN2_HIGH is exact
+)
 _LN2_LOW = 1.90821492927058770002e-10
 _SHIFT = 1.5 * 2.0**52  # a sum with it has no digits behind the point
 _EXP_LARGEST = 708.0  # beyond it the result leaves the range of normal doubles
@@ -40,7 +42,9 @@ _EXP_LARGEST = 708.0  # beyond it the result leaves the range of normal doubles
 @intrinsic
 def _bits_to_float(typingctx: Any, bits: types.Type) -> Any:
     """Return the double that has the 64 bits of an integer."""
-    return types.float64(types.int64), lambda context, builder, signature, args: builder.bitcast(
+    return types.float64(
+        types.int64
+    ), lambda context, builder, signature, args: builder.bitcast(
         args[0], ir.DoubleType()
     )
 
@@ -48,7 +52,9 @@ def _bits_to_float(typingctx: Any, bits: types.Type) -> Any:
 @intrinsic
 def _float_to_bits(typingctx: Any, x: types.Type) -> Any:
     """Return the integer that has the 64 bits of a double."""
-    return types.int64(types.float64), lambda context, builder, signature, args: builder.bitcast(
+    return types.int64(
+        types.float64
+    ), lambda context, builder, signature, args: builder.bitcast(
         args[0], ir.IntType(64)
     )
 
@@ -111,7 +117,9 @@ def _halved(x: float) -> tuple[float, float]:
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
     r2 = r * r
     r4 = r2 * r2
-    low = (0.5000000000000011 + r * 0.16666666666666413) + r2 * (0.041666666666530155 + r * 0.008333333333494463)
+    low = (0.5000000000000011 + r * 0.16666666666666413) + r2 * (
+        0.041666666666530155 + r * 0.008333333333494463
+    )
     high = (0.0013888888943630218 + r * 0.00019841269506574313) + r2 * (
         2.4801493098786526e-05 + r * 2.755758637826493e-06
     )
@@ -171,8 +179,12 @@ def sin(x: float) -> float:
     q = x * x
     q2 = q * q
     q4 = q2 * q2
-    low = (-0.1666666666666626 + q * 0.008333333333291249) + q2 * (-0.00019841269826532476 + q * 2.7557316776588648e-06)
-    high = (-2.5051890908075402e-08 + q * 1.604841188205156e-10) + q2 * -7.37703133227332e-13
+    low = (-0.1666666666666626 + q * 0.008333333333291249) + q2 * (
+        -0.00019841269826532476 + q * 2.7557316776588648e-06
+    )
+    high = (
+        -2.5051890908075402e-08 + q * 1.604841188205156e-10
+    ) + q2 * -7.37703133227332e-13
     return x + x * q * (low + q4 * high)
 
 
@@ -182,16 +194,22 @@ def cos(x: float) -> float:
     q = x * x
     q2 = q * q
     q4 = q2 * q2
-    low = (0.04166666666666652 - q * 0.0013888888888869506) + q2 * (2.4801587293967007e-05 - q * 2.755731788617287e-07)
-    high = (2.087663514887468e-09 - q * 1.1464747733290135e-11) + q2 * 4.627676268649195e-14
+    low = (0.04166666666666652 - q * 0.0013888888888869506) + q2 * (
+        2.4801587293967007e-05 - q * 2.755731788617287e-07
+    )
+    high = (
+        2.087663514887468e-09 - q * 1.1464747733290135e-11
+    ) + q2 * 4.627676268649195e-14
     return (1.0 - 0.5 * q) + q2 * (low + q4 * high)
 
 
 @_inline
 def atan2(y: float, x: float) -> float:
     """Return the angle of the vector (x, y) in (-pi, pi], absolute error below 1e-15; 0 for the zero vector."""
-    across, along = abs(y), abs(x)
-    small, large = minimum(across, along), maximum(across, along)
+    across = abs(y)
+    along = abs(x)
+    small = minimum(across, along)
+    large = maximum(across, along)
     # beyond tan(pi/8) the angle is taken from the diagonal, which keeps the argument of the series below 0.4143
     diagonal = small > 0.41421356237309503 * large
     numerator = small - large if diagonal else small

@@ -19,7 +19,12 @@ from numba.core.compiler_machinery import PassManager, register_pass
 from planarfriction._engine.compiler.internals import need
 
 need(_dynfunc, "make_function")
-need(JITCodeLibrary, "_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals")
+need(
+    JITCodeLibrary,
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+)
 need(typed_passes, "NativeLowering")
 
 _NEEDLESS = {
@@ -47,8 +52,12 @@ class _Linked(JITCodeLibrary):
     """Code that is only ever linked into the code of callers: simplified, with its own inner functions in place."""
 
     def _optimize_final_module(self) -> None:
-        made = self._codegen._module_pass_manager(opt=0, loop_vectorize=False, slp_vectorize=False, cost="cheap")
-        passes, *builder = made if isinstance(made, tuple) else (made,)  # Numba before 0.62 has no builder
+        made = self._codegen._module_pass_manager(
+            opt=0, loop_vectorize=False, slp_vectorize=False, cost="cheap"
+        )
+        passes, *builder = (
+            made if isinstance(made, tuple) else (made,)
+        )  # Numba before 0.62 has no builder
         passes.run(self._final_module, *builder)
 
     def _finalize_final_module(self) -> None:
@@ -68,7 +77,14 @@ class _Lowering(typed_passes.NativeLowering):
         super().run_pass(state)
         state.library.finalize()
         made = state.cr.fndesc
-        key = _dynfunc.make_function(made.lookup_module(), made.qualname, "", _REFUSE, state.cr.env, (state.library,))
+        key = _dynfunc.make_function(
+            made.lookup_module(),
+            made.qualname,
+            "",
+            _REFUSE,
+            state.cr.env,
+            (state.library,),
+        )
         state.targetctx.insert_user_function(key, made, [state.library])
         state.cr = state.cr._replace(cfunc=key)
         return True
@@ -80,8 +96,12 @@ class Inner(CompilerBase):
     def define_pipelines(self) -> list[PassManager]:
         """Return Numba's passes without the needless ones, and with another lowering."""
         passes = PassManager("inner")
-        for each, words in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
+        for each, words in DefaultPassBuilder.define_nopython_pipeline(
+            self.state
+        ).passes:
             if each.__name__ not in _NEEDLESS:
-                passes.add_pass(_Lowering if each is typed_passes.NativeLowering else each, words)
+                passes.add_pass(
+                    _Lowering if each is typed_passes.NativeLowering else each, words
+                )
         passes.finalize()
         return [passes]

@@ -46,7 +46,9 @@ event.register("numba:run_pass", _keyboard)
 
 
 def _in_main_thread() -> bool:
-    return threading.current_thread() is threading.main_thread()  # no other hears signals
+    return (
+        threading.current_thread() is threading.main_thread()
+    )  # no other hears signals
 
 
 @contextlib.contextmanager
@@ -56,7 +58,8 @@ def heard_between_passes() -> Iterator[None]:
     if not _in_main_thread() or not callable(hear) or hear == _keyboard.hold:
         yield
         return
-    _keyboard.hear, _keyboard.pressed = hear, False
+    _keyboard.hear = hear
+    _keyboard.pressed = False
     signal.signal(signal.SIGINT, _keyboard.hold)
     try:
         yield

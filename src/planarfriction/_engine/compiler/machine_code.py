@@ -36,7 +36,14 @@ need(CompileResult, "_reduce", "_rebuild")
 _PASSES = "planarfriction._engine.compiler.interrupts", "heard_between_passes"
 heard_between_passes = part(*_PASSES, contextlib.nullcontext)
 
-_SETTINGS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "USING_SVML")
+_SETTINGS = (
+    "OPT",
+    "BOUNDSCHECK",
+    "DEBUGINFO_DEFAULT",
+    "LOOP_VECTORIZE",
+    "SLP_VECTORIZE",
+    "USING_SVML",
+)
 """Settings of Numba that change machine code; the processor and its features are in the key of the target."""
 
 _VERSIONS_KEPT = 8
@@ -52,7 +59,11 @@ def kept(dispatcher: Any, sources: Sources) -> Any:
         return dispatcher
     function = dispatcher.py_func
     digest = digest_of(Path(function.__code__.co_filename))
-    if digest is not None and sources.digest is not None and function.__closure__ is None:
+    if (
+        digest is not None
+        and sources.digest is not None
+        and function.__closure__ is None
+    ):
         dispatcher._cache = MachineCode(function, digest, sources)
     compile_deaf = dispatcher.compile
 
@@ -90,8 +101,10 @@ class MachineCode(NullCache):
     """True once the user was warned that nothing can be kept."""
 
     def __init__(self, function: Any, digest: str, sources: Sources) -> None:
-        path, name = Path(function.__code__.co_filename), function.__qualname__
-        self._sources, self._name = sources, f"{path.stem}.{name}"
+        path = Path(function.__code__.co_filename)
+        name = function.__qualname__
+        self._sources = sources
+        self._name = f"{path.stem}.{name}"
         self._identity = (sources.name_of(path), name, digest)
 
     def writable(self) -> bool:
@@ -106,9 +119,15 @@ class MachineCode(NullCache):
     def _file(self, arguments: tuple, codegen: Any) -> tuple[str, bytes]:
         """Return the name of the file for a signature, and the origin of its machine code."""
         settings = [str(getattr(config, name, None)) for name in _SETTINGS]
-        variant = repr((self._identity[0], str(arguments), codegen.magic_tuple(), settings))
-        name = f"{self._name}-{hashlib.sha256(variant.encode()).hexdigest()[:16]}.machine"
-        return name.replace("<", "").replace(">", ""), repr((self._sources.digest, self._identity, variant)).encode()
+        variant = repr(
+            (self._identity[0], str(arguments), codegen.magic_tuple(), settings)
+        )
+        name = (
+            f"{self._name}-{hashlib.sha256(variant.encode()).hexdigest()[:16]}.machine"
+        )
+        return name.replace("<", "").replace(">", ""), repr(
+            (self._sources.digest, self._identity, variant)
+        ).encode()
 
     def holds(self, signature: tuple, target_context: Any) -> bool:
         """Return True if there is a file for a signature; whether it is sound shows when it is read."""
@@ -132,7 +151,11 @@ class MachineCode(NullCache):
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
         """Write the machine code for a signature to the first folder that takes it."""
-        if data.library.has_dynamic_globals or data.lifted or not self._sources.unchanged():
+        if (
+            data.library.has_dynamic_globals
+            or data.lifted
+            or not self._sources.unchanged()
+        ):
             return
         name, origin = self._file(normalize_signature(sig)[0], data.codegen)
         content = dumps(data._reduce())
@@ -170,7 +193,9 @@ def _checksum(content: bytes) -> bytes:
 def target() -> tuple[str, set[str]]:
     """Return the processor that code is compiled for and its features, by LLVM's names."""
     _, name, features = cpu_target.target_context.codegen().magic_tuple()
-    return name, {feature[1:] for feature in features.split(",") if feature.startswith("+")}
+    return name, {
+        feature[1:] for feature in features.split(",") if feature.startswith("+")
+    }
 
 
 def whole(file: Path) -> bool:
@@ -179,8 +204,11 @@ def whole(file: Path) -> bool:
     return read[:_SEAL].endswith(_checksum(read[_SEAL:]))
 
 
-def _unpacked(file: bytes, origin: bytes, arguments: tuple, target_context: Any) -> CompileResult:
-    seal, content = file[:_SEAL], file[_SEAL:]
+def _unpacked(
+    file: bytes, origin: bytes, arguments: tuple, target_context: Any
+) -> CompileResult:
+    seal = file[:_SEAL]
+    content = file[_SEAL:]
     if seal != _seal(origin, content):
         raise ValueError("damaged, or made from other sources")
     compiled = CompileResult._rebuild(target_context, *pickle.loads(content))
@@ -195,6 +223,12 @@ def _make(folder: Path) -> None:
         return
     folder.mkdir(parents=True, exist_ok=True)
     with contextlib.suppress(OSError):  # another process may drop them too
-        others = [one for one in folder.parent.glob("planarfriction-" + "[0-9a-f]" * 16) if one != folder]
-        for old in sorted(others, key=lambda one: one.stat().st_mtime)[: 1 - _VERSIONS_KEPT]:
+        others = [
+            one
+            for one in folder.parent.glob("planarfriction-" + "[0-9a-f]" * 16)
+            if one != folder
+        ]
+        for old in sorted(others, key=lambda one: one.stat().st_mtime)[
+            : 1 - _VERSIONS_KEPT
+        ]:
             shutil.rmtree(old, ignore_errors=True)

@@ -80,11 +80,18 @@ def _words(kind: Any) -> int:
 @functools.cache
 def _plan(record: Any) -> dict[str, tuple[int, int, bool, np.dtype | None]]:
     """Return the first word of each field, the words of a record in it or 0, True for an integer, and the dtype."""
-    plan, first = {}, 0
+    plan = {}
+    first = 0
     for name, kind in _fields(record):
-        number, words = _number_of(kind), _words(kind)
+        number = _number_of(kind)
+        words = _words(kind)
         dtype = None if number is None else np.dtype(str(number))
-        plan[name] = first, words if hasattr(kind, "_fields") else 0, _is_integer(kind), dtype
+        plan[name] = (
+            first,
+            words if hasattr(kind, "_fields") else 0,
+            _is_integer(kind),
+            dtype,
+        )
         first += words
     return plan
 
@@ -102,7 +109,9 @@ def row_of(record: Any) -> np.ndarray:
 
 def _write(row: np.ndarray, record: Any) -> None:
     integers = row.view(np.int64)
-    for (first, words, integer, dtype), value in zip(_plan(type(record)).values(), record, strict=True):
+    for (first, words, integer, dtype), value in zip(
+        _plan(type(record)).values(), record, strict=True
+    ):
         if words:
             if isinstance(value, np.ndarray):
                 row[first : first + words] = value
@@ -123,7 +132,9 @@ def rows_of(record: Any, count: int, **columns: np.ndarray) -> np.ndarray:
     rows = np.tile(row_of(record), (count, 1))
     for name, column in columns.items():
         first, words, integer, _ = _plan(type(record))[name]
-        target = (rows.view(np.int64) if integer else rows)[:, first : first + (words or 1)]
+        target = (rows.view(np.int64) if integer else rows)[
+            :, first : first + (words or 1)
+        ]
         target[:] = np.reshape(column, target.shape)
     return rows
 
@@ -132,7 +143,8 @@ class Packed:
     """A record, its words, and their address, which compiled functions take; it keeps the arrays alive."""
 
     def __init__(self, record: Any) -> None:
-        self.record, self.words = record, row_of(record)
+        self.record = record
+        self.words = row_of(record)
         self.address = place_of(self.words)
 
 
@@ -141,15 +153,24 @@ class Packed:
 
 def _field_type(kind: Any) -> Any:
     number = _number_of(kind)
-    return types.CPointer(number) if number else (types.int64 if _is_integer(kind) else types.float64)
+    return (
+        types.CPointer(number)
+        if number
+        else (types.int64 if _is_integer(kind) else types.float64)
+    )
 
 
 def _type_of(record: Any) -> Any:
-    parts = [_type_of(kind) if hasattr(kind, "_fields") else _field_type(kind) for _, kind in _fields(record)]
+    parts = [
+        _type_of(kind) if hasattr(kind, "_fields") else _field_type(kind)
+        for _, kind in _fields(record)
+    ]
     return types.BaseTuple.from_types(parts, record)
 
 
-def _load(context: Any, builder: Any, kind: Any, words: Any, at: int, constant: bool = False) -> tuple[Any, int]:
+def _load(
+    context: Any, builder: Any, kind: Any, words: Any, at: int, constant: bool = False
+) -> tuple[Any, int]:
     """Load a value of a type whose words begin at number `at`; return it and where the next begins.
 
     Words that are `constant` as long as the function runs may be loaded once for a whole loop.
@@ -161,7 +182,9 @@ def _load(context: Any, builder: Any, kind: Any, words: Any, at: int, constant: 
             values.append(value)
         return context.make_tuple(builder, kind, values), at
     place = builder.gep(words, [ir.Constant(ir.IntType(64), at)])
-    value = builder.load(builder.bitcast(place, context.get_value_type(kind).as_pointer()))
+    value = builder.load(
+        builder.bitcast(place, context.get_value_type(kind).as_pointer())
+    )
     if constant:
         value.set_metadata("invariant.load", builder.module.add_metadata([]))
     return value, at + 1
@@ -172,7 +195,11 @@ def pointer_to(context: Any, builder: Any, kind: Any, value: Any, target: Any) -
     if isinstance(kind, types.Array):
         value = context.make_array(kind)(context, builder, value).data
     place = context.get_value_type(types.CPointer(target))
-    return builder.inttoptr(value, place) if isinstance(kind, types.Integer) else builder.bitcast(value, place)
+    return (
+        builder.inttoptr(value, place)
+        if isinstance(kind, types.Integer)
+        else builder.bitcast(value, place)
+    )
 
 
 class _View(types.Type):
@@ -190,7 +217,10 @@ class _ViewModel(models.OpaqueModel):
 
 def _holds_arrays(kind: Any) -> bool:
     """Return True for a record that holds arrays, itself or in a record of its own."""
-    return any(_number_of(each) or (hasattr(each, "_fields") and _holds_arrays(each)) for _, each in _fields(kind))
+    return any(
+        _number_of(each) or (hasattr(each, "_fields") and _holds_arrays(each))
+        for _, each in _fields(kind)
+    )
 
 
 def _type_in_view(kind: Any) -> Any:
@@ -212,7 +242,8 @@ class _Fields(AttributeTemplate):
 
 @lower_getattr_generic(_View)
 def _load_field(context: Any, builder: Any, view: _View, value: Any, name: str) -> Any:
-    words, first = builder.bitcast(value, ir.DoubleType().as_pointer()), _plan(view.record)[name][0]
+    words = builder.bitcast(value, ir.DoubleType().as_pointer())
+    first = _plan(view.record)[name][0]
     result = _type_in_view(dict(_fields(view.record))[name])
     if isinstance(result, _View):
         place = builder.gep(words, [ir.Constant(ir.IntType(64), first)])
@@ -265,13 +296,19 @@ doubles, floats, integers, integers32 = (
 @intrinsic
 def at(typingctx: Any, place: types.Type, i: types.Type) -> Any:
     """Return the place, pointer or address, of the number i of 8 bytes from a place on."""
-    if not isinstance(i, types.Integer) or not isinstance(place, (types.Integer, types.CPointer)):
+    if not isinstance(i, types.Integer) or not isinstance(
+        place, (types.Integer, types.CPointer)
+    ):
         return None
     if isinstance(place, types.CPointer):
-        return place(place, types.int64), lambda context, builder, signature, args: builder.gep(args[0], [args[1]])
+        return place(
+            place, types.int64
+        ), lambda context, builder, signature, args: builder.gep(args[0], [args[1]])
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.add(args[0], builder.mul(args[1], ir.Constant(ir.IntType(64), _WORD)))
+        return builder.add(
+            args[0], builder.mul(args[1], ir.Constant(ir.IntType(64), _WORD))
+        )
 
     return types.int64(types.int64, types.int64), generate
 
@@ -294,7 +331,9 @@ def exists(typingctx: Any, place: types.Type) -> Any:
 @functools.cache
 def offsets_of(record: Any) -> Any:
     """Return the record of the same names whose arrays are offsets in words (`arrays_at` makes it a record again)."""
-    twin = typing.NamedTuple(f"{record.__name__}Offsets", [(name, int) for name, _ in _fields(record)])
+    twin = typing.NamedTuple(
+        f"{record.__name__}Offsets", [(name, int) for name, _ in _fields(record)]
+    )
     twin.record = record
     return twin
 
@@ -303,25 +342,37 @@ class Layout:
     """Arrays of a record one behind the other in a block of words; shapes are given by name, numbers stand for [n]."""
 
     def __init__(self, record: Any, **shapes: Any) -> None:
-        self._record, self._shapes = record, {name: shapes[name] for name in record._fields}
-        sizes = [math.prod(shape) if isinstance(shape, tuple) else shape for shape in self._shapes.values()]
+        self._record = record
+        self._shapes = {name: shapes[name] for name in record._fields}
+        sizes = [
+            math.prod(shape) if isinstance(shape, tuple) else shape
+            for shape in self._shapes.values()
+        ]
         ends = [0, *itertools.accumulate(sizes)]
         self.size: int = ends[-1]
         """Words of the block."""
         self.offsets = offsets_of(record)(*ends[:-1])
         """Words at which the arrays begin (see `arrays_at`)."""
-        self.slices = {name: slice(*each) for name, *each in zip(self._shapes, ends[:-1], ends[1:], strict=True)}
+        self.slices = {
+            name: slice(*each)
+            for name, *each in zip(self._shapes, ends[:-1], ends[1:], strict=True)
+        }
         """The numbers of each array in a block."""
         self._places = np.where(sizes, np.multiply(_WORD, ends[:-1]), -1)
         """Bytes at which the arrays begin, -1 for those without numbers."""
-        self._integers = {name for name, kind in _fields(record) if _number_of(kind) == types.int64}
+        self._integers = {
+            name for name, kind in _fields(record) if _number_of(kind) == types.int64
+        }
 
     def made(self, **known: np.ndarray) -> Any:
         """Return the record with its arrays in a new block of zeros, except arrays that are `known`."""
-        block, arrays = np.zeros(self.size), {}
+        block = np.zeros(self.size)
+        arrays = {}
         for name, shape in self._shapes.items():
             flat = block[self.slices[name]]
-            arrays[name] = (flat.view(np.int64) if name in self._integers else flat).reshape(shape)
+            arrays[name] = (
+                flat.view(np.int64) if name in self._integers else flat
+            ).reshape(shape)
         return self._record(**{**arrays, **known})
 
     def placed(self, block: np.ndarray) -> Any:
@@ -339,9 +390,16 @@ def arrays_at(typingctx: Any, offsets: types.Type, place: types.Type) -> Any:
     result = _type_of(offsets.instance_class.record)
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        first, fields = pointer_to(context, builder, place, args[1], types.float64), []
-        for kind, offset in zip(result, cgutils.unpack_tuple(builder, args[0]), strict=True):
-            fields.append(builder.bitcast(builder.gep(first, [offset]), context.get_value_type(kind)))
+        first = pointer_to(context, builder, place, args[1], types.float64)
+        fields = []
+        for kind, offset in zip(
+            result, cgutils.unpack_tuple(builder, args[0]), strict=True
+        ):
+            fields.append(
+                builder.bitcast(
+                    builder.gep(first, [offset]), context.get_value_type(kind)
+                )
+            )
         return context.make_tuple(builder, result, fields)
 
     return result(offsets, place), generate

@@ -17,7 +17,9 @@ _LINE = "planarfriction compiles its loops, once after installation (planarfrict
 def watched() -> bool:
     """Return True if somebody is watching this process: at a terminal, or in a notebook."""
     alone = multiprocessing.parent_process() is None
-    return alone and ("ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()))
+    return alone and (
+        "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
+    )
 
 
 class _Said(Listener):
@@ -26,7 +28,9 @@ class _Said(Listener):
     done = False
 
     def on_start(self, event: Any) -> None:
-        module = event.data["dispatcher"].py_func.__module__ or ""  # none of functions that are made from others
+        module = (
+            event.data["dispatcher"].py_func.__module__ or ""
+        )  # none of functions that are made from others
         if _Said.done or not module.startswith("planarfriction"):
             return
         _Said.done = True

@@ -29,13 +29,25 @@ class Crew:
     def __init__(self, code: str, jobs: Iterable[int], processes: int) -> None:
         self.seconds: dict[int, float] = {}
         """Time that each job of another process took [s]."""
-        self._left, self._busy, self._open = list(jobs), set(), True
+        self._left = list(jobs)
+        self._busy = set()
+        self._open = True
         self._changed = threading.Condition()
-        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+        pipes: dict[str, Any] = {
+            "stdin": subprocess.PIPE,
+            "stdout": subprocess.PIPE,
+            "stderr": subprocess.DEVNULL,
+        }
         where = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = [sys.executable, "-c", code]
-        self._workers = [subprocess.Popen(command, env=where, bufsize=0, **pipes) for _ in range(processes)]
-        self._listeners = [threading.Thread(target=self._lead, args=(worker,)) for worker in self._workers]
+        self._workers = [
+            subprocess.Popen(command, env=where, bufsize=0, **pipes)
+            for _ in range(processes)
+        ]
+        self._listeners = [
+            threading.Thread(target=self._lead, args=(worker,))
+            for worker in self._workers
+        ]
 
     def __enter__(self) -> Crew:
         for each in self._listeners:

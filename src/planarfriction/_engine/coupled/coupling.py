@@ -26,7 +26,13 @@ from planarfriction._engine.codegen.vectors import clear, copy
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import entry, jit, kernel
 from planarfriction._engine.compiler.calls import call, pointer
-from planarfriction._engine.compiler.memory import Doubles, Place, arrays_at, at, doubles
+from planarfriction._engine.compiler.memory import (
+    Doubles,
+    Place,
+    arrays_at,
+    at,
+    doubles,
+)
 from planarfriction._engine.coupled.coupling_rows import INVALID, Patches, Problem, read
 from planarfriction._engine.coupled.coupling_steps import step_all, write_load_slopes
 from planarfriction._engine.coupled.following import follow
@@ -81,7 +87,9 @@ def _size(patches: Patches, p: Problem, i: int) -> float:
 def _load(patches: Patches, p: Problem) -> None:
     """Write the loads that follow from the wrenches."""
     for k in range(patches.count):
-        p.load[k] = xp.maximum(_applied(p.load_response, k, 3 * patches.count, p.wrench, p.load_0[k]), 0.0)
+        p.load[k] = xp.maximum(
+            _applied(p.load_response, k, 3 * patches.count, p.wrench, p.load_0[k]), 0.0
+        )
 
 
 @kernel
@@ -99,11 +107,16 @@ def _misfit(patches: Patches, p: Problem) -> float:
 
     A load counts as the speed that all of it would cause as friction.
     """
-    n, w, largest, finite = 3 * patches.count, p.change, 0.0, True
+    n = 3 * patches.count
+    w = p.change
+    largest = 0.0
+    finite = True
     for i in range(n):
         w[i] = p.load[i // 3] * p.unit[i]
     for k in range(patches.count):
-        missing = xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
+        missing = (
+            xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
+        )
         for i in range(3 * k, 3 * k + 3):
             gap = abs(_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
             if i == 3 * k + 2:
@@ -118,16 +131,27 @@ def _misfit(patches: Patches, p: Problem) -> float:
 @kernel
 def _write_rows(patches: Patches, p: Problem, k: int, keep_loads: bool) -> None:
     """Write the rows of patch k in the system of the Newton step, whose right-hand side is `change`."""
-    n, a, gap, slopes, load = 3 * patches.count, p.response, p.gap, at(p.slopes, 9 * k), p.load[k]
+    n = 3 * patches.count
+    a = p.response
+    gap = p.gap
+    slopes = at(p.slopes, 9 * k)
+    load = p.load[k]
     lacks = _applied(p.load_response, k, n, p.wrench, p.load_0[k]) - load
     follows = 0.0 if keep_loads or (load == 0.0 and lacks < 0.0) else 1.0
     for i in range(3):
-        one, x, y, s = 3 * k + i, slopes[3 * i], slopes[3 * i + 1], slopes[3 * i + 2]
+        one = 3 * k + i
+        x = slopes[3 * i]
+        y = slopes[3 * i + 1]
+        s = slopes[3 * i + 2]
         p.change[one] = (load + follows * lacks) * p.unit[one] - p.wrench[one]
         p.change[one] += follows * lacks * (p.unit_loaded[one] - p.unit[one])
         p.change[one] += x * gap[3 * k] + y * gap[3 * k + 1] + s * gap[3 * k + 2]
         for j in range(n):
-            caused = x * a[n * 3 * k + j] + y * a[n * (3 * k + 1) + j] + s * a[n * (3 * k + 2) + j]
+            caused = (
+                x * a[n * 3 * k + j]
+                + y * a[n * (3 * k + 1) + j]
+                + s * a[n * (3 * k + 2) + j]
+            )
             loaded = follows * p.unit_loaded[one] * p.load_response[n * k + j]
             p.matrix[n * one + j] = (1.0 if j == one else 0.0) - caused - loaded
 
@@ -142,7 +166,9 @@ def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bo
     n = 3 * patches.count
     for i in range(n):
         gap = _applied(p.response, i, n, p.wrench, p.twist_0[i]) - p.twist[i]
-        rounded = abs(gap) <= NOISE * abs(p.twist_0[i]) or abs(gap) <= NOISE * _size(patches, p, i)
+        rounded = abs(gap) <= NOISE * abs(p.twist_0[i]) or abs(gap) <= NOISE * _size(
+            patches, p, i
+        )
         p.gap[i] = 0.0 if rounded else gap
     for k in range(patches.count):
         slopes = at(p.slopes, 9 * k)
@@ -151,20 +177,29 @@ def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bo
         if falling:
             leave_out_rising(slopes, at(p.scale, 3 * k), p.turned, at(p.turned, 9))
         _write_rows(patches, p, k, keep_loads)
-    sign, downhill = solved(p.matrix, p.change, n), _downhill(patches, p)
+    sign = solved(p.matrix, p.change, n)
+    downhill = _downhill(patches, p)
     return sign > 0.0 and downhill > 0.0
 
 
 @kernel
 def _downhill(patches: Patches, p: Problem) -> float:
     """Write `A dW` into `move`; return `A dW . (dW - dV.P dV)` with P as it is, rising directions and all."""
-    n, move, downhill = 3 * patches.count, p.move, 0.0
+    n = 3 * patches.count
+    move = p.move
+    downhill = 0.0
     for i in range(n):
         move[i] = _applied(p.response, i, n, p.change, 0.0)
     for i in range(n):
         k = i // 3
-        caused = p.unit_slopes[3 * i] * move[3 * k] + p.unit_slopes[3 * i + 1] * move[3 * k + 1]
-        downhill += move[i] * (p.change[i] - p.load[k] * (caused + p.unit_slopes[3 * i + 2] * move[3 * k + 2]))
+        caused = (
+            p.unit_slopes[3 * i] * move[3 * k]
+            + p.unit_slopes[3 * i + 1] * move[3 * k + 1]
+        )
+        downhill += move[i] * (
+            p.change[i]
+            - p.load[k] * (caused + p.unit_slopes[3 * i + 2] * move[3 * k + 2])
+        )
     return downhill
 
 
@@ -190,13 +225,18 @@ def shortening_of(first: float, here: float) -> float:
 
 
 @kernel
-def _go(patches: Patches, p: Problem, keep_loads: bool, whole: bool, careful: bool) -> None:
+def _go(
+    patches: Patches, p: Problem, keep_loads: bool, whole: bool, careful: bool
+) -> None:
     """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far.
 
     Twists change by what the step adds, which keeps digits that `V_0 + A W` has lost where patches stick. A `careful`
     step goes too far where it passes a root.
     """
-    n, w, first, far = 3 * patches.count, p.wrench, _slope(patches, p), 1.0
+    n = 3 * patches.count
+    w = p.wrench
+    first = _slope(patches, p)
+    far = 1.0
     copy(w, p.start, n)
     for i in range(n):
         p.gap[i] += p.twist[i]
@@ -233,7 +273,9 @@ def _valid(patches: Patches, p: Problem, words: Doubles) -> bool:
 @kernel
 def prepare(patches: Patches, p: Problem) -> float:
     """Write twists and loads without wrenches, and the scale; return the largest speed [m/s] that goes into a twist."""
-    n, a, largest = 3 * patches.count, p.response, 0.0
+    n = 3 * patches.count
+    a = p.response
+    largest = 0.0
     for i in range(n):
         caused = _applied(a, i, n, p.guess, 0.0)
         p.twist_0[i] = p.free_twist[i] - caused
@@ -275,7 +317,9 @@ def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]
 
 
 @kernel
-def _copy(patches: Patches, twist: Doubles, load: Doubles, to_twist: Doubles, to_load: Doubles) -> None:
+def _copy(
+    patches: Patches, twist: Doubles, load: Doubles, to_twist: Doubles, to_load: Doubles
+) -> None:
     copy(twist, to_twist, 3 * patches.count)
     copy(load, to_load, patches.count)
 
@@ -288,20 +332,34 @@ def _restrain(patches: Patches, p: Problem) -> None:
     `V_0 + s A W`. If that is more work at s = 1, s is that of the least; if it is still more, the bristles are let go,
     which gives all they hold, and s W does no work then, since none is done at s = 0.
     """
-    n, w, move, work, begin, bends = 3 * patches.count, p.wrench, p.move, 0.0, 0.0, 0.0
+    n = 3 * patches.count
+    w = p.wrench
+    move = p.move
+    work = 0.0
+    begin = 0.0
+    bends = 0.0
     for i in range(n):
         move[i] = _applied(p.response, i, n, w, 0.0)
-        work, begin, bends = work + w[i] * p.twist[i], begin + w[i] * p.twist_0[i], bends + w[i] * move[i]
+        work = work + w[i] * p.twist[i]
+        begin = begin + w[i] * p.twist_0[i]
+        bends = bends + w[i] * move[i]
     if begin + bends > work:
-        s = xp.minimum(xp.maximum(-0.5 * begin / bends, 0.0), 1.0) if bends > 0.0 else 0.0
+        s = (
+            xp.minimum(xp.maximum(-0.5 * begin / bends, 0.0), 1.0)
+            if bends > 0.0
+            else 0.0
+        )
         if s * (begin + s * bends) > work:
             clear(p.new, patches.states)
         for i in range(n):
-            w[i], p.twist[i] = s * w[i], p.twist_0[i] + s * move[i]
+            w[i] = s * w[i]
+            p.twist[i] = p.twist_0[i] + s * move[i]
 
 
 @kernel
-def _search(patches: Patches, p: Problem, tolerance: float, most: int, careful: bool) -> tuple[float, bool]:
+def _search(
+    patches: Patches, p: Problem, tolerance: float, most: int, careful: bool
+) -> tuple[float, bool]:
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
     misfit, rest = _start(patches, p, tolerance)
     best = math.inf
@@ -313,19 +371,24 @@ def _search(patches: Patches, p: Problem, tolerance: float, most: int, careful: 
         if misfit <= tolerance or iteration == most or misfit == math.inf:
             break
         keep_loads = iteration % ROUND >= JOINT
-        step_all(patches, p, patches.slopes)  # dear: not before they are needed, which at rest they are not
+        step_all(
+            patches, p, patches.slopes
+        )  # dear: not before they are needed, which at rest they are not
         write_load_slopes(patches, p)
         if not _newton(patches, p, keep_loads, False):
             _newton(patches, p, keep_loads, True)
         _go(patches, p, keep_loads, rest, careful)
-        rest, misfit = False, _misfit(patches, p)
+        rest = False
+        misfit = _misfit(patches, p)
     if not misfit <= best:
         _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best
 
 
 @kernel
-def find(patches: Patches, p: Problem, rounding: float, most: int, again: bool) -> tuple[float, float]:
+def find(
+    patches: Patches, p: Problem, rounding: float, most: int, again: bool
+) -> tuple[float, float]:
     """Solve from the wrenches, and `again` where that fails, with care and without them, for a longer time.
 
     Return the misfit of the twists and loads, whose states and wrenches are written, and that which is accepted.
@@ -339,13 +402,15 @@ def find(patches: Patches, p: Problem, rounding: float, most: int, again: bool) 
         accepted = xp.maximum(tolerance, PRECISION * _largest_speed(patches, p))
         current = True
     if best > accepted and again:
-        taken, first = p.iterations[0], best
+        taken = p.iterations[0]
+        first = best
         _copy(patches, p.twist, p.load, p.kept_twist, p.kept_load)
         clear(p.wrench, 3 * patches.count)
         best, current = _search(patches, p, tolerance, PATIENCE * most, True)
         p.iterations[0] += taken
         if not best <= first:
-            best, current = first, False
+            best = first
+            current = False
             _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
     if not current:
         step_all(patches, p, patches.steps)
@@ -357,7 +422,8 @@ def solve(patches_at: Place, problem_at: Place) -> None:
     """Solve the problem of one row; arguments are the addresses of its `Patches` and of that row."""
     patches = read(patches_at)
     p = arrays_at(patches.row, problem_at)
-    p.iterations[0], p.residual[0] = INVALID, math.inf
+    p.iterations[0] = INVALID
+    p.residual[0] = math.inf
     if not _valid(patches, p, doubles(problem_at)):
         return
     follow(patches, p, problem_at)
@@ -371,7 +437,8 @@ def solve(patches_at: Place, problem_at: Place) -> None:
                 p.new[i] = 0.0
     if best > accepted and again:
         _restrain(patches, p)
-    p.residual[0], p.converged[0] = best, 1.0 if best <= accepted else 0.0
+    p.residual[0] = best
+    p.converged[0] = 1.0 if best <= accepted else 0.0
 
 
 @jit
@@ -379,4 +446,7 @@ def solve_batch(words: np.ndarray, problems: np.ndarray, first: int, last: int) 
     """Solve the problems [E, words] from `first` to `last`; `words` are the row of their `Patches`."""
     patches = read(words)
     for e in range(first, last):
-        call(patches.solve, (pointer(words), at(pointer(problems), problems.shape[1] * e)))
+        call(
+            patches.solve,
+            (pointer(words), at(pointer(problems), problems.shape[1] * e)),
+        )

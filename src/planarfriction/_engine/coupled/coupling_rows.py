@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planarfriction._engine.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
+from planarfriction._engine.compiler.memory import (
+    Doubles,
+    Integers,
+    Layout,
+    offsets_of,
+    reader,
+)
 from planarfriction._engine.protocol import SLOPES
 
 ALONG = 1e-12
@@ -117,15 +123,29 @@ INVALID = -1.0
 
 def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     """Return the layout of rows for k patches, of so many `points` to share loads, and words of records to copy."""
-    k, n = patches, 3 * patches
+    k = patches
+    n = 3 * patches
     shapes = dict.fromkeys(Problem._fields, n)
-    shapes |= dict.fromkeys(("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1)
-    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load", "kept_load"), k)
+    shapes |= dict.fromkeys(
+        ("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1
+    )
+    shapes |= dict.fromkeys(
+        ("free_load", "load", "load_0", "best_load", "kept_load"), k
+    )
     shapes |= dict.fromkeys(("follows", "records", "acting"), k)
-    shapes |= dict.fromkeys(("moments", "shift"), 2 * k) | {"weights": points, "copies": copies, "support": 7 * patches}
+    shapes |= dict.fromkeys(("moments", "shift"), 2 * k) | {
+        "weights": points,
+        "copies": copies,
+        "support": 7 * patches,
+    }
     shapes |= dict.fromkeys(("state", "new"), states)
-    shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
-    return Layout(Problem, **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3})
+    shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(
+        ("response", "matrix"), n * n
+    )
+    return Layout(
+        Problem,
+        **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3},
+    )
 
 
 class Followers(NamedTuple):

@@ -26,26 +26,53 @@ def _bring_back(step: Doubles, dx: float, dy: float) -> None:
 
 
 @kernel
-def step_patch(patches: Patches, p: Problem, functions: Integers, k: int, load: float) -> None:
+def step_patch(
+    patches: Patches, p: Problem, functions: Integers, k: int, load: float
+) -> None:
     """Step patch k under a load, at the twist that it sees."""
-    first, reference = patches.firsts[k], patches.reference[k]
+    first = patches.firsts[k]
+    reference = patches.reference[k]
     if reference > 0.0:
-        states, factor = patches.firsts[k + 1] - first, factor_at(reference, load)
+        states = patches.firsts[k + 1] - first
+        factor = factor_at(reference, load)
         bristles = patches.bristle[k], states, factor, at(p.state, first)
-        stepped(functions[k], p.acting[k], *bristles, p.seen, p.dt[0], at(p.new, first), p.step)
+        stepped(
+            functions[k],
+            p.acting[k],
+            *bristles,
+            p.seen,
+            p.dt[0],
+            at(p.new, first),
+            p.step,
+        )
     else:
-        call(functions[k], (p.acting[k], at(p.state, first), p.seen, p.dt[0], at(p.new, first), p.step))
+        call(
+            functions[k],
+            (
+                p.acting[k],
+                at(p.state, first),
+                p.seen,
+                p.dt[0],
+                at(p.new, first),
+                p.step,
+            ),
+        )
 
 
 @kernel
 def write_load_slopes(patches: Patches, p: Problem) -> None:
     """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
     for k in range(patches.count):
-        one, load = 3 * k, p.load[k]
+        one = 3 * k
+        load = p.load[k]
         for i in range(3):
             p.unit_loaded[one + i] = p.unit[one + i]
         if patches.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
-            p.seen[0], p.seen[1], p.seen[2] = p.twist[one], p.twist[one + 1], p.twist[one + 2]
+            p.seen[0], p.seen[1], p.seen[2] = (
+                p.twist[one],
+                p.twist[one + 1],
+                p.twist[one + 2],
+            )
             step_patch(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
             for i in range(3):
                 p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP
@@ -58,11 +85,16 @@ def step_all(patches: Patches, p: Problem, functions: Integers) -> None:
     `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.
     """
     for k in range(patches.count):
-        seen, dx, dy, spin = p.seen, p.shift[2 * k], p.shift[2 * k + 1], p.twist[3 * k + 2]
+        seen = p.seen
+        dx = p.shift[2 * k]
+        dy = p.shift[2 * k + 1]
+        spin = p.twist[3 * k + 2]
         if p.acting[k] == 0:
             clear(p.step, 12)
         else:
-            seen[0], seen[1], seen[2] = p.twist[3 * k] - spin * dy, p.twist[3 * k + 1] + spin * dx, spin
+            seen[0] = p.twist[3 * k] - spin * dy
+            seen[1] = p.twist[3 * k + 1] + spin * dx
+            seen[2] = spin
             step_patch(patches, p, functions, k, p.load[k])
             if dx != 0.0 or dy != 0.0:
                 _bring_back(p.step, dx, dy)

@@ -15,34 +15,48 @@ from planarfriction._engine.coupled.coupling_rows import Patches, Problem
 
 
 @kernel
-def _borne(x: Doubles, y: Doubles, w: Doubles, n: int, support: Doubles, out: Doubles) -> None:
+def _borne(
+    x: Doubles, y: Doubles, w: Doubles, n: int, support: Doubles, out: Doubles
+) -> None:
     """Write the weights that lie on the rectangle of the support, with their total unchanged; all if none does."""
     copy(w, out, n)
     if not support[4] > 0.0:
         return
-    total, borne, far = 0.0, 0.0, support[6]
+    total = 0.0
+    borne = 0.0
+    far = support[6]
     for i in range(n):
-        dx, dy, share = x[i] - support[0], y[i] - support[1], 1.0
+        dx = x[i] - support[0]
+        dy = y[i] - support[1]
+        share = 1.0
         for half, off in (
             (support[4], abs(support[2] * dx + support[3] * dy)),
             (support[5], abs(support[2] * dy - support[3] * dx)),
         ):
             share *= xp.minimum(xp.maximum(0.5 + (half - off) / far, 0.0), 1.0)
-        total, borne, out[i] = total + w[i], borne + w[i] * share, w[i] * share
+        total = total + w[i]
+        borne = borne + w[i] * share
+        out[i] = w[i] * share
     for i in range(n):
         out[i] = out[i] * (total / borne) if borne > 0.0 else w[i]
 
 
 @kernel
-def _press(patches: Patches, p: Problem, problem_at: Place, k: int, n: int, first: int) -> None:
+def _press(
+    patches: Patches, p: Problem, problem_at: Place, k: int, n: int, first: int
+) -> None:
     """Write the weights of the n points of patch k, which begin at `first`, or how far it moves as a whole."""
-    x, y = at(patches.followers.x, first), at(patches.followers.y, first)
+    x = at(patches.followers.x, first)
+    y = at(patches.followers.y, first)
     cx, cy = centre(p.moments[2 * k], p.moments[2 * k + 1], p.free_load[k])
-    words, out = patches.followers.words[k], at(p.weights, first)
+    words = patches.followers.words[k]
+    out = at(p.weights, first)
     if words == 0:
-        p.shift[2 * k], p.shift[2 * k + 1] = cx - x[0], cy - y[0]
+        p.shift[2 * k] = cx - x[0]
+        p.shift[2 * k + 1] = cy - y[0]
     elif p.records[k] != 0:
-        record, copied = integers(p.records[k]), 0
+        record = integers(p.records[k])
+        copied = 0
         _borne(x, y, doubles(record[words - 1]), n, at(p.support, 7 * k), out)
         tilt(x, y, out, n, cx, cy, out)
         for j in range(k):
@@ -67,7 +81,8 @@ def follow(patches: Patches, p: Problem, problem_at: Place) -> None:
         if p.follows[k] < 0.0:
             continue
         p.acting[k] = p.records[k]
-        p.shift[2 * k], p.shift[2 * k + 1] = 0.0, 0.0
+        p.shift[2 * k] = 0.0
+        p.shift[2 * k + 1] = 0.0
         first = patches.followers.firsts[k]
         n = patches.followers.firsts[k + 1] - first
         if p.follows[k] > 0.0 and p.free_load[k] > 0.0 and n > 0:

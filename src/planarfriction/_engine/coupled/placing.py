@@ -56,7 +56,11 @@ def onto_plane(place: Any, middle: Any, normal: Any) -> Any:
     y = middle[1] - place[1]
     z = middle[2] - place[2]
     height = normal[0] * x + normal[1] * y + normal[2] * z
-    return place[0] + height * normal[0], place[1] + height * normal[1], place[2] + height * normal[2]
+    return (
+        place[0] + height * normal[0],
+        place[1] + height * normal[1],
+        place[2] + height * normal[2],
+    )
 
 
 def bend(over: Any, tilt: Any, both: Any, normal: Any, apart: Any, dt: Any) -> Any:
@@ -92,7 +96,9 @@ def across(axis: Any, normal: Any) -> Any:
 
 def excess(x: Any, y: Any, scale: Any, reach: Any) -> Any:
     """Return the distances in x and y [m] by which a point lies beyond a patch resized by `scale`; < 0 within it."""
-    return abs(x - scale * reach[0]) - scale * reach[2], abs(y - scale * reach[1]) - scale * reach[3]
+    return abs(x - scale * reach[0]) - scale * reach[2], abs(
+        y - scale * reach[1]
+    ) - scale * reach[3]
 
 
 def reach_of(patch: Any) -> tuple[float, ...]:
@@ -101,7 +107,9 @@ def reach_of(patch: Any) -> tuple[float, ...]:
     least = patch.positions.min(axis=0) - half
     largest = patch.positions.max(axis=0) + half
     margin = MARGIN * size_of(patch)
-    return *(0.5 * (least + largest)).tolist(), *(0.5 * (largest - least) + margin).tolist()
+    return *(0.5 * (least + largest)).tolist(), *(
+        0.5 * (largest - least) + margin
+    ).tolist()
 
 
 def size_of(patch: Any) -> float:

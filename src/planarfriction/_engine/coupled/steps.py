@@ -82,7 +82,18 @@ def _step(
     """Step contact b; `unit` [3] is scratch."""
     if table.reference > 0.0:
         factor = factor_at(table.reference, load)
-        stepped(table.function, _record(table, b), table.size, table.states, factor, z, twist, dt, new, unit)
+        stepped(
+            table.function,
+            _record(table, b),
+            table.size,
+            table.states,
+            factor,
+            z,
+            twist,
+            dt,
+            new,
+            unit,
+        )
     else:
         call(table.function, (_record(table, b), z, twist, dt, new, unit))
     if load > 0.0:
@@ -94,19 +105,34 @@ def _step(
 
 @jit
 def step_one(
-    stepped: np.ndarray, z: np.ndarray, vx: float, vy: float, omega: float, load: float, dt: float, result: np.ndarray
+    stepped: np.ndarray,
+    z: np.ndarray,
+    vx: float,
+    vy: float,
+    omega: float,
+    load: float,
+    dt: float,
+    result: np.ndarray,
 ) -> bool:
     """Step one contact; `stepped` are the words of `Stepped`, `z` [S].
 
     New state and wrench go into the first of `result` [S + 9], whose last six are scratch. Called from Python: every
     argument costs a quarter of a microsecond on the way in.
     """
-    table, out = _read(stepped), pointer(result)
+    table = _read(stepped)
+    out = pointer(result)
     n = table.states
-    valid = z.shape[0] == n and xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and _positive(load, dt)
+    valid = (
+        z.shape[0] == n
+        and xp.in_range(vx)
+        and xp.in_range(vy)
+        and xp.in_range(omega)
+        and _positive(load, dt)
+    )
     if not (valid and _in_order(z, n)):
         return False
-    wrench, twist = at(out, n), at(out, n + 3)
+    wrench = at(out, n)
+    twist = at(out, n + 3)
     put(twist, (vx, vy, omega))
     _step(table, 0, pointer(z), twist, load, dt, out, wrench, at(out, n + 6))
     return True
@@ -118,53 +144,112 @@ def step_many(
     wrench: np.ndarray, scratch: np.ndarray,
 ) -> bool:  # fmt: skip
     """Step B contacts: `z`, `new` [B, S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [3]."""
-    table, (count, n) = _read(stepped), z.shape
-    loads, steps = load.shape[0], dt.shape[0]
+    table = _read(stepped)
+    (count, n) = z.shape
+    loads = load.shape[0]
+    steps = dt.shape[0]
     valid = n == table.states and twist.shape[0] == count and twist.shape[1] == 3
     valid = valid and (loads == 1 or loads == count) and (steps == 1 or steps == count)
     for b in range(count if valid else 0):
-        valid = valid and _positive(load[b if loads > 1 else 0], dt[b if steps > 1 else 0])
+        valid = valid and _positive(
+            load[b if loads > 1 else 0], dt[b if steps > 1 else 0]
+        )
         valid = valid and _in_order(z[b], n) and _in_order(twist[b], 3)
     if not valid:
         return False
-    states, twists, ends, wrenches = pointer(z), pointer(twist), pointer(new), pointer(wrench)
+    states = pointer(z)
+    twists = pointer(twist)
+    ends = pointer(new)
+    wrenches = pointer(wrench)
     for b in range(count):
-        load_b, dt_b = load[b if loads > 1 else 0], dt[b if steps > 1 else 0]
+        load_b = load[b if loads > 1 else 0]
+        dt_b = dt[b if steps > 1 else 0]
         into = at(ends, n * b), at(wrenches, 3 * b)
-        _step(table, b, at(states, n * b), at(twists, 3 * b), load_b, dt_b, *into, pointer(scratch))
+        _step(
+            table,
+            b,
+            at(states, n * b),
+            at(twists, 3 * b),
+            load_b,
+            dt_b,
+            *into,
+            pointer(scratch),
+        )
     return True
 
 
 @kernel
 def _step_fixed(
-    table: Stepped, b: int, z: Doubles, inputs: Doubles, new: Doubles, by_load: Doubles, wrench_load: Doubles
+    table: Stepped,
+    b: int,
+    z: Doubles,
+    inputs: Doubles,
+    new: Doubles,
+    by_load: Doubles,
+    wrench_load: Doubles,
 ) -> None:
     """Step contact b with a fixed stiffness: slopes behind `new` as for other laws, and slopes by the load.
 
     Slopes by the load are central differences.
     """
-    s, load, dt, record = table.states, inputs[3], inputs[4], _record(table, b)
-    unit, more, less = at(new, s), factor_at(table.reference, load * (1.0 + NUDGE)), load * (1.0 - NUDGE)
+    s = table.states
+    load = inputs[3]
+    dt = inputs[4]
+    record = _record(table, b)
+    unit = at(new, s)
+    more = factor_at(table.reference, load * (1.0 + NUDGE))
+    less = load * (1.0 - NUDGE)
     stepped(table.function, record, table.size, s, more, z, inputs, dt, new, unit)
     above = three(unit)
     copy(new, by_load, s)
-    stepped(table.function, record, table.size, s, factor_at(table.reference, less), z, inputs, dt, new, unit)
+    stepped(
+        table.function,
+        record,
+        table.size,
+        s,
+        factor_at(table.reference, less),
+        z,
+        inputs,
+        dt,
+        new,
+        unit,
+    )
     change = times(0.5 / NUDGE, plus(above, -1.0, three(unit)))
     for i in range(s):
-        by_load[i] = (by_load[i] - new[i]) * (0.5 / NUDGE) / xp.maximum(load, table.reference * LIGHTEST)
+        by_load[i] = (
+            (by_load[i] - new[i])
+            * (0.5 / NUDGE)
+            / xp.maximum(load, table.reference * LIGHTEST)
+        )
     factor = factor_at(table.reference, load)
     stepped(table.function, record, table.size, s, factor, z, inputs, dt, new, unit)
     put(wrench_load, plus(three(unit), 1.0, change))
     by_twist = at(unit, SLOPES)
-    unscale(record, table.size, z, factor, by_twist, at(by_twist, 3 * s), at(by_twist, 6 * s))
+    unscale(
+        record,
+        table.size,
+        z,
+        factor,
+        by_twist,
+        at(by_twist, 3 * s),
+        at(by_twist, 6 * s),
+    )
 
 
 @kernel
-def _jacobians(table: Stepped, b: int, z: Doubles, inputs: Doubles, out: Doubles, new: Doubles) -> None:
+def _jacobians(
+    table: Stepped, b: int, z: Doubles, inputs: Doubles, out: Doubles, new: Doubles
+) -> None:
     """Write the derivatives of a step of contact b to `out`; `new` [S] and all behind it are scratch."""
-    s, load, dt = table.states, inputs[3], inputs[4]
-    unit, loaded, by_twist = at(new, s), 1.0 if load > 0.0 else 0.0, at(out, table.square)
-    by_load, of_wrench, wrench_twist = at(by_twist, 3 * s), at(by_twist, 4 * s), at(by_twist, 7 * s)
+    s = table.states
+    load = inputs[3]
+    dt = inputs[4]
+    unit = at(new, s)
+    loaded = 1.0 if load > 0.0 else 0.0
+    by_twist = at(out, table.square)
+    by_load = at(by_twist, 3 * s)
+    of_wrench = at(by_twist, 4 * s)
+    wrench_twist = at(by_twist, 7 * s)
     if table.reference > 0.0:
         _step_fixed(table, b, z, inputs, new, by_load, at(wrench_twist, 9))
     else:
@@ -181,43 +266,73 @@ def _jacobians(table: Stepped, b: int, z: Doubles, inputs: Doubles, out: Doubles
 
 
 @jit
-def jacobians(stepped: np.ndarray, z: np.ndarray, inputs: np.ndarray, result: np.ndarray) -> bool:
+def jacobians(
+    stepped: np.ndarray, z: np.ndarray, inputs: np.ndarray, result: np.ndarray
+) -> bool:
     """Write derivatives of steps of B contacts: `z` [B S]; `inputs` [B 5]: twist, load and dt; all arrays are flat.
 
     Into `result` go, for one contact after the other: new state by state [square], by twist [S, 3] and by load [S],
     wrench by state [3, S], by twist [3, 3] and by load [3]. Scratch for one contact follows at the end.
     """
-    table, states, rows, out = _read(stepped), pointer(z), pointer(inputs), pointer(result)
-    n, count = table.states, inputs.shape[0] // 5
-    if z.shape[0] != count * n or not (_in_order(z, z.shape[0]) and _in_order(inputs, inputs.shape[0])):
+    table = _read(stepped)
+    states = pointer(z)
+    rows = pointer(inputs)
+    out = pointer(result)
+    n = table.states
+    count = inputs.shape[0] // 5
+    if z.shape[0] != count * n or not (
+        _in_order(z, z.shape[0]) and _in_order(inputs, inputs.shape[0])
+    ):
         return False
     for b in range(count):
         if not (inputs[5 * b + 3] >= 0.0 and inputs[5 * b + 4] >= 0.0):
             return False
     size = table.square + 7 * n + 12
     for b in range(count):
-        _jacobians(table, b, at(states, n * b), at(rows, 5 * b), at(out, size * b), at(out, size * count))
+        _jacobians(
+            table,
+            b,
+            at(states, n * b),
+            at(rows, 5 * b),
+            at(out, size * b),
+            at(out, size * count),
+        )
     return True
 
 
 @jit
 def rates_many(
-    function: Place, records: np.ndarray, state: np.ndarray, twist: np.ndarray, rate: np.ndarray, wrench: np.ndarray
+    function: Place,
+    records: np.ndarray,
+    state: np.ndarray,
+    twist: np.ndarray,
+    rate: np.ndarray,
+    wrench: np.ndarray,
 ) -> None:
     """Call `ModelFunctions.evaluate` of B contacts: `state`, `rate` [B, S], `twist`, `wrench` [B, 3] (per unit load).
 
     `function` is its address; `records` [B or 1, words] has a row for each contact, or one for all.
     """
     for b in range(state.shape[0]):
-        record = at(pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0)
+        record = at(
+            pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0
+        )
         call(function, (record, state[b], twist[b], rate[b], wrench[b]))
 
 
 @jit
-def linearise_many(function: Place, records: np.ndarray, state: np.ndarray, twist: np.ndarray, lin: np.ndarray) -> None:
+def linearise_many(
+    function: Place,
+    records: np.ndarray,
+    state: np.ndarray,
+    twist: np.ndarray,
+    lin: np.ndarray,
+) -> None:
     """Call `ModelFunctions.linearise` of B contacts into `lin` [B, workspace]; the rest as in `rates_many`."""
     for b in range(state.shape[0]):
-        record = at(pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0)
+        record = at(
+            pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0
+        )
         call(function, (record, state[b], twist[b], lin[b]))
 
 

@@ -24,10 +24,25 @@ from planarfriction._engine.bristles.law import grip, traction
 from planarfriction._engine.codegen.derive import derive
 from planarfriction._engine.codegen.rules import ratio
 from planarfriction._engine.codegen.small_matrices import applied, inverse
-from planarfriction._engine.codegen.vectors import Vector, applied_back, norm, plus, put, put_all, three, times
+from planarfriction._engine.codegen.vectors import (
+    Vector,
+    applied_back,
+    norm,
+    plus,
+    put,
+    put_all,
+    three,
+    times,
+)
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import entry, kernel
-from planarfriction._engine.compiler.memory import Doubles, Layout, Place, arrays_at, reader
+from planarfriction._engine.compiler.memory import (
+    Doubles,
+    Layout,
+    Place,
+    arrays_at,
+    reader,
+)
 from planarfriction._engine.protocol import ROWS, ModelFunctions
 from planarfriction._engine.published.surfaces import sliding, sliding_jacobian
 from planarfriction.formulas import LawNumbers
@@ -87,7 +102,9 @@ _LINEAR = LINEAR.offsets
 
 def slopes_in(lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return `f_z` and `f_V` [B, 3, 3] of linearisations [B, words]."""
-    by_z, by_twist = (lin[:, LINEAR.slices[name]].reshape(-1, 3, 3) for name in ("by_z", "by_twist"))
+    by_z, by_twist = (
+        lin[:, LINEAR.slices[name]].reshape(-1, 3, 3) for name in ("by_z", "by_twist")
+    )
     return by_z, by_twist
 
 
@@ -106,8 +123,13 @@ def through(root: Root, x: float, y: float) -> Vector:
 @kernel
 def _seen(record: PublishedContact, v: Vector) -> Vector:
     """Return `V_S` of a twist."""
-    (x, y), shape = through(record.root, v[0], v[1]), record.shape
-    return x - v[2] * shape.centre_y, y + v[2] * shape.centre_x, shape.contact_radius * v[2]
+    (x, y) = through(record.root, v[0], v[1])
+    shape = record.shape
+    return (
+        x - v[2] * shape.centre_y,
+        y + v[2] * shape.centre_x,
+        shape.contact_radius * v[2],
+    )
 
 
 @kernel
@@ -115,14 +137,22 @@ def _wrench(record: PublishedContact, t: Vector) -> Vector:
     """Return the wrench about the origin of a scaled one about the centre of pressure."""
     shape = record.shape
     x, y = through(record.root, t[0], t[1])
-    return x, y, shape.contact_radius * t[2] + shape.centre_x * t[1] - shape.centre_y * t[0]
+    return (
+        x,
+        y,
+        shape.contact_radius * t[2] + shape.centre_x * t[1] - shape.centre_y * t[0],
+    )
 
 
 @kernel
 def _viscous(record: PublishedContact, v: Vector) -> Vector:
     """Return `V_S` with the spin that the second moment has in the place of the squared radius."""
     x, y, _ = _seen(record, v)
-    return x, y, record.shape.second_moment * per_radius(record.shape.contact_radius) * v[2]
+    return (
+        x,
+        y,
+        record.shape.second_moment * per_radius(record.shape.contact_radius) * v[2],
+    )
 
 
 @kernel
@@ -142,7 +172,9 @@ def per_h(u: Vector, v: float) -> float:
 
 
 @kernel
-def decay_of(law: LawNumbers, z: Vector, u: Vector, v: float, per: float, q: float) -> float:
+def decay_of(
+    law: LawNumbers, z: Vector, u: Vector, v: float, per: float, q: float
+) -> float:
     """Return the decay of a scaled bristle at the scaled speed v; `per` is `1/|h|`, q the grip."""
     deflection, along = seen(z, norm(z), u, per, q)
     return formulas.bristle_decay(xp, deflection, along, v, q, law)
@@ -167,8 +199,11 @@ def _rate(record: PublishedContact, z: Vector, twist: Vector) -> Vector:
 
 
 @kernel
-def _slopes(record: PublishedContact, z: Vector, twist: Vector, m: LinearPublished) -> None:
-    (x, y, s), j = twist, m.sliding
+def _slopes(
+    record: PublishedContact, z: Vector, twist: Vector, m: LinearPublished
+) -> None:
+    (x, y, s) = twist
+    j = m.sliding
     sliding_jacobian(record.kind, record.data, 0, record.size, x, y, s, norm(twist), j)
     (k,), tape = _forth(record.law, z, applied(j, twist), twist)
     by_z, by_u, by_twist = _back(tape, (1.0,))
@@ -185,7 +220,8 @@ def _slopes(record: PublishedContact, z: Vector, twist: Vector, m: LinearPublish
 @entry
 def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) -> None:
     """Write `z'` and the wrench."""
-    record, v = read(contact), three(v)
+    record = read(contact)
+    v = three(v)
     z = _scaled(record, three(z))
     rate = _rate(record, z, _seen(record, v))
     put(zdot, _raw(record, rate))
@@ -196,36 +232,63 @@ def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) 
 def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
     """Write `f_z` and `f_V`."""
     record = read(contact)
-    _slopes(record, _scaled(record, three(z)), _seen(record, three(v)), arrays_at(_LINEAR, lin))
+    _slopes(
+        record,
+        _scaled(record, three(z)),
+        _seen(record, three(v)),
+        arrays_at(_LINEAR, lin),
+    )
 
 
 @entry
-def factor(contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles) -> None:
+def factor(
+    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles
+) -> None:
     """Prepare `D^-1`, write `-G' ((sigma_0 + sigma_1 shift) D^-1 f_V G + sigma_2 G)`."""
-    record, m = read(contact), arrays_at(_LINEAR, lin)
+    record = read(contact)
+    m = arrays_at(_LINEAR, lin)
     put_all(m.inverse, inverse(shift, m.by_z))
     pull = record.law.sigma_0 + record.law.sigma_1 * shift
     for k in range(3):
-        unit = (1.0 if k == 0 else 0.0), (1.0 if k == 1 else 0.0), (1.0 if k == 2 else 0.0)
+        unit = (
+            (1.0 if k == 0 else 0.0),
+            (1.0 if k == 1 else 0.0),
+            (1.0 if k == 2 else 0.0),
+        )
         z = applied(m.inverse, applied(m.by_twist, _seen(record, unit)))
         t = plus(times(-pull, z), -record.law.sigma_2, _viscous(record, unit))
         stiffness[k], stiffness[3 + k], stiffness[6 + k] = _wrench(record, t)
 
 
 @entry
-def eliminate(contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles) -> None:
+def eliminate(
+    contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles
+) -> None:
     """Write `G' (sigma_1 - (sigma_0 + sigma_1 shift) D^-1) r`."""
-    record, m = read(contact), arrays_at(_LINEAR, lin)
-    r, pull = _scaled(record, three(r)), record.law.sigma_0 + record.law.sigma_1 * shift
-    put(w, _wrench(record, plus(times(record.law.sigma_1, r), -pull, applied(m.inverse, r))))
+    record = read(contact)
+    m = arrays_at(_LINEAR, lin)
+    r = _scaled(record, three(r))
+    pull = record.law.sigma_0 + record.law.sigma_1 * shift
+    put(
+        w,
+        _wrench(
+            record, plus(times(record.law.sigma_1, r), -pull, applied(m.inverse, r))
+        ),
+    )
 
 
 @entry
-def back_substitute(contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles) -> None:
+def back_substitute(
+    contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles
+) -> None:
     """Solve `D out = r + f_V G dV`."""
-    record, m = read(contact), arrays_at(_LINEAR, lin)
+    record = read(contact)
+    m = arrays_at(_LINEAR, lin)
     driven = applied(m.by_twist, _seen(record, three(dv)))
-    put(out, _raw(record, applied(m.inverse, plus(_scaled(record, three(r)), 1.0, driven))))
+    put(
+        out,
+        _raw(record, applied(m.inverse, plus(_scaled(record, three(r)), 1.0, driven))),
+    )
 
 
 @entry
@@ -234,28 +297,48 @@ def change(
     friction: float, size: float,
 ) -> None:  # fmt: skip
     """Write the changes of `z'` and of the wrench."""
-    record, m, rows = read(contact), arrays_at(_LINEAR, lin), arrays_at(ROWS, rows)
+    record = read(contact)
+    m = arrays_at(_LINEAR, lin)
+    rows = arrays_at(ROWS, rows)
     turns = 0.0, 0.0, 1.0
-    v, z = plus(three(rows.d_twist), size * rows.twist[2], turns), _scaled(record, three(z))
+    v = plus(three(rows.d_twist), size * rows.twist[2], turns)
+    z = _scaled(record, three(z))
     dz = plus(_scaled(record, three(dz)), -size * z[2], turns)
-    rate = plus(applied(m.by_z, plus(dz, -friction, z)), 1.0, applied(m.by_twist, _seen(record, v)))
+    rate = plus(
+        applied(m.by_z, plus(dz, -friction, z)),
+        1.0,
+        applied(m.by_twist, _seen(record, v)),
+    )
     put(dzdot, plus(_raw(record, rate), size * zdot[2], turns))
     w = _wrench(record, traction(record.law, dz, rate, _viscous(record, v)))
     put(rows.d_wrench, plus(w, size * rows.wrench[2], turns))
 
 
 @entry
-def solve_transposed(contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: Doubles) -> None:
+def solve_transposed(
+    contact: Place, z: Doubles, r: Doubles, lin: Doubles, out: Doubles
+) -> None:
     """Solve `D' out = r`; a cotangent is scaled as a state is made raw."""
-    record, m = read(contact), arrays_at(_LINEAR, lin)
+    record = read(contact)
+    m = arrays_at(_LINEAR, lin)
     put(out, _scaled(record, applied_back(m.inverse, _raw(record, three(r)))))
 
 
 @entry
-def pull_back(contact: Place, z: Doubles, lin: Doubles, dzdot: Doubles, rows: Doubles, out: Doubles) -> None:
+def pull_back(
+    contact: Place,
+    z: Doubles,
+    lin: Doubles,
+    dzdot: Doubles,
+    rows: Doubles,
+    out: Doubles,
+) -> None:
     """Write the transpose of `change`; the transpose of `G' t` is G."""
-    record, m, rows = read(contact), arrays_at(_LINEAR, lin), arrays_at(ROWS, rows)
-    law, wrench = record.law, three(rows.d_wrench)
+    record = read(contact)
+    m = arrays_at(_LINEAR, lin)
+    rows = arrays_at(ROWS, rows)
+    law = record.law
+    wrench = three(rows.d_wrench)
     t = _seen(record, wrench)
     rate = plus(_raw(record, three(dzdot)), -law.sigma_1, t)
     put(out, _scaled(record, plus(applied_back(m.by_z, rate), -law.sigma_0, t)))
@@ -263,4 +346,13 @@ def pull_back(contact: Place, z: Doubles, lin: Doubles, dzdot: Doubles, rows: Do
     put(rows.d_twist, _wrench(record, u))
 
 
-FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)
+FUNCTIONS = ModelFunctions(
+    evaluate,
+    linearise,
+    factor,
+    eliminate,
+    back_substitute,
+    change,
+    solve_transposed,
+    pull_back,
+)

@@ -53,9 +53,21 @@ SCRATCH = 9
 
 _NUMBERS = len(NAMES)
 _SIZES = (_NUMBERS, _NUMBERS, 3, 3, 1, 3, 1, 3, 3, 3, 1, 9)
-_ROW, _ROW_BAR, _STATE, _TWIST, _OMEGA, _SLIDING, _LOAD, _WRENCH, _CARRY, _TWIST_BAR, _LOAD_BAR, _SLOPES, _END = (
-    ABREAST * n for n in itertools.accumulate(_SIZES, initial=0)
-)
+(
+    _ROW,
+    _ROW_BAR,
+    _STATE,
+    _TWIST,
+    _OMEGA,
+    _SLIDING,
+    _LOAD,
+    _WRENCH,
+    _CARRY,
+    _TWIST_BAR,
+    _LOAD_BAR,
+    _SLOPES,
+    _END,
+) = (ABREAST * n for n in itertools.accumulate(_SIZES, initial=0))
 """Fields: numbers of the contact and their gradient; state before a step; scaled twist, spin, sliding and load; wrench
 or its cotangent; cotangent of the state, of the twist and of the load; slopes of the sliding."""
 
@@ -66,12 +78,20 @@ def _vector(w: np.ndarray, field: int, c: int) -> Vector:
 
 
 @kernel
-def _begin(w: np.ndarray, inputs: Inputs, first: int, lanes: int, carried: np.ndarray, field: int) -> None:
+def _begin(
+    w: np.ndarray,
+    inputs: Inputs,
+    first: int,
+    lanes: int,
+    carried: np.ndarray,
+    field: int,
+) -> None:
     """Write the rows of the lanes from contact `first` on, with `carried` in a field and gradients of zero."""
     for c in range(lanes):
         row = inputs.rows[row_of(inputs.rows, first + c)]
         for m in range(row.shape[0]):
-            w[_ROW + m * ABREAST + c], w[_ROW_BAR + m * ABREAST + c] = row[m], 0.0
+            w[_ROW + m * ABREAST + c] = row[m]
+            w[_ROW_BAR + m * ABREAST + c] = 0.0
         scatter(w, field + c, ABREAST, three(carried[first + c]))
 
 
@@ -79,10 +99,16 @@ def _begin(w: np.ndarray, inputs: Inputs, first: int, lanes: int, carried: np.nd
 def _see(w: np.ndarray, inputs: Inputs, first: int, lanes: int, t: int) -> None:
     """Write scaled twists, spins, sliding and loads of step t."""
     for c in range(lanes):
-        twists, loads = inputs.twist[row_of(inputs.twist, first + c)], inputs.load[row_of(inputs.load, first + c)]
-        twist, surface = three(twists[t]), inputs.shape.surface
-        x, y, s = scaled = scaled_twist(PublishedPatch(*gathered(w, _ROW + LAW * ABREAST + c, ABREAST, 4)), twist)
-        u = sliding(surface[0], inputs.shape.data, surface[1], surface[2], x, y, s, norm(scaled))
+        twists = inputs.twist[row_of(inputs.twist, first + c)]
+        loads = inputs.load[row_of(inputs.load, first + c)]
+        twist = three(twists[t])
+        surface = inputs.shape.surface
+        x, y, s = scaled = scaled_twist(
+            PublishedPatch(*gathered(w, _ROW + LAW * ABREAST + c, ABREAST, 4)), twist
+        )
+        u = sliding(
+            surface[0], inputs.shape.data, surface[1], surface[2], x, y, s, norm(scaled)
+        )
         scatter(w, _TWIST + c, ABREAST, (scaled, twist[2], u, loads[t]))
 
 
@@ -92,14 +118,25 @@ def _see_slopes(w: np.ndarray, inputs: Inputs, lanes: int, work: np.ndarray) -> 
     surface = inputs.shape.surface
     for c in range(lanes):
         x, y, s = twist = _vector(w, _TWIST, c)
-        sliding_jacobian(surface[0], inputs.shape.data, surface[1], surface[2], x, y, s, norm(twist), work)
+        sliding_jacobian(
+            surface[0],
+            inputs.shape.data,
+            surface[1],
+            surface[2],
+            x,
+            y,
+            s,
+            norm(twist),
+            work,
+        )
         for m in range(9):
             w[_SLOPES + m * ABREAST + c] = work[m]
 
 
 @kernel
 def _step(w: np.ndarray, c: int, dt: float) -> tuple[Contact, PublishedStep]:
-    row, twist = gathered(w, _ROW + c, ABREAST, _NUMBERS), _vector(w, _TWIST, c)
+    row = gathered(w, _ROW + c, ABREAST, _NUMBERS)
+    twist = _vector(w, _TWIST, c)
     contact = Contact(LawNumbers(*row[:LAW]), PublishedPatch(*row[LAW:]), 0, 0)
     drive = HeldTwist(twist, w[_OMEGA + c], norm(twist), _vector(w, _SLIDING, c))
     return contact, taped_step(contact, drive, _vector(w, _STATE, c), dt)
@@ -107,26 +144,36 @@ def _step(w: np.ndarray, c: int, dt: float) -> tuple[Contact, PublishedStep]:
 
 @kernel
 def _unless(none: bool, a: Vector) -> Vector:
-    return xp.where(none, 0.0, a[0]), xp.where(none, 0.0, a[1]), xp.where(none, 0.0, a[2])
+    return (
+        xp.where(none, 0.0, a[0]),
+        xp.where(none, 0.0, a[1]),
+        xp.where(none, 0.0, a[2]),
+    )
 
 
 @kernel
 def _advance_one(w: np.ndarray, c: int, dt: float) -> None:
-    load, (_, step) = w[_LOAD + c], _step(w, c, dt)
+    load = w[_LOAD + c]
+    (_, step) = _step(w, c, dt)
     scatter(w, _STATE + c, ABREAST, _unless(load == 0.0, step.new))
     scatter(w, _WRENCH + c, ABREAST, _unless(load == 0.0, times(load, step.wrench)))
 
 
 @kernel
 def _advance(w: np.ndarray, lanes: int, dt: float) -> None:
-    for c in range(lanes):  # the body apart: kernel later, it leaves the compiler a loop that it can count
+    for c in range(
+        lanes
+    ):  # the body apart: kernel later, it leaves the compiler a loop that it can count
         _advance_one(w, c, dt)
 
 
 @kernel
 def _retreat_one(w: np.ndarray, c: int, dt: float) -> None:
-    load, pull, (contact, step) = w[_LOAD + c], _vector(w, _WRENCH, c), _step(w, c, dt)
-    new, slopes = _unless(load == 0.0, _vector(w, _CARRY, c)), gathered(w, _SLOPES + c, ABREAST, 9)
+    load = w[_LOAD + c]
+    pull = _vector(w, _WRENCH, c)
+    (contact, step) = _step(w, c, dt)
+    new = _unless(load == 0.0, _vector(w, _CARRY, c))
+    slopes = gathered(w, _SLOPES + c, ABREAST, 9)
     bar = pull_back(contact, step, slopes, new, times(load, pull))
     scatter(w, _CARRY + c, ABREAST, (bar.state, bar.twist, dot(pull, step.wrench)))
     accumulate(w, _ROW_BAR + c, ABREAST, (bar.law, bar.shape))
@@ -140,7 +187,12 @@ def _retreat(w: np.ndarray, lanes: int, dt: float) -> None:
 
 @kernel
 def _rollout(
-    inputs: Inputs, span: tuple[int, ...], z: np.ndarray, wrench: np.ndarray, states: np.ndarray, w: np.ndarray
+    inputs: Inputs,
+    span: tuple[int, ...],
+    z: np.ndarray,
+    wrench: np.ndarray,
+    states: np.ndarray,
+    w: np.ndarray,
 ) -> None:
     kept = states.shape[1] > 0
     for first in range(span[0], span[1], ABREAST):
@@ -158,7 +210,13 @@ def _rollout(
 
 
 @jit
-def rollout(inputs: Inputs, span: tuple[int, ...], z: np.ndarray, wrench: np.ndarray, states: np.ndarray) -> None:
+def rollout(
+    inputs: Inputs,
+    span: tuple[int, ...],
+    z: np.ndarray,
+    wrench: np.ndarray,
+    states: np.ndarray,
+) -> None:
     """Step the contacts `span[0]` to `span[1]`: `z` [B, 3] in place, wrenches added to `wrench` [B, T, 3].
 
     The state before each step goes into `states` [B, T, 3], unless that is empty.
@@ -177,7 +235,8 @@ def _gradient(
         _begin(w, inputs, first, lanes, bars.state, _CARRY)
         for t in range(inputs.dt.shape[0] - 1, -1, -1):
             for c in range(lanes):
-                before, pulls = states[row_of(states, first + c)], wrench_bar[row_of(wrench_bar, first + c)]
+                before = states[row_of(states, first + c)]
+                pulls = wrench_bar[row_of(wrench_bar, first + c)]
                 scatter(w, _STATE + c, ABREAST, three(before[t]))
                 scatter(w, _WRENCH + c, ABREAST, three(pulls[t]))
             _see(w, inputs, first, lanes, t)
@@ -193,9 +252,16 @@ def _gradient(
 
 
 @jit
-def gradient(inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], bars: Bars) -> None:
+def gradient(
+    inputs: Inputs,
+    states: np.ndarray,
+    wrench_bar: np.ndarray,
+    span: tuple[int, ...],
+    bars: Bars,
+) -> None:
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
-    w, work = np.empty(_END), np.empty(SCRATCH)
+    w = np.empty(_END)
+    work = np.empty(SCRATCH)
     _gradient(inputs, states, wrench_bar, span, bars, w, work)
 
 
@@ -206,12 +272,23 @@ def gradient(inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: t
 def _contact(inputs: Inputs, row: np.ndarray) -> Contact:
     """Return a contact from its row of numbers."""
     surface = inputs.shape.surface
-    return Contact(law_of(row), shape_of(row[LAW:]), (surface[0], surface[1], surface[2]), inputs.shape.data)
+    return Contact(
+        law_of(row),
+        shape_of(row[LAW:]),
+        (surface[0], surface[1], surface[2]),
+        inputs.shape.data,
+    )
 
 
 @kernel
 def _jacobian(
-    contact: Contact, z: Vector, twist: Vector, load: float, dt: float, work: np.ndarray, out: np.ndarray
+    contact: Contact,
+    z: Vector,
+    twist: Vector,
+    load: float,
+    dt: float,
+    work: np.ndarray,
+    out: np.ndarray,
 ) -> PublishedStep:
     """Write derivatives of the new state and of the wrench (6 rows) to `out` [6, 7 + N]; return the step.
 
@@ -220,16 +297,39 @@ def _jacobian(
     drive, slopes = hold_slopes(contact, twist, work)
     step = taped_step(contact, drive, z, dt)
     for i in range(6):
-        unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
+        unit = (
+            (1.0 if i % 3 == 0 else 0.0),
+            (1.0 if i % 3 == 1 else 0.0),
+            (1.0 if i % 3 == 2 else 0.0),
+        )
         loaded = 0.0 if i > 2 or load == 0.0 else 1.0
-        bar = pull_back(contact, step, slopes, times(loaded, unit), times(load if i > 2 else 0.0, unit))
+        bar = pull_back(
+            contact,
+            step,
+            slopes,
+            times(loaded, unit),
+            times(load if i > 2 else 0.0, unit),
+        )
         clear(out[i], out.shape[1])
-        accumulate(out[i], 0, 1, (bar.state, bar.twist, dot(unit, step.wrench) if i > 2 else 0.0, bar.law, bar.shape))
+        accumulate(
+            out[i],
+            0,
+            1,
+            (
+                bar.state,
+                bar.twist,
+                dot(unit, step.wrench) if i > 2 else 0.0,
+                bar.law,
+                bar.shape,
+            ),
+        )
     return step
 
 
 @kernel
-def _by_number(rows: np.ndarray, i: int, d: int, columns: np.ndarray, b: int, t: int) -> float:
+def _by_number(
+    rows: np.ndarray, i: int, d: int, columns: np.ndarray, b: int, t: int
+) -> float:
     """Return row i of a step's derivatives by number `columns[d]` of the contact."""
     return rows[i, 7 + columns[d]]
 
@@ -237,7 +337,8 @@ def _by_number(rows: np.ndarray, i: int, d: int, columns: np.ndarray, b: int, t:
 @kernel
 def _along(rows: np.ndarray, i: int, d: int, changes: Bars, b: int, t: int) -> float:
     """Return the change of row i along `changes` of the inputs of contact b without its state."""
-    turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
+    turns = changes.twist[row_of(changes.twist, b)]
+    pushes = changes.load[row_of(changes.load, b)]
     by = changes.rows[row_of(changes.rows, b)]
     change = dot(three(rows[i, 3:]), three(turns[t])) + rows[i, 6] * pushes[t]
     for m in range(by.shape[0]):
@@ -256,19 +357,30 @@ def _forward(
     [B, 3, D] are the changes of the state, and `z`, in place. `results`, to which is added: wrenches [B, T, 3] and
     their changes [B, T, 3, D]; `work`: arrays [SCRATCH] and [6, 7 + N].
     """
-    (wrenches, slopes), (scratch, rows) = results, work
+    (wrenches, slopes) = results
+    (scratch, rows) = work
     for b in range(span[0], span[1]):
-        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        contact, state, change = _contact(inputs, inputs.rows[row_of(inputs.rows, b)]), three(z[b]), d_state[b]
+        twists = inputs.twist[row_of(inputs.twist, b)]
+        loads = inputs.load[row_of(inputs.load, b)]
+        contact = _contact(inputs, inputs.rows[row_of(inputs.rows, b)])
+        state = three(z[b])
+        change = d_state[b]
         for t in range(inputs.dt.shape[0]):
-            load, twist, dt = loads[t], three(twists[t]), inputs.dt[t]
+            load = loads[t]
+            twist = three(twists[t])
+            dt = inputs.dt[t]
             step = _jacobian(contact, state, twist, load, dt, scratch, rows)
             state = step.new if load != 0.0 else (0.0, 0.0, 0.0)
-            add(wrenches[b, t], times(load, step.wrench) if load != 0.0 else (0.0, 0.0, 0.0))
+            add(
+                wrenches[b, t],
+                times(load, step.wrench) if load != 0.0 else (0.0, 0.0, 0.0),
+            )
             for d in range(change.shape[1]):
                 before = change[0, d], change[1, d], change[2, d]
                 for i in range(6):
-                    now = dot(three(rows[i]), before) + seed(rows, i, d, directions, b, t)
+                    now = dot(three(rows[i]), before) + seed(
+                        rows, i, d, directions, b, t
+                    )
                     if i < 3:
                         change[i, d] = now
                     else:
@@ -277,22 +389,32 @@ def _forward(
 
 
 @jit
-def sensitivities(inputs: Inputs, span: tuple[int, ...], z: np.ndarray, out: Derivatives) -> None:
+def sensitivities(
+    inputs: Inputs, span: tuple[int, ...], z: np.ndarray, out: Derivatives
+) -> None:
     """Run rollouts with the derivatives of the wrenches by numbers of the contact; see `_forward`."""
     work = np.empty(SCRATCH), np.empty((6, 7 + inputs.rows.shape[1]))
-    changes, results = np.zeros((z.shape[0], 3, out.columns.shape[0])), (out.wrenches, out.slopes)
+    changes = np.zeros((z.shape[0], 3, out.columns.shape[0]))
+    results = (out.wrenches, out.slopes)
     _forward(_by_number, inputs, span, z, out.columns, changes, results, work)
 
 
 @jit
 def tangent(
-    inputs: Inputs, span: tuple[int, ...], z: np.ndarray, changes: Bars, wrenches: np.ndarray, slopes: np.ndarray
+    inputs: Inputs,
+    span: tuple[int, ...],
+    z: np.ndarray,
+    changes: Bars,
+    wrenches: np.ndarray,
+    slopes: np.ndarray,
 ) -> None:
     """Run rollouts with their change along changes of the inputs; see `_forward`.
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; the change of the state is in place.
     """
     work = np.empty(SCRATCH), np.empty((6, 7 + inputs.rows.shape[1]))
-    count, steps = z.shape[0], inputs.dt.shape[0]
-    d_state, results = changes.state.reshape(count, 3, 1), (wrenches, slopes.reshape(count, steps, 3, 1))
+    count = z.shape[0]
+    steps = inputs.dt.shape[0]
+    d_state = changes.state.reshape(count, 3, 1)
+    results = (wrenches, slopes.reshape(count, steps, 3, 1))
     _forward(_along, inputs, span, z, changes, d_state, results, work)

@@ -18,11 +18,16 @@ from planarfriction._engine.compiler import jit
 
 
 @jit
-def spin_sum(x: np.ndarray, y: np.ndarray, w: np.ndarray, cx: float, cy: float) -> Vector:
+def spin_sum(
+    x: np.ndarray, y: np.ndarray, w: np.ndarray, cx: float, cy: float
+) -> Vector:
     """Return `sum w v/|v|` and `sum w rho x v/|v|` of a unit spin about `(cx, cy)`; a cell there adds nothing."""
-    hx, hy, ht = 0.0, 0.0, 0.0
+    hx = 0.0
+    hy = 0.0
+    ht = 0.0
     for i in range(x.shape[0]):
-        dx, dy = x[i] - cx, y[i] - cy
+        dx = x[i] - cx
+        dy = y[i] - cy
         square = dx * dx + dy * dy
         c = w[i] / math.sqrt(square if square > 0.0 else math.inf)
         hx -= c * dy
@@ -33,7 +38,13 @@ def spin_sum(x: np.ndarray, y: np.ndarray, w: np.ndarray, cx: float, cy: float) 
 
 @jit
 def smoothed_spin_sum(
-    corners: np.ndarray, grid: Vector, x: np.ndarray, y: np.ndarray, w: np.ndarray, cx: float, cy: float
+    corners: np.ndarray,
+    grid: Vector,
+    x: np.ndarray,
+    y: np.ndarray,
+    w: np.ndarray,
+    cx: float,
+    cy: float,
 ) -> Vector:
     """Return `spin_sum` blended bilinearly over the corners of the grid cell that holds the centre of rotation.
 
@@ -42,23 +53,39 @@ def smoothed_spin_sum(
     width, height)` of its cells relative to the centre of pressure; `corners` `[columns + 1, rows + 1, 3]` caches the
     sums (NaN: not yet).
     """
-    columns, rows = corners.shape[0] - 1, corners.shape[1] - 1
-    a, b = (cx - grid[0]) / grid[2], (cy - grid[1]) / grid[3]
+    columns = corners.shape[0] - 1
+    rows = corners.shape[1] - 1
+    a = (cx - grid[0]) / grid[2]
+    b = (cy - grid[1]) / grid[3]
     if not (-1.0 < a < columns and -1.0 < b < rows):
         return spin_sum(x, y, w, cx, cy)
-    i, j = int(a), int(b)
-    a, b = a - i, b - j
+    i = int(a)
+    j = int(b)
+    a = a - i
+    b = b - j
     for p in range(i, i + 2):
         for q in range(j, j + 2):
             if math.isnan(corners[p, q, 0]):
                 corner = spin_sum(x, y, w, grid[0] + p * grid[2], grid[1] + q * grid[3])
                 corners[p, q, 0], corners[p, q, 1], corners[p, q, 2] = corner
-    w00, w10, w01, w11 = (1.0 - a) * (1.0 - b), a * (1.0 - b), (1.0 - a) * b, a * b
+    w00 = (1.0 - a) * (1.0 - b)
+    w10 = a * (1.0 - b)
+    w01 = (1.0 - a) * b
+    w11 = a * b
     c = corners
     return (
-        w00 * c[i, j, 0] + w10 * c[i + 1, j, 0] + w01 * c[i, j + 1, 0] + w11 * c[i + 1, j + 1, 0],
-        w00 * c[i, j, 1] + w10 * c[i + 1, j, 1] + w01 * c[i, j + 1, 1] + w11 * c[i + 1, j + 1, 1],
-        w00 * c[i, j, 2] + w10 * c[i + 1, j, 2] + w01 * c[i, j + 1, 2] + w11 * c[i + 1, j + 1, 2],
+        w00 * c[i, j, 0]
+        + w10 * c[i + 1, j, 0]
+        + w01 * c[i, j + 1, 0]
+        + w11 * c[i + 1, j + 1, 0],
+        w00 * c[i, j, 1]
+        + w10 * c[i + 1, j, 1]
+        + w01 * c[i, j + 1, 1]
+        + w11 * c[i + 1, j + 1, 1],
+        w00 * c[i, j, 2]
+        + w10 * c[i + 1, j, 2]
+        + w01 * c[i, j + 1, 2]
+        + w11 * c[i + 1, j + 1, 2],
     )
 
 
@@ -72,13 +99,20 @@ def smoothed_nodes(
     for i in range(size + 1):
         for j in range(4 * size):
             if i == size:  # pure sliding: the centre of rotation is at infinity
-                hx, hy, ht = math.cos(j * segment), math.sin(j * segment), 0.0
+                hx = math.cos(j * segment)
+                hy = math.sin(j * segment)
+                ht = 0.0
                 for m in range(x.shape[0]):
                     ht += w[m] * (x[m] * hy - y[m] * hx)
             else:
                 distance = radius * math.tan(i * segment)
-                cx, cy = -distance * math.sin(j * segment), distance * math.cos(j * segment)
+                cx = -distance * math.sin(j * segment)
+                cy = distance * math.cos(j * segment)
                 hx, hy, ht = smoothed_spin_sum(corners, grid, x, y, w, cx, cy)
-            nodes[i, j, 0], nodes[i, j, 1], nodes[i, j, 2] = hx, hy, ht / radius
-        for c in range(3):  # one by one: an assignment of arrays takes six times as long to compile
+            nodes[i, j, 0] = hx
+            nodes[i, j, 1] = hy
+            nodes[i, j, 2] = ht / radius
+        for c in range(
+            3
+        ):  # one by one: an assignment of arrays takes six times as long to compile
             nodes[i, 4 * size, c] = nodes[i, 0, c]

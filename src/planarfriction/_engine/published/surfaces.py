@@ -43,8 +43,10 @@ def place(size: int, x: float, y: float, s: float) -> tuple:
     azimuth = xp.atan2(y, x)
     if azimuth < 0.0:
         azimuth += 2.0 * math.pi
-    a, b = polar * per_segment, azimuth * per_segment
-    i, j = xp.minimum(int(a), size - 1), xp.minimum(int(b), 4 * size - 1)
+    a = polar * per_segment
+    b = azimuth * per_segment
+    i = xp.minimum(int(a), size - 1)
+    j = xp.minimum(int(b), 4 * size - 1)
     return i, j, a - i, b - j, polar, azimuth
 
 
@@ -56,7 +58,8 @@ def _sines(x: float, y: float, s: float, polar: float) -> Vector:
     norm = math.sqrt(x * x + y * y + s * s)
     per_norm = 1.0 / xp.where(norm > 0.0, norm, 1.0)
     inside = polar < _AXIS
-    sin_p, cos_p = xp.where(inside, _SIN_AXIS, across * per_norm), xp.where(inside, _COS_AXIS, s * per_norm)
+    sin_p = xp.where(inside, _SIN_AXIS, across * per_norm)
+    cos_p = xp.where(inside, _COS_AXIS, s * per_norm)
     return sin_p, cos_p, y * per_across, xp.where(across > 0.0, x * per_across, 1.0)
 
 
@@ -71,29 +74,44 @@ def _corners(data: Doubles, p: int, row: int, a: float, b: float) -> Vector:
 
 
 @kernel
-def _bilinear(data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float) -> Vector:
+def _bilinear(
+    data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float
+) -> Vector:
     i, j, a, b, _, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
-    hx, hy, hs = _corners(data, p, row, a, b), _corners(data, p + 1, row, a, b), _corners(data, p + 2, row, a, b)
+    hx = _corners(data, p, row, a, b)
+    hy = _corners(data, p + 1, row, a, b)
+    hs = _corners(data, p + 2, row, a, b)
     return hx[0] * speed, hy[0] * speed, hs[0] * speed
 
 
 @kernel
-def _bilinear_jacobian(data: Doubles, start: int, size: int, x: float, y: float, s: float, out: Doubles) -> None:
+def _bilinear_jacobian(
+    data: Doubles, start: int, size: int, x: float, y: float, s: float, out: Doubles
+) -> None:
     i, j, a, b, polar, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     per_segment = size / (0.5 * math.pi)
     sin_p, cos_p, sin_a, cos_a = _sines(x, y, s, polar)
-    radial, per_azimuth = (sin_p * cos_a, sin_p * sin_a, cos_p), per_segment / sin_p
-    polar_slope = (per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p)
+    radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
+    per_azimuth = per_segment / sin_p
+    polar_slope = (
+        per_segment * cos_p * cos_a,
+        per_segment * cos_p * sin_a,
+        -per_segment * sin_p,
+    )
     azimuth_slope = (-per_azimuth * sin_a, per_azimuth * cos_a, 0.0)
-    a = xp.where(polar < _AXIS, _AXIS * per_segment, a)  # the axis has no slope by the azimuth
+    a = xp.where(
+        polar < _AXIS, _AXIS * per_segment, a
+    )  # the axis has no slope by the azimuth
     for i in range(3):
         h, h_polar, h_azimuth = _corners(data, p + i, row, a, b)
         for j in range(3):
-            out[3 * i + j] = h * radial[j] + h_polar * polar_slope[j] + h_azimuth * azimuth_slope[j]
+            out[3 * i + j] = (
+                h * radial[j] + h_polar * polar_slope[j] + h_azimuth * azimuth_slope[j]
+            )
 
 
 @kernel
@@ -107,7 +125,9 @@ def _hermite(t: float) -> tuple[Vector, Vector, Vector]:
 
 
 @kernel
-def _blend(data: Doubles, p: int, row: int, segment: float, a: Vector, b: Vector, whole: float) -> float:
+def _blend(
+    data: Doubles, p: int, row: int, segment: float, a: Vector, b: Vector, whole: float
+) -> float:
     """Bicubic value from the basis `a` along the polar angle and `b` along the azimuth.
 
     Azimuth's neighbours enter by their differences: near the spin axis, where they are equal but for little, its second
@@ -118,10 +138,19 @@ def _blend(data: Doubles, p: int, row: int, segment: float, a: Vector, b: Vector
     for i in range(2):
         q = p + i * row
         low = a[i] * data[q] + a[i + 2] * segment * data[q + 1]
-        change = a[i] * (data[q + 4] - data[q]) + a[i + 2] * segment * (data[q + 5] - data[q + 1])
+        change = a[i] * (data[q + 4] - data[q]) + a[i + 2] * segment * (
+            data[q + 5] - data[q + 1]
+        )
         total += whole * low + b[1] * change
         for j in range(2):
-            total += segment * b[j + 2] * (a[i] * data[q + 4 * j + 2] + a[i + 2] * segment * data[q + 4 * j + 3])
+            total += (
+                segment
+                * b[j + 2]
+                * (
+                    a[i] * data[q + 4 * j + 2]
+                    + a[i + 2] * segment * data[q + 4 * j + 3]
+                )
+            )
     return total
 
 
@@ -138,7 +167,9 @@ def _tilt(ax: float, ay: float, x: float, y: float, s: float) -> tuple[float, Ve
 
 
 @kernel
-def _potential(data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float) -> Vector:
+def _potential(
+    data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float
+) -> Vector:
     i, j, a, b, polar, azimuth = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
@@ -148,12 +179,16 @@ def _potential(data: Doubles, start: int, size: int, x: float, y: float, s: floa
     phi = _blend(data, p, row, segment, av, bv, 1.0)
     d_polar = _blend(data, p, row, segment, af, bv, 1.0) / segment
     d_azimuth = _blend(data, p, row, segment, av, bf, 0.0) / segment
-    sin_p, cos_p = math.sin(polar), math.cos(polar)
-    sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
+    sin_p = math.sin(polar)
+    cos_p = math.cos(polar)
+    sin_a = math.sin(azimuth)
+    cos_a = math.cos(azimuth)
     across = d_azimuth / xp.maximum(sin_p, _AXIS)
     radial = phi * sin_p + d_polar * cos_p
     end = start + (size + 1) * row
-    nx, ny, ns = x / speed, y / speed, s / speed
+    nx = x / speed
+    ny = y / speed
+    ns = s / speed
     c, tilt = _tilt(data[end], data[end + 1], nx, ny, ns)
     return (
         speed * (tilt[0] - 2.0 * c * nx + radial * cos_a - across * sin_a),
@@ -163,7 +198,9 @@ def _potential(data: Doubles, start: int, size: int, x: float, y: float, s: floa
 
 
 @kernel
-def _potential_jacobian(data: Doubles, start: int, size: int, x: float, y: float, s: float, out: Doubles) -> None:
+def _potential_jacobian(
+    data: Doubles, start: int, size: int, x: float, y: float, s: float, out: Doubles
+) -> None:
     i, j, a, b, polar, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
@@ -183,29 +220,53 @@ def _potential_jacobian(data: Doubles, start: int, size: int, x: float, y: float
     radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
     along = (cos_p * cos_a, cos_p * sin_a, -sin_p)  # unit vector of growing polar angle
     across = (-sin_a, cos_a, 0.0)  # unit vector of growing azimuth
-    axis, lean = (0.0, 0.0, 1.0), (data[end], data[end + 1], 0.0)
+    axis = (0.0, 0.0, 1.0)
+    lean = (data[end], data[end + 1], 0.0)
     c, n = _tilt(lean[0], lean[1], radial[0], radial[1], radial[2])
     h_across = d_a / sin_p
     m_pp = phi + d_pp
     m_pa = (d_pa - d_a * cos_p / sin_p) / sin_p
     m_aa = phi + (d_p * cos_p + d_aa / sin_p) / sin_p
     for i in range(3):
-        h = phi * radial[i] + d_p * along[i] + h_across * across[i] + n[i] - 2.0 * c * radial[i]
+        h = (
+            phi * radial[i]
+            + d_p * along[i]
+            + h_across * across[i]
+            + n[i]
+            - 2.0 * c * radial[i]
+        )
         to_radial = h + 8.0 * c * radial[i] - 2.0 * n[i]
-        to_along, to_across = m_pp * along[i] + m_pa * across[i], m_pa * along[i] + m_aa * across[i]
-        to_axis = 2.0 * cos_p * lean[i] + 2.0 * (lean[0] * radial[0] + lean[1] * radial[1]) * axis[i]
+        to_along = m_pp * along[i] + m_pa * across[i]
+        to_across = m_pa * along[i] + m_aa * across[i]
+        to_axis = (
+            2.0 * cos_p * lean[i]
+            + 2.0 * (lean[0] * radial[0] + lean[1] * radial[1]) * axis[i]
+        )
         for j in range(3):
-            out[3 * i + j] = to_radial * radial[j] + to_along * along[j] + to_across * across[j]
-            out[3 * i + j] += to_axis * axis[j] - 2.0 * radial[i] * n[j] + 2.0 * cos_p * axis[i] * lean[j]
+            out[3 * i + j] = (
+                to_radial * radial[j] + to_along * along[j] + to_across * across[j]
+            )
+            out[3 * i + j] += (
+                to_axis * axis[j]
+                - 2.0 * radial[i] * n[j]
+                + 2.0 * cos_p * axis[i] * lean[j]
+            )
         out[4 * i] -= 2.0 * c
 
 
 @kernel
-def _cells(data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float) -> Vector:
-    hx, hy, hs = 0.0, 0.0, 0.0
+def _cells(
+    data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float
+) -> Vector:
+    hx = 0.0
+    hy = 0.0
+    hs = 0.0
     for i in range(size):
-        px, py, w = data[start + i], data[start + size + i], data[start + 2 * size + i]
-        ux, uy = x - s * py, y + s * px
+        px = data[start + i]
+        py = data[start + size + i]
+        w = data[start + 2 * size + i]
+        ux = x - s * py
+        uy = y + s * px
         norm = math.sqrt(ux * ux + uy * uy)
         c = w / norm if norm > _AT_REST * speed else 0.0
         hx += c * ux
@@ -216,26 +277,49 @@ def _cells(data: Doubles, start: int, size: int, x: float, y: float, s: float, s
 
 @kernel
 def _cells_jacobian(
-    data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float, out: Doubles
+    data: Doubles,
+    start: int,
+    size: int,
+    x: float,
+    y: float,
+    s: float,
+    speed: float,
+    out: Doubles,
 ) -> None:
     radial = (x / speed, y / speed, s / speed)
     clear(out, 9)
     for m in range(size):
-        px, py, w = data[start + m], data[start + size + m], data[start + 2 * size + m]
-        ux, uy = x - s * py, y + s * px
+        px = data[start + m]
+        py = data[start + size + m]
+        w = data[start + 2 * size + m]
+        ux = x - s * py
+        uy = y + s * px
         norm = math.sqrt(ux * ux + uy * uy)
         per_norm = 1.0 / norm if norm > _AT_REST * speed else 0.0
-        ex, ey = per_norm * ux, per_norm * uy
+        ex = per_norm * ux
+        ey = per_norm * uy
         # the velocity turns across e only: d e/dV = t t' P / |v| with t normal to e
-        along, across = (ex, ey, px * ey - py * ex), (-ey, ex, px * ex + py * ey)
+        along = (ex, ey, px * ey - py * ex)
+        across = (-ey, ex, px * ex + py * ey)
         turn = speed * per_norm
         for i in range(3):
             for j in range(3):
-                out[3 * i + j] += w * (along[i] * radial[j] + turn * across[i] * across[j])
+                out[3 * i + j] += w * (
+                    along[i] * radial[j] + turn * across[i] * across[j]
+                )
 
 
 @kernel
-def sliding(kind: int, data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float) -> Vector:
+def sliding(
+    kind: int,
+    data: Doubles,
+    start: int,
+    size: int,
+    x: float,
+    y: float,
+    s: float,
+    speed: float,
+) -> Vector:
     """`u = h(V) |V_S|` of the scaled twist `(x, y, s)` of norm `speed`; the lower half sphere mirrors the upper."""
     if kind == ELLIPSOID:
         return x, y, s
@@ -253,7 +337,15 @@ def sliding(kind: int, data: Doubles, start: int, size: int, x: float, y: float,
 
 @kernel
 def sliding_jacobian(
-    kind: int, data: Doubles, start: int, size: int, x: float, y: float, s: float, speed: float, out: Doubles
+    kind: int,
+    data: Doubles,
+    start: int,
+    size: int,
+    x: float,
+    y: float,
+    s: float,
+    speed: float,
+    out: Doubles,
 ) -> None:
     """Write `du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's.
 
@@ -277,18 +369,29 @@ def _norm(twist: np.ndarray) -> float:
 
 
 @jit
-def sliding_batch(kind: int, data: np.ndarray, start: int, size: int, twist: np.ndarray, u: np.ndarray) -> None:
+def sliding_batch(
+    kind: int, data: np.ndarray, start: int, size: int, twist: np.ndarray, u: np.ndarray
+) -> None:
     """`sliding` for scaled twists `[M, 3]` into `u [M, 3]`."""
     for m in range(twist.shape[0]):
         v = twist[m]
-        u[m, 0], u[m, 1], u[m, 2] = sliding(kind, data, start, size, v[0], v[1], v[2], _norm(v))
+        u[m, 0], u[m, 1], u[m, 2] = sliding(
+            kind, data, start, size, v[0], v[1], v[2], _norm(v)
+        )
 
 
 @jit
 def sliding_jacobian_batch(
-    kind: int, data: np.ndarray, start: int, size: int, twist: np.ndarray, jacobian: np.ndarray
+    kind: int,
+    data: np.ndarray,
+    start: int,
+    size: int,
+    twist: np.ndarray,
+    jacobian: np.ndarray,
 ) -> None:
     """`sliding_jacobian` for scaled twists `[M, 3]` into `jacobian [M, 9]`."""
     for m in range(twist.shape[0]):
         v = twist[m]
-        sliding_jacobian(kind, data, start, size, v[0], v[1], v[2], _norm(v), jacobian[m])
+        sliding_jacobian(
+            kind, data, start, size, v[0], v[1], v[2], _norm(v), jacobian[m]
+        )

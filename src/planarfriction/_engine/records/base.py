@@ -14,7 +14,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.coupled.steps import UNFIT, jacobians, ready, step_many, step_one
+from planarfriction._engine.coupled.steps import (
+    UNFIT,
+    jacobians,
+    ready,
+    step_many,
+    step_one,
+)
 from planarfriction._engine.protocol import StepFunctions
 from planarfriction._engine.records.packed import PackedModel, driven, rates
 from planarfriction.equality import by_parts
@@ -69,19 +75,39 @@ class CompiledModel:
     depends_on_load: bool
     """True if the load changes the shape of the patch."""
 
-    def __init__(self, functions: StepFunctions, state_shape: tuple[int, ...], square_shape: tuple[int, ...]) -> None:
-        self.functions, self.state_shape = functions, state_shape
-        self._size, self._square, self._flat = math.prod(state_shape), math.prod(square_shape), len(state_shape) == 1
+    def __init__(
+        self,
+        functions: StepFunctions,
+        state_shape: tuple[int, ...],
+        square_shape: tuple[int, ...],
+    ) -> None:
+        self.functions = functions
+        self.state_shape = state_shape
+        self._size = math.prod(state_shape)
+        self._square = math.prod(square_shape)
+        self._flat = len(state_shape) == 1
         """Number of states, and numbers of d new state / d state, whose shape is `square_shape`."""
         n = self._size
-        self._new, self._wrench, self._result, self._table = slice(n), slice(n, n + 3), n + 9, None
-        shapes = square_shape, (*state_shape, 3), state_shape, (3, *state_shape), (3, 3), (3,)
+        self._new = slice(n)
+        self._wrench = slice(n, n + 3)
+        self._result = n + 9
+        self._table = None
+        shapes = (
+            square_shape,
+            (*state_shape, 3),
+            state_shape,
+            (3, *state_shape),
+            (3, 3),
+            (3,),
+        )
         ends = [0, *itertools.accumulate(map(math.prod, shapes))]
         self._derivatives = [
-            (slice(*span), shape) for span, shape in zip(itertools.pairwise(ends), shapes, strict=True)
+            (slice(*span), shape)
+            for span, shape in zip(itertools.pairwise(ends), shapes, strict=True)
         ]
         """Places and shapes of `StepJacobians` in the numbers that `coupled.steps.jacobians` writes for a contact."""
-        self._per_contact, self._scratch = ends[-1], 7 * n + self._square + 12
+        self._per_contact = ends[-1]
+        self._scratch = 7 * n + self._square + 12
 
     # ------------------------------------------------------------------ at given loads
 
@@ -133,7 +159,9 @@ class CompiledModel:
 
     # ------------------------------------------------------------------ fast doors
 
-    def step_one(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray] | None:
+    def step_one(
+        self, state: Any, twist: Any, normal_force: Any, dt: Any
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """Step one contact, or return None; the compiled step checks its numbers, but takes True for 1.0."""
         kind = type(twist)
         if kind is tuple or kind is list:
@@ -142,7 +170,9 @@ class CompiledModel:
             numbers = twist.tolist()
         else:
             return None
-        if type(state) is not _ARRAY or ((table := self._table) is None and (table := self._opened()) is None):
+        if type(state) is not _ARRAY or (
+            (table := self._table) is None and (table := self._opened()) is None
+        ):
             return None
         try:
             vx, vy, omega = numbers
@@ -166,9 +196,15 @@ class CompiledModel:
             pass
         return None
 
-    def step_batch(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray] | None:
+    def step_batch(
+        self, state: Any, twist: Any, normal_force: Any, dt: Any
+    ) -> tuple[np.ndarray, np.ndarray] | None:
         """Step contacts along one axis, or return None; loads and steps are one number, or one for each contact."""
-        if type(state) is not _ARRAY or type(twist) is not _ARRAY or (table := self._many) is None:
+        if (
+            type(state) is not _ARRAY
+            or type(twist) is not _ARRAY
+            or (table := self._many) is None
+        ):
             return None
         if twist.ndim != 2 or state.shape != (count := len(twist), *self.state_shape):
             return None
@@ -182,42 +218,68 @@ class CompiledModel:
                     return None
                 dt = _MAKE((dt,), float)
             rows = state if state.ndim == 2 else state.reshape(count, self._size)
-            new, wrench = _EMPTY((count, self._size)), _EMPTY((count, 3))
-            if not step_many(table, rows, twist, normal_force, dt, new, wrench, _EMPTY(3)):
+            new = _EMPTY((count, self._size))
+            wrench = _EMPTY((count, 3))
+            if not step_many(
+                table, rows, twist, normal_force, dt, new, wrench, _EMPTY(3)
+            ):
                 return None
         except _REFUSED:
             return None
         return new if state.ndim == 2 else new.reshape(state.shape), wrench
 
-    def jacobians_one(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> StepJacobians | None:
+    def jacobians_one(
+        self, state: Any, twist: Any, normal_force: Any, dt: Any
+    ) -> StepJacobians | None:
         """Differentiate a step of one contact, or return None."""
         if type(twist) is _ARRAY and twist.ndim == 1:
             twist = twist.tolist()
         if type(state) is not _ARRAY or state.shape != self.state_shape:
             return None
-        if type(twist) not in (tuple, list) or len(twist) != 3 or (table := self._slopes) is None:
+        if (
+            type(twist) not in (tuple, list)
+            or len(twist) != 3
+            or (table := self._slopes) is None
+        ):
             return None
         inputs = *twist, normal_force, dt
         if not _PLAIN.issuperset(map(type, inputs)):
             return None
         result = _EMPTY(self._per_contact + self._scratch)
         try:
-            if not jacobians(table, state if state.ndim == 1 else state.ravel(), _MAKE(inputs, float), result):
+            if not jacobians(
+                table,
+                state if state.ndim == 1 else state.ravel(),
+                _MAKE(inputs, float),
+                result,
+            ):
                 return None
         except _REFUSED:
             return None
-        return StepJacobians(*[result[place].reshape(shape) for place, shape in self._derivatives])
+        return StepJacobians(
+            *[result[place].reshape(shape) for place, shape in self._derivatives]
+        )
 
     # ------------------------------------------------------------------ batches, load by load
 
     def evaluate(
-        self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, centre: np.ndarray | None = None
+        self,
+        state: np.ndarray,
+        twist: np.ndarray,
+        load: np.ndarray,
+        centre: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the rates of the states, and wrenches per unit load `[..., 3]`; `centre` as in `pressed`."""
-        z, v = state.reshape(-1, self._size), twist.reshape(-1, 3)
-        rate, unit = np.zeros(z.shape), np.zeros(v.shape)
+        z = state.reshape(-1, self._size)
+        v = twist.reshape(-1, 3)
+        rate = np.zeros(z.shape)
+        unit = np.zeros(v.shape)
         for rows, contact, offset in self.pressed(load, centre):
-            rate[rows], pull = rates(contact, z[rows], driven(contact, _seen(v[rows], offset), load.reshape(-1)[rows]))
+            rate[rows], pull = rates(
+                contact,
+                z[rows],
+                driven(contact, _seen(v[rows], offset), load.reshape(-1)[rows]),
+            )
             unit[rows] = _pull(pull, offset)
         return rate.reshape(state.shape), unit.reshape(twist.shape)
 
@@ -230,12 +292,20 @@ class CompiledModel:
         centre: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return new states and wrenches `[..., 3]`; `centre` as in `pressed`."""
-        z, v, f, h = state.reshape(-1, self._size), twist.reshape(-1, 3), load.reshape(-1), dt.reshape(-1)
-        new, wrench = np.zeros(z.shape), np.zeros(v.shape)
+        z = state.reshape(-1, self._size)
+        v = twist.reshape(-1, 3)
+        f = load.reshape(-1)
+        h = dt.reshape(-1)
+        new = np.zeros(z.shape)
+        wrench = np.zeros(v.shape)
         for rows, contact, offset in self.pressed(load, centre):
-            end, pull = np.empty_like(z[rows]), np.empty_like(v[rows])
-            table, seen = self.step_table(contact), _seen(v[rows], offset)
-            ready(step_many)(table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(3))
+            end = np.empty_like(z[rows])
+            pull = np.empty_like(v[rows])
+            table = self.step_table(contact)
+            seen = _seen(v[rows], offset)
+            ready(step_many)(
+                table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(3)
+            )
             new[rows], wrench[rows] = end, _pull(pull, offset)
         return new.reshape(state.shape), wrench.reshape(twist.shape)
 
@@ -248,32 +318,60 @@ class CompiledModel:
         centre: np.ndarray | None = None,
     ) -> StepJacobians:
         """Differentiate steps, with the pressure held; `centre` as in `pressed`."""
-        inputs = np.concatenate([twist, load[..., None], dt[..., None]], axis=-1).reshape(load.size, 5)
-        z, results = state.reshape(-1, self._size), np.zeros((load.size, self._per_contact))
+        inputs = np.concatenate(
+            [twist, load[..., None], dt[..., None]], axis=-1
+        ).reshape(load.size, 5)
+        z = state.reshape(-1, self._size)
+        results = np.zeros((load.size, self._per_contact))
         for rows, contact, offset in self.pressed(load, centre):
             numbers = inputs[rows]
             numbers[:, :3] = _seen(numbers[:, :3], offset)
             result = np.empty(len(numbers) * self._per_contact + self._scratch)
-            ready(jacobians)(self._jacobian_table(contact), z[rows].ravel(), numbers.ravel(), result)
-            results[rows] = result[: -self._scratch].reshape(len(numbers), self._per_contact)
+            ready(jacobians)(
+                self._jacobian_table(contact), z[rows].ravel(), numbers.ravel(), result
+            )
+            results[rows] = result[: -self._scratch].reshape(
+                len(numbers), self._per_contact
+            )
             if offset is not None and len(offset) > 0:
                 self._move(results, rows, offset)
-        return StepJacobians(*(results[:, place].reshape(*load.shape, *shape) for place, shape in self._derivatives))
+        return StepJacobians(
+            *(
+                results[:, place].reshape(*load.shape, *shape)
+                for place, shape in self._derivatives
+            )
+        )
 
     def _move(self, results: np.ndarray, rows: Any, offset: np.ndarray) -> None:
         """Bring the derivatives of patches at an offset to the twist and the wrench about the origin, in place."""
         at = np.tile(np.eye(3), (len(offset), 1, 1))
-        at[:, 0, 2], at[:, 1, 2] = -offset[:, 1], offset[:, 0]
-        back, (_, state_twist, _, wrench_state, wrench_twist, wrench_load) = at.mT, (p for p, _ in self._derivatives)
-        for place, left, right in ((state_twist, None, at), (wrench_state, back, None), (wrench_twist, back, at)):
-            block = results[rows, place].reshape(len(offset), *((-1, 3) if left is None else (3, -1)))
+        at[:, 0, 2] = -offset[:, 1]
+        at[:, 1, 2] = offset[:, 0]
+        back = at.mT
+        (_, state_twist, _, wrench_state, wrench_twist, wrench_load) = (
+            p for p, _ in self._derivatives
+        )
+        for place, left, right in (
+            (state_twist, None, at),
+            (wrench_state, back, None),
+            (wrench_twist, back, at),
+        ):
+            block = results[rows, place].reshape(
+                len(offset), *((-1, 3) if left is None else (3, -1))
+            )
             block = block if right is None else block @ right
-            results[rows, place] = (block if left is None else left @ block).reshape(len(offset), -1)
-        results[rows, wrench_load] = (back @ results[rows, wrench_load][..., None])[..., 0]
+            results[rows, place] = (block if left is None else left @ block).reshape(
+                len(offset), -1
+            )
+        results[rows, wrench_load] = (back @ results[rows, wrench_load][..., None])[
+            ..., 0
+        ]
 
     # ------------------------------------------------------------------ for the loops of others
 
-    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
+    def packed(
+        self, loads: Sequence[float | None], between: tuple[float, float] | None = None
+    ) -> PackedModel:
         """Pack the model for the solver (see `FrictionModel.packed`)."""
         raise NotImplementedError
 

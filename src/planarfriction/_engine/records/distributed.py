@@ -18,7 +18,12 @@ from planarfriction._engine.compiler.memory import places_of, rows_of, size_of
 from planarfriction._engine.protocol import ModelFunctions, StepFunctions
 from planarfriction._engine.records import packed
 from planarfriction._engine.records.base import CompiledModel
-from planarfriction._engine.records.packed import PackedModel, cells_by_load, driven, linearised
+from planarfriction._engine.records.packed import (
+    PackedModel,
+    cells_by_load,
+    driven,
+    linearised,
+)
 
 LOAD_STEP = 1e-5
 """Step of the central differences of weights by the load, as a share of the load [-]; their relative error is 1e-10."""
@@ -28,25 +33,33 @@ class CompiledDistributed(CompiledModel):
     """Machine form of a `DistributedModel` with a law on a patch."""
 
     def __init__(self, law: Any, patch: Any) -> None:
-        self.law, self.patch, self.depends_on_load = law, patch, patch.depends_on_load
+        self.law = law
+        self.patch = patch
+        self.depends_on_load = patch.depends_on_load
         self.size = patch.bristles
         """Number of bristles of a cell: two of a point, three of a disc."""
         self.reference = 0.0 if law.reference_load is None else law.reference_load
         """Load [N] of `reference_load`, or 0."""
         self._contact, functions = self._functions()
         if self.reference > 0.0:
-            self._contact = fixed_rates_of(self.size, patch.anisotropic, patch.asymmetric)
+            self._contact = fixed_rates_of(
+                self.size, patch.anisotropic, patch.asymmetric
+            )
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
     def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
-        return functions_of_cells(self.size, self.patch.anisotropic, self.patch.asymmetric)
+        return functions_of_cells(
+            self.size, self.patch.anisotropic, self.patch.asymmetric
+        )
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         matrices = MATRICES if self.reference > 0.0 else LINEAR
         lean = numbers[-2 if self.patch.asymmetric else len(numbers) :]
-        return CellsContact(self.law.numbers, numbers.shape[1], numbers, lean, weights), matrices * self.size**2
+        return CellsContact(
+            self.law.numbers, numbers.shape[1], numbers, lean, weights
+        ), matrices * self.size**2
 
     # ------------------------------------------------------------------ at given loads
 
@@ -57,7 +70,11 @@ class CompiledDistributed(CompiledModel):
         contact = self.fixed if centre is None else None
         if contact is None:
             weights = self.patch.weights(load.reshape(-1))
-            moved = weights if centre is None else tilted(self.patch.positions, weights, centre.reshape(-1, 2))
+            moved = (
+                weights
+                if centre is None
+                else tilted(self.patch.positions, weights, centre.reshape(-1, 2))
+            )
             contact = self._packed(moved)
         yield slice(None), contact, None
 
@@ -66,7 +83,9 @@ class CompiledDistributed(CompiledModel):
         size = size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
         return self.patch.positions[: 0 if self.reference > 0.0 else None], size
 
-    def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
+    def linearisation(
+        self, state: np.ndarray, twist: np.ndarray, load: np.ndarray
+    ) -> np.ndarray:
         """Return linearisations `[..., L, N]` of `cells.general_cells`."""
         ((_, contact, _),) = self.pressed(load)
         cells = state.shape[-1]
@@ -79,17 +98,31 @@ class CompiledDistributed(CompiledModel):
 
         Four arrays `[..., d, d, N]` of d bristles a cell; the velocity is that which a cell sees.
         """
-        law, d, lin = self.law.numbers, self.size, self.linearisation(state, twist, load)
-        matrices = np.moveaxis(lin.reshape(*load.shape, lin.shape[-2] // d**2, d, d, lin.shape[-1]), -4, 0)
-        by_state, by_velocity, identity = matrices[A], matrices[F], np.eye(d)[:, :, None]
+        law = self.law.numbers
+        d = self.size
+        lin = self.linearisation(state, twist, load)
+        matrices = np.moveaxis(
+            lin.reshape(*load.shape, lin.shape[-2] // d**2, d, d, lin.shape[-1]), -4, 0
+        )
+        by_state = matrices[A]
+        by_velocity = matrices[F]
+        identity = np.eye(d)[:, :, None]
         if len(matrices) == MATRICES:
             return by_state, by_velocity, matrices[C], matrices[E]
-        pull_state, pull_velocity = law.sigma_0 * identity + law.sigma_1 * by_state, law.sigma_2 * identity
-        return by_state, by_velocity, -pull_state, -(pull_velocity + law.sigma_1 * by_velocity)
+        pull_state = law.sigma_0 * identity + law.sigma_1 * by_state
+        pull_velocity = law.sigma_2 * identity
+        return (
+            by_state,
+            by_velocity,
+            -pull_state,
+            -(pull_velocity + law.sigma_1 * by_velocity),
+        )
 
     # ------------------------------------------------------------------ for the loops of others
 
-    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
+    def packed(
+        self, loads: Sequence[float | None], between: tuple[float, float] | None = None
+    ) -> PackedModel:
         """See `CompiledModel`; only cells that carry load at one of the loads have bristles."""
         if len(loads) == 1 and loads[0] is None:
             return self._at_any_load
@@ -99,7 +132,10 @@ class CompiledDistributed(CompiledModel):
             return self._packed(weights[:, chosen], chosen)
         chosen = self.patch.pressure.ever_loaded(self.patch.positions, between)
         most = max(int(packed.MAX_PACK_BYTES / (8.0 * chosen.sum())), 1)
-        return self._packed(np.array([self.patch.weights(load)[chosen] for load in loads[:most]]), chosen)
+        return self._packed(
+            np.array([self.patch.weights(load)[chosen] for load in loads[:most]]),
+            chosen,
+        )
 
     @functools.cached_property
     def _at_any_load(self) -> PackedModel:
@@ -116,21 +152,32 @@ class CompiledDistributed(CompiledModel):
 
         Slopes are central differences.
         """
-        by_load, step = None, LOAD_STEP * loads
+        by_load = None
+        step = LOAD_STEP * loads
         if slopes:
-            above, below = (self.patch.weights(loads + change) for change in (step, -step))
+            above, below = (
+                self.patch.weights(loads + change) for change in (step, -step)
+            )
             by_load = (above - below) / (2.0 * step)[:, None]
         return cells_by_load(self.numbers(), self.patch.weights(loads), by_load)
 
-    def _packed(self, weights: np.ndarray, chosen: np.ndarray | None = None) -> PackedModel:
+    def _packed(
+        self, weights: np.ndarray, chosen: np.ndarray | None = None
+    ) -> PackedModel:
         """Pack the chosen cells, or all, with R rows of their weights `[R, n]`."""
         chosen = np.ones(weights.shape[1], bool) if chosen is None else chosen
-        weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
-        count, numbers = len(positions), self.numbers(chosen)
-        (record, per_cell), states = self.record(numbers, weights), self.size * count
+        weights = np.ascontiguousarray(weights)
+        positions = self.patch.positions[chosen]
+        count = len(positions)
+        numbers = self.numbers(chosen)
+        (record, per_cell) = self.record(numbers, weights)
+        states = self.size * count
         distances = np.hypot(*(positions - positions.mean(axis=0)).T)
-        radius = float(np.hypot(distances, KAPPA * self.patch.lever_radii[chosen]).mean())
-        rows, scale = rows_of(record, len(weights), weights=places_of(weights)), self.law.largest_deflection
+        radius = float(
+            np.hypot(distances, KAPPA * self.patch.lever_radii[chosen]).mean()
+        )
+        rows = rows_of(record, len(weights), weights=places_of(weights))
+        scale = self.law.largest_deflection
         return PackedModel(
             self._contact, rows, states, per_cell * count, np.full(states, scale), radius, (weights, numbers), chosen,
             reference=self.reference, bristle=self.size,
@@ -141,7 +188,9 @@ class CompiledDistributed(CompiledModel):
         levers = self.patch.levers()[chosen]
         spin = levers[:, 2:, 2].T
         if not self.patch.anisotropic:
-            return np.ascontiguousarray(np.vstack([self.patch.positions[chosen].T, spin]))
+            return np.ascontiguousarray(
+                np.vstack([self.patch.positions[chosen].T, spin])
+            )
         asymmetry = self.patch.asymmetries()[chosen]
         turned = [levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))]
         return np.array([*turned, *spin, *asymmetry.T])

@@ -73,12 +73,15 @@ def driven(contact: PackedModel, twist: np.ndarray, load: np.ndarray) -> np.ndar
     return np.concatenate([twist, factor[:, None]], axis=1)
 
 
-def rates(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rates(
+    packed: PackedModel, state: np.ndarray, twist: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return rates as `state` `[B, ...]` and wrenches per unit load `[B, 3]` at contiguous states and twists `[B, 3]`.
 
     `packed` has one record, or one for each contact.
     """
-    rate, wrench = np.empty((len(twist), packed.states)), np.empty((len(twist), 3))
+    rate = np.empty((len(twist), packed.states))
+    wrench = np.empty((len(twist), 3))
     function = address_of(packed.functions.evaluate)
     rates_many(function, packed.records, state.reshape(rate.shape), twist, rate, wrench)
     return rate.reshape(state.shape), wrench
@@ -88,11 +91,15 @@ def linearised(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> np.
     """Return linearisations `[B, workspace]`; the kernels of each kind of model describe the numbers."""
     lin = np.empty((len(twist), packed.workspace))
     function = address_of(packed.functions.linearise)
-    linearise_many(function, packed.records, state.reshape(len(twist), packed.states), twist, lin)
+    linearise_many(
+        function, packed.records, state.reshape(len(twist), packed.states), twist, lin
+    )
     return lin
 
 
-def cells_by_load(levers: np.ndarray, weights: np.ndarray, by_load: np.ndarray | None) -> ShapesByLoad:
+def cells_by_load(
+    levers: np.ndarray, weights: np.ndarray, by_load: np.ndarray | None
+) -> ShapesByLoad:
     """Pack cells by the numbers of their levers `[K, N]` and weights `[L, N]` at L loads, with slopes or zeros."""
     numbers, cells = levers.shape
     blocks, lanes = divided.py_func(cells)

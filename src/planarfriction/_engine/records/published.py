@@ -10,7 +10,12 @@ import numpy as np
 
 from planarfriction._engine.compiler.memory import place_of, rows_of
 from planarfriction._engine.published import published_contact
-from planarfriction._engine.published.published_contact import LINEAR, PublishedContact, PublishedPatch, Root
+from planarfriction._engine.published.published_contact import (
+    LINEAR,
+    PublishedContact,
+    PublishedPatch,
+    Root,
+)
 from planarfriction._engine.published.published_step import STEPS
 from planarfriction._engine.records import packed
 from planarfriction._engine.records.base import CompiledModel
@@ -28,7 +33,9 @@ class CompiledPublished(CompiledModel):
     """Machine form of a `ReducedModelPublished` with a law, and `PublishedShapes` of the patch at any load."""
 
     def __init__(self, law: Any, shapes: Any) -> None:
-        self._law, self.shapes, self.depends_on_load = law, shapes, shapes.depends_on_load
+        self._law = law
+        self.shapes = shapes
+        self.depends_on_load = shapes.depends_on_load
         super().__init__(STEPS, (3,), (3, 3))
 
     # ------------------------------------------------------------------ at given loads
@@ -50,13 +57,21 @@ class CompiledPublished(CompiledModel):
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """See `CompiledModel`; the patch moves as a whole to the centre of pressure."""
         for rows, shape in self.shape_at_each_load(load):
-            yield rows, self._at(shape), None if centre is None else centre.reshape(-1, 2)[rows] - shape.place
+            yield (
+                rows,
+                self._at(shape),
+                None if centre is None else centre.reshape(-1, 2)[rows] - shape.place,
+            )
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
-        return np.empty((0, 2)) if self.depends_on_load else self.shapes.shape_at(None).place[None], 0
+        return np.empty((0, 2)) if self.depends_on_load else self.shapes.shape_at(
+            None
+        ).place[None], 0
 
-    def linearisation(self, shape: Any, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
+    def linearisation(
+        self, shape: Any, state: np.ndarray, twist: np.ndarray
+    ) -> np.ndarray:
         """Return linearisations `[B, L]` at flat states and twists (see `published_contact.LinearPublished`)."""
         return linearised(self._at(shape), state, twist)
 
@@ -65,9 +80,14 @@ class CompiledPublished(CompiledModel):
 
     def _packed(self, shapes: Sequence[Any], radius: float = 0.0) -> PackedModel:
         """Pack a contact at each of the `shapes` (`PublishedShape`); `radius` is the lever arm [m]."""
-        data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
-        numbers, root = self._law.numbers, shapes[0].root
-        patch, metric = PublishedPatch(*shapes[0].numbers), Root(root[0, 0], root[0, 1], root[1, 1])
+        data = [
+            np.ascontiguousarray(shape.surface.numbers.data, dtype=float)
+            for shape in shapes
+        ]
+        numbers = self._law.numbers
+        root = shapes[0].root
+        patch = PublishedPatch(*shapes[0].numbers)
+        metric = Root(root[0, 0], root[0, 1], root[1, 1])
         rows = rows_of(
             PublishedContact(numbers, patch, metric, 0, 0, data[0]),
             len(shapes),
@@ -84,11 +104,19 @@ class CompiledPublished(CompiledModel):
 
     # ------------------------------------------------------------------ for the loops of others
 
-    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
+    def packed(
+        self, loads: Sequence[float | None], between: tuple[float, float] | None = None
+    ) -> PackedModel:
         """See `CompiledModel`; the lever arm of a run is that at its highest load."""
-        shapes = list(map(self.shapes.shape_at, loads)) if between is None else self._first(loads)
+        shapes = (
+            list(map(self.shapes.shape_at, loads))
+            if between is None
+            else self._first(loads)
+        )
         ends = loads if between is None else between[1:]
-        return self._packed(shapes, max(self.shapes.shape_at(load).contact_radius for load in ends))
+        return self._packed(
+            shapes, max(self.shapes.shape_at(load).contact_radius for load in ends)
+        )
 
     def with_all_states(self, loads: Sequence[float | None]) -> PackedModel:
         """See `CompiledModel`."""
@@ -96,11 +124,15 @@ class CompiledPublished(CompiledModel):
 
     def _first(self, loads: Sequence[float | None]) -> list[Any]:
         """Return shapes at the first of `loads`, as many as `MAX_PACK_BYTES` and `MAX_PACK_SECONDS` allow."""
-        shapes, surfaces, begin = [], {}, time.perf_counter()
+        shapes = []
+        surfaces = {}
+        begin = time.perf_counter()
         for load in loads:
             shapes.append(self.shapes.shape_at(load))
             data = shapes[-1].surface.numbers.data
-            if id(data) in surfaces:  # no other array takes the place of one, as `shapes` holds it
+            if (
+                id(data) in surfaces
+            ):  # no other array takes the place of one, as `shapes` holds it
                 continue
             surfaces[id(data)] = data.nbytes
             if sum(surfaces.values()) > packed.MAX_PACK_BYTES and len(shapes) > 1:

@@ -64,13 +64,18 @@ class Asking:
     """Steps of patches on a shadow. What it keeps is scratch: each step starts from what it is given."""
 
     def __init__(self, shadow: Shadow, coupled: CoupledPatches, size: int) -> None:
-        k, self._coupled = len(coupled.models), coupled
-        self._shadow, self._row, self._normals = shadow, CouplingRow(coupled, shadow), np.zeros((k, 3))
+        k = len(coupled.models)
+        self._coupled = coupled
+        self._shadow = shadow
+        self._row = CouplingRow(coupled, shadow)
+        self._normals = np.zeros((k, 3))
         self._moments = np.zeros((k, 2, 6))
         """Maps of forces and their moments about the world's origin to the moments about the patches' origins."""
-        self._touching, self._levers = [False] * k, np.ones(3 * k)
+        self._touching = [False] * k
+        self._levers = np.ones(3 * k)
         self._levers[2::3] = [lever_of(model) for model in coupled.models]
-        self._rows, self._moved = np.zeros((3 * k, size)), np.zeros((size, 3 * k))
+        self._rows = np.zeros((3 * k, size))
+        self._moved = np.zeros((size, 3 * k))
         """Jacobian of the twists `[3k, nv]`; velocities that wrenches cause without contact `[nv, 3k]`."""
         self._open = MISFIT
         """Twists [m/s] that Drake's solver leaves open, next to heavy or fast bodies more than `MISFIT`."""
@@ -91,8 +96,15 @@ class Asking:
         twists that bristles are `owed` (those that they saw in the last step were off by them), its x `axes`, and its
         `answers`.
         """
-        row, passes, iterations, solved, misfit = self._row, 0, 0, False, np.inf
-        bristles, wrench, owed, axes = bristles.copy(), wrench.copy(), owed.copy(), axes.copy()
+        row = self._row
+        passes = 0
+        iterations = 0
+        solved = False
+        misfit = np.inf
+        bristles = bristles.copy()
+        wrench = wrench.copy()
+        owed = owed.copy()
+        axes = axes.copy()
         self._forget()
         np.copyto(row.follows, abs(row.follows))
         while True:
@@ -103,31 +115,65 @@ class Asking:
                 np.copyto(row.follows, abs(row.follows))
                 if passes == 1:
                     self._answer_as_before(answers)
-                wrench, owed, solved, misfit = self._pressed(wrench), self._pressed(owed), False, np.inf
-            twist, load = self._twists(velocity) + owed, np.maximum((self._normals * pushes[:, :3]) @ _ONES, 0.0)
+                wrench = self._pressed(wrench)
+                owed = self._pressed(owed)
+                solved = False
+                misfit = np.inf
+            twist = self._twists(velocity) + owed
+            load = np.maximum((self._normals * pushes[:, :3]) @ _ONES, 0.0)
             if solved:
                 off = twist - row.twist
-                last, misfit = misfit, self._speed(off, load - row.load)
-                if misfit <= self._open or passes >= PASSES or 0.5 * last < misfit <= NOTICED:
+                last = misfit
+                misfit = self._speed(off, load - row.load)
+                if (
+                    misfit <= self._open
+                    or passes >= PASSES
+                    or 0.5 * last < misfit <= NOTICED
+                ):
                     break
                 if misfit > last:  # learnt where contacts came or went
                     self._answer_freely()
                 elif misfit > max(NOTICED, self._open):
-                    self._learn(wrench - row.guess, twist - row.free_twist, load - row.free_load)
-            turned = self._moved.T @ (wrench @ self._rows - force)  # the axes have, since the last step
-            row.free_twist[:], row.free_load[:], row.guess[:], row.state[:] = twist + turned, load, wrench, bristles
+                    self._learn(
+                        wrench - row.guess, twist - row.free_twist, load - row.free_load
+                    )
+            turned = self._moved.T @ (
+                wrench @ self._rows - force
+            )  # the axes have, since the last step
+            row.free_twist[:] = twist + turned
+            row.free_load[:] = load
+            row.guess[:] = wrench
+            row.state[:] = bristles
             row.moments[:] = (self._moments @ pushes[:, :, None]).ravel()
             iterations += row.solve()
-            np.copyto(row.follows, -abs(row.follows))  # pressures stay for the rest of the step
-            change, wrench, solved = row.wrench - wrench, row.wrench.copy(), True
+            np.copyto(
+                row.follows, -abs(row.follows)
+            )  # pressures stay for the rest of the step
+            change = row.wrench - wrench
+            wrench = row.wrench.copy()
+            solved = True
             force = wrench @ self._rows
             moved = self._speed(turned + row.response @ change)
             if moved <= QUIET:
-                misfit, off, twist = moved, 0.0 * owed, row.twist
+                misfit = moved
+                off = 0.0 * owed
+                twist = row.twist
                 break
         report = passes, iterations, row.residual[0], misfit, row.converged[0]
         answers = np.concatenate([row.response.ravel(), row.load_response.ravel()])
-        return Asked(row.new, wrench, force, off, axes, twist - owed, load, self._touching, answers, velocity, report)
+        return Asked(
+            row.new,
+            wrench,
+            force,
+            off,
+            axes,
+            twist - owed,
+            load,
+            self._touching,
+            answers,
+            velocity,
+            report,
+        )
 
     def _twists(self, velocity: np.ndarray) -> np.ndarray:
         """Return how far patches move in the step that the shadow took last, per dt: what is held keeps its place."""
@@ -143,7 +189,12 @@ class Asking:
             each.fill(0.0)
 
     def _touch(
-        self, pushes: np.ndarray, bristles: np.ndarray, wrench: np.ndarray, owed: np.ndarray, axes: np.ndarray
+        self,
+        pushes: np.ndarray,
+        bristles: np.ndarray,
+        wrench: np.ndarray,
+        owed: np.ndarray,
+        axes: np.ndarray,
     ) -> bool:
         """Place patches that touch for the first time in this step; return True if there are any.
 
@@ -151,18 +202,26 @@ class Asking:
         """
         if all(self._touching):
             return False
-        new = [p for p, touching in enumerate(self._touching) if not touching and pushes[p, :3].any()]
+        new = [
+            p
+            for p, touching in enumerate(self._touching)
+            if not touching and pushes[p, :3].any()
+        ]
         for p in new:
             one = slice(3 * p, 3 * p + 3)
             placed = self._shadow.rows(p, pushes[p, :3], axes[one])
-            self._rows[one], self._normals[p], self._moments[p], axes[one], turn = placed
+            self._rows[one], self._normals[p], self._moments[p], axes[one], turn = (
+                placed
+            )
             for vectors in (self._coupled.states(bristles)[p], wrench[one], owed[one]):
                 vectors[:2] = np.tensordot(turn, vectors[:2], 1)
             self._touching[p] = True
         if new:
             self._moved, momentum = self._shadow.moved(self._rows)
             self._answer_freely()
-            speeds = self._levers * np.sqrt(self._row.response.diagonal() / self._shadow.dt)
+            speeds = self._levers * np.sqrt(
+                self._row.response.diagonal() / self._shadow.dt
+            )
             self._open = max(MISFIT, RESOLUTION * momentum * speeds.max())
         return bool(new)
 
@@ -176,11 +235,18 @@ class Asking:
         k = len(self._touching)
         if answers[:k].tolist() == self._touching:
             twists, loads = np.split(answers[k:], [9 * k * k])
-            self._row.response[:], self._row.load_response[:] = twists.reshape(3 * k, -1), loads.reshape(k, -1)
+            self._row.response[:], self._row.load_response[:] = (
+                twists.reshape(3 * k, -1),
+                loads.reshape(k, -1),
+            )
 
     def _pressed(self, wrench: np.ndarray) -> np.ndarray:
         """Return values of the patches that touch, and zeros for the others."""
-        return wrench if all(self._touching) else np.where(np.repeat(self._touching, 3), wrench, 0.0)
+        return (
+            wrench
+            if all(self._touching)
+            else np.where(np.repeat(self._touching, 3), wrench, 0.0)
+        )
 
     def _speed(self, twist: np.ndarray, load: np.ndarray | None = None) -> float:
         """Return the size of changes of twists, and of loads in the speed that they could cause [m/s]."""
@@ -197,9 +263,11 @@ class Asking:
         Contacts only stiffen: `A - A_true >= 0`. Where a correction takes all that A has, contacts came or went, or the
         change was too small for Drake's solver.
         """
-        response, load_response = self._row.response, self._row.load_response
+        response = self._row.response
+        load_response = self._row.load_response
         expected = response @ wrench
-        off, along = expected - twist, expected @ wrench
+        off = expected - twist
+        along = expected @ wrench
         load_response += np.outer(load - load_response @ wrench, expected / along)
         gap = off @ wrench
         if 1e-9 * along < gap < (1.0 - STIFFEST) * along:
@@ -213,11 +281,19 @@ class CouplingRow(SimpleNamespace):
     """Arrays of a `coupled.coupling_rows.Problem`, solved in place: a step of Drake has no time for more."""
 
     def __init__(self, coupled: CoupledPatches, shadow: Shadow) -> None:
-        words, k = coupled._blank_problem(shadow.follows), len(coupled.models)
-        super().__init__(**{name: words[0, place] for name, place in coupled._packed.layout.slices.items()})
-        self.response, self.load_response = self.response.reshape(3 * k, 3 * k), self.load_response.reshape(k, 3 * k)
+        words = coupled._blank_problem(shadow.follows)
+        k = len(coupled.models)
+        super().__init__(
+            **{
+                name: words[0, place]
+                for name, place in coupled._packed.layout.slices.items()
+            }
+        )
+        self.response = self.response.reshape(3 * k, 3 * k)
+        self.load_response = self.load_response.reshape(k, 3 * k)
         self.dt[:] = shadow.dt
-        self._coupled, self._words = coupled, words
+        self._coupled = coupled
+        self._words = words
 
     def solve(self) -> int:
         """Fill in `new, wrench, twist, load, residual, converged`; the iterations taken."""
@@ -235,7 +311,10 @@ class CouplingRow(SimpleNamespace):
     def _refuse(self) -> None:
         """Let the public step say what is wrong."""
         k = len(self.free_load)
-        twist, guess = self.free_twist.reshape(k, 3), self.guess.reshape(k, 3)
+        twist = self.free_twist.reshape(k, 3)
+        guess = self.guess.reshape(k, 3)
         moments = self.moments.reshape(k, 2) if self.follows.any() else None
-        host = HostStep(twist, self.free_load, guess, self.response, self.load_response, moments)
+        host = HostStep(
+            twist, self.free_load, guess, self.response, self.load_response, moments
+        )
         self._coupled.step(self.state, host, self.dt[0])

@@ -12,7 +12,12 @@ import numpy as np
 from pydrake.common.value import AbstractValue  # pyright: ignore[reportMissingModuleSource]
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType, ValueProducer
+from pydrake.systems.framework import (
+    DiagramBuilder,
+    LeafSystem,
+    PortDataType,
+    ValueProducer,
+)
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
 
 from planarfriction import validation
@@ -63,7 +68,12 @@ class Friction(LeafSystem):
     pairs with friction of their own.
     """
 
-    def __init__(self, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[PatchContact]) -> None:
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        patches: Iterable[PatchContact],
+    ) -> None:
         super().__init__()
         self.set_name("patch_friction")
         _check(plant, scene_graph)
@@ -75,29 +85,47 @@ class Friction(LeafSystem):
         self._size = plant.num_velocities()
         self._said: set[str] = set()
         self._declare_inputs(plant)
-        k, states = len(self.patches), self.coupled.state_shape[0]
+        k = len(self.patches)
+        states = self.coupled.state_shape[0]
         sizes = {
             "bristles": states, "wrenches": 3 * k, "force": self._size, "owed": 3 * k, "axes": 3 * k, "twists": 3 * k,
             "loads": k, "answers": k * (1 + 12 * k), "velocities": self._size, "report": len(Report._fields),
         }  # fmt: skip
         bounds = np.cumsum([0, *sizes.values()])
-        self._parts = {name: slice(*ends) for name, ends in zip(sizes, itertools.pairwise(bounds), strict=True)}
+        self._parts = {
+            name: slice(*ends)
+            for name, ends in zip(sizes, itertools.pairwise(bounds), strict=True)
+        }
         self.DeclareDiscreteState(int(bounds[-1]))
         producer = ValueProducer(lambda: AbstractValue.Make(()), self._solve)
         tickets = {self.all_input_ports_ticket(), self.xd_ticket()}
         self._solution: Any = self.DeclareCacheEntry("solution", producer, tickets)
-        self.DeclareVectorOutputPort("generalized_force", self._size, self._write_force, {self._solution.ticket()})
+        self.DeclareVectorOutputPort(
+            "generalized_force",
+            self._size,
+            self._write_force,
+            {self._solution.ticket()},
+        )
         for name in ("wrenches", "twists", "loads", "report"):
-            self.DeclareVectorOutputPort(name, sizes[name], self._writer(name), {self.xd_ticket()})
+            self.DeclareVectorOutputPort(
+                name, sizes[name], self._writer(name), {self.xd_ticket()}
+            )
         # Of the same kind as that of the plant: both are then worked out from the state before either.
         if plant.has_sampled_output_ports():
-            self.DeclarePeriodicUnrestrictedUpdateEvent(plant.time_step(), 0.0, self._update)
+            self.DeclarePeriodicUnrestrictedUpdateEvent(
+                plant.time_step(), 0.0, self._update
+            )
         else:
-            self.DeclarePeriodicDiscreteUpdateEvent(plant.time_step(), 0.0, self._update_discrete)
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                plant.time_step(), 0.0, self._update_discrete
+            )
 
     @staticmethod
     def AddToBuilder(
-        builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[PatchContact]
+        builder: DiagramBuilder,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        patches: Iterable[PatchContact],
     ) -> Friction:
         """Add patch friction to a builder and connect it; connect all other inputs of the plant before.
 
@@ -110,16 +138,23 @@ class Friction(LeafSystem):
         friction = Friction(plant, scene_graph, patches)
         sources = _sources(builder, plant)
         if _FORCE in sources and isinstance(sources[_FORCE].get_system(), Friction):
-            raise InvalidValueError("plant", "have no patch friction yet: give all patches in one call", "one with it")
+            raise InvalidValueError(
+                "plant",
+                "have no patch friction yet: give all patches in one call",
+                "one with it",
+            )
         builder.AddSystem(friction)
         builder.Connect(plant.get_state_output_port(), friction.GetInputPort("state"))
         for name in friction._inputs:
-            port, own = plant.GetInputPort(name), friction.GetInputPort(name)
+            port = plant.GetInputPort(name)
+            own = friction.GetInputPort(name)
             if name in sources:
                 builder.Connect(sources[name], own)
                 if name == _FORCE:
                     builder.Disconnect(sources[name], port)
-        builder.Connect(friction.GetOutputPort("generalized_force"), plant.GetInputPort(_FORCE))
+        builder.Connect(
+            friction.GetOutputPort("generalized_force"), plant.GetInputPort(_FORCE)
+        )
         _reserve(builder, plant, sources)
         return friction
 
@@ -131,8 +166,12 @@ class Friction(LeafSystem):
 
     def GetReport(self, context: Any) -> Report:
         """Return the statistics of the last step, from this system's context."""
-        passes, iterations, residual, misfit, surprise, converged = self._read(context, "report").tolist()
-        return Report(int(passes), int(iterations), residual, misfit, surprise, converged > 0.0)
+        passes, iterations, residual, misfit, surprise, converged = self._read(
+            context, "report"
+        ).tolist()
+        return Report(
+            int(passes), int(iterations), residual, misfit, surprise, converged > 0.0
+        )
 
     def get_generalized_force_output_port(self) -> Any:
         """Return the port to connect to the plant: friction plus the generalized forces that others apply `[nv]`."""
@@ -158,7 +197,9 @@ class Friction(LeafSystem):
 
     def _declare_inputs(self, plant: Any) -> None:
         """Declare the inputs: the state of the plant, and all that drives the plant."""
-        self._state: Any = self.DeclareVectorInputPort("state", plant.num_multibody_states())
+        self._state: Any = self.DeclareVectorInputPort(
+            "state", plant.num_multibody_states()
+        )
         self._inputs: dict[str, Any] = {}
         for i in range(plant.num_input_ports()):
             port = plant.get_input_port(i)
@@ -166,7 +207,9 @@ class Friction(LeafSystem):
                 continue
             name = port.get_name()
             if port.get_data_type() == PortDataType.kAbstractValued:
-                self._inputs[name] = self.DeclareAbstractInputPort(name, plant.AllocateInputAbstract(port))
+                self._inputs[name] = self.DeclareAbstractInputPort(
+                    name, plant.AllocateInputAbstract(port)
+                )
             elif port.size():
                 self._inputs[name] = self.DeclareVectorInputPort(name, port.size())
 
@@ -174,23 +217,41 @@ class Friction(LeafSystem):
         return context.get_discrete_state_vector().value()[self._parts[name]]
 
     def _solve(self, context: Any, solution: Any) -> None:
-        state, parts = self._state.Eval(context), self._parts
+        state = self._state.Eval(context)
+        parts = self._parts
         if not math.isfinite(state.sum()):
-            raise InvalidValueError("state", "be finite", f"{state[~np.isfinite(state)][0]} in that of the plant")
+            raise InvalidValueError(
+                "state",
+                "be finite",
+                f"{state[~np.isfinite(state)][0]} in that of the plant",
+            )
         port = self._inputs[_FORCE]
         applied = port.Eval(context) if port.HasValue(context) else np.zeros(self._size)
-        ports = {name: each for name, each in self._inputs.items() if name != _FORCE and each.HasValue(context)}
-        driven = {name: self.EvalAbstractInput(context, each.get_index()) for name, each in ports.items()}
+        ports = {
+            name: each
+            for name, each in self._inputs.items()
+            if name != _FORCE and each.HasValue(context)
+        }
+        driven = {
+            name: self.EvalAbstractInput(context, each.get_index())
+            for name, each in ports.items()
+        }
         self._shadow.begin(state, driven)
         own = context.get_discrete_state_vector().value()
-        before = (own[parts[name]] for name in ("bristles", "wrenches", "force", "owed", "axes", "answers"))
+        before = (
+            own[parts[name]]
+            for name in ("bristles", "wrenches", "force", "owed", "axes", "answers")
+        )
         asked = self._asking.step(applied, *before)
         *report, converged = asked.report
-        surprise, last = self._surprise(state, own), own[parts["report"]][-2]
+        surprise = self._surprise(state, own)
+        last = own[parts["report"]][-2]
         if min(surprise, last) > EXPECTED:
             converged = 0.0
             self._warn(_SURPRISED, _SURPRISED.format(surprise))
-        for placed, touching, fault in zip(self._placed, asked.touching, self._shadow.faults, strict=True):
+        for placed, touching, fault in zip(
+            self._placed, asked.touching, self._shadow.faults, strict=True
+        ):
             if touching and fault:
                 line = placed.misplaced_line(fault)
                 self._warn(line, line)
@@ -207,7 +268,11 @@ class Friction(LeafSystem):
         """Return how far the plant's velocities are from those predicted in the last step; 0 in the first one."""
         if own[self._parts["report"]][0] == 0.0:
             return 0.0
-        return float(abs(state[len(state) - self._size :] - own[self._parts["velocities"]]).max(initial=0.0))
+        return float(
+            abs(state[len(state) - self._size :] - own[self._parts["velocities"]]).max(
+                initial=0.0
+            )
+        )
 
     def _write_force(self, context: Any, output: Any) -> None:
         output.SetFromVector(self._solution.Eval(context)[0])
@@ -228,9 +293,13 @@ def _check(plant: Any, scene_graph: Any) -> None:
     if not plant.is_finalized():
         raise InvalidValueError("plant", "be finalized", "one that is not")
     if plant.time_step() == 0.0:
-        raise InvalidValueError("time_step", "be > 0: friction is for discrete plants", plant.time_step())
+        raise InvalidValueError(
+            "time_step", "be > 0: friction is for discrete plants", plant.time_step()
+        )
     if not plant.geometry_source_is_registered():
-        raise InvalidValueError("plant", "be registered with the scene graph", "one that is not")
+        raise InvalidValueError(
+            "plant", "be registered with the scene graph", "one that is not"
+        )
 
 
 def _sources(builder: Any, plant: Any) -> dict[str, Any]:
@@ -238,11 +307,17 @@ def _sources(builder: Any, plant: Any) -> dict[str, Any]:
     sources = {}
     for (system, index), (source, output) in builder.connection_map().items():
         if system is plant:
-            sources[plant.get_input_port(index).get_name()] = source.get_output_port(output)
+            sources[plant.get_input_port(index).get_name()] = source.get_output_port(
+                output
+            )
     for i in range(plant.num_input_ports()):
         port = plant.get_input_port(i)
         if builder.IsConnectedOrExported(port) and port.get_name() not in sources:
-            raise InvalidValueError("plant", "have no exported input (export that of a PassThrough)", port.get_name())
+            raise InvalidValueError(
+                "plant",
+                "have no exported input (export that of a PassThrough)",
+                port.get_name(),
+            )
     return sources
 
 
@@ -250,7 +325,8 @@ def _reserve(builder: Any, plant: Any, sources: dict[str, Any]) -> None:
     """Connect free inputs to nothing, so that Drake refuses later connections, which would not be seen here."""
     for i in range(plant.num_input_ports()):
         port = plant.get_input_port(i)
-        name, nothing = port.get_name(), None
+        name = port.get_name()
+        nothing = None
         if name == "applied_spatial_force":
             nothing = ConstantValueSource(plant.AllocateInputAbstract(port))
         elif name.endswith("actuation") and port.size():

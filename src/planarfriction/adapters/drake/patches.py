@@ -8,7 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import Capsule, Cylinder, Ellipsoid, GeometryId, ProximityProperties, Role, RoleAssign, Sphere
+from pydrake.geometry import (
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    GeometryId,
+    ProximityProperties,
+    Role,
+    RoleAssign,
+    Sphere,
+)
 from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import BodyIndex, FrameIndex
 
@@ -57,9 +66,19 @@ class PatchContact(Checked):
         validation.instance("model", self.model, FrictionModel, "a friction model")
         validation.text("frame", self.frame)
         names = self.geometries
-        if isinstance(names, str) or not (isinstance(names, Sequence) and len(names) == 2):
-            raise InvalidValueError("geometries", "be the names of two geometries or bodies", self.geometries)
-        self._set(geometries=tuple(validation.text("geometries", name) for name in self.geometries))
+        if isinstance(names, str) or not (
+            isinstance(names, Sequence) and len(names) == 2
+        ):
+            raise InvalidValueError(
+                "geometries",
+                "be the names of two geometries or bodies",
+                self.geometries,
+            )
+        self._set(
+            geometries=tuple(
+                validation.text("geometries", name) for name in self.geometries
+            )
+        )
         validation.choice("centre", self.centre, CENTRES)
         validation.choice("pressure", self.pressure, PRESSURES)
 
@@ -68,29 +87,44 @@ class Placed:
     """A patch found in a plant."""
 
     def __init__(self, plant: Any, scene_graph: Any, patch: PatchContact) -> None:
-        self.patch, self.frame = patch, _frame(plant, patch.frame)
+        self.patch = patch
+        self.frame = _frame(plant, patch.frame)
         sides = [_geometries(plant, scene_graph, name) for name in patch.geometries]
         bodies = [_body_of(plant, scene_graph, side[0]) for side in sides]
         owner = self.frame.body()
         if owner.index() not in [body.index() for body in bodies]:
-            raise InvalidValueError("frame", f"be on the body of one of the geometries {patch.geometries}", patch.frame)
+            raise InvalidValueError(
+                "frame",
+                f"be on the body of one of the geometries {patch.geometries}",
+                patch.frame,
+            )
         if bodies[0].index() == bodies[1].index():
             raise InvalidValueError("geometries", "be on two bodies", patch.geometries)
         own = int(bodies[1].index() == owner.index())
         self.other = bodies[1 - own].body_frame()
-        self.pairs = {(a.get_value(), b.get_value()) for a, b in itertools.product(sides[own], sides[1 - own])}
+        self.pairs = {
+            (a.get_value(), b.get_value())
+            for a, b in itertools.product(sides[own], sides[1 - own])
+        }
         """Pairs of ids of geometries, the owner's first."""
         inspector = scene_graph.model_inspector()
         self._check_friction(inspector, sides)
-        shapes = [inspector.GetShape(side[0]) if len(side) == 1 else None for side in sides]
+        shapes = [
+            inspector.GetShape(side[0]) if len(side) == 1 else None for side in sides
+        ]
         faces = not any(isinstance(shape, _ROUND) for shape in shapes)
-        self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and faces and follows(patch.model))
+        self.follows = patch.pressure == "follows" or (
+            patch.pressure == "auto" and faces and follows(patch.model)
+        )
         """True if the pressure follows the contact forces."""
         self.centre = CENTRES.index(patch.centre)
         """Origin of the patch, one of those of `placing`."""
         self.round = not faces
         self.cylinders = [
-            (body.body_frame(), inspector.GetPoseInFrame(side[0]).rotation().matrix()[:, 2])
+            (
+                body.body_frame(),
+                inspector.GetPoseInFrame(side[0]).rotation().matrix()[:, 2],
+            )
             for body, side, shape in zip(bodies, sides, shapes, strict=True)
             if isinstance(shape, Cylinder)
         ]
@@ -100,21 +134,35 @@ class Placed:
         self.goes = smaller == own
         """True if the patch goes along with the own side over the other, which is larger."""
         self.carrier = bodies[smaller].body_frame()
-        self.middle = np.mean([inspector.GetPoseInFrame(each).translation() for each in sides[smaller]], axis=0)
+        self.middle = np.mean(
+            [inspector.GetPoseInFrame(each).translation() for each in sides[smaller]],
+            axis=0,
+        )
         """Middle of the smaller side in this frame [m]."""
 
     def misplaced_line(self, fault: int) -> str:
         """Return a line about a patch that does not lie in its contact."""
-        return placing.fault_line("frame", self.patch.frame, self.patch.geometries, fault)
+        return placing.fault_line(
+            "frame", self.patch.frame, self.patch.geometries, fault
+        )
 
     def _check_friction(self, inspector: Any, sides: list[list[GeometryId]]) -> None:
         """Refuse pairs with friction of their own, and those that never touch."""
-        pairs, between = list(itertools.product(*sides)), " and ".join(self.patch.geometries)
+        pairs = list(itertools.product(*sides))
+        between = " and ".join(self.patch.geometries)
         if all(inspector.CollisionFiltered(*pair) for pair in pairs):
-            raise InvalidValueError("geometries", "be able to collide (a collision filter keeps them apart)", between)
+            raise InvalidValueError(
+                "geometries",
+                "be able to collide (a collision filter keeps them apart)",
+                between,
+            )
         least = max(min(_friction(inspector, one) for one in pair) for pair in pairs)
         if least > 0.0:
-            raise InvalidValueError("friction", f"be 0 on {between}, on one of the two (prepare does that)", least)
+            raise InvalidValueError(
+                "friction",
+                f"be 0 on {between}, on one of the two (prepare does that)",
+                least,
+            )
 
 
 def prepare(plant: Any, scene_graph: Any, patches: Iterable[PatchContact]) -> None:
@@ -129,24 +177,35 @@ def prepare(plant: Any, scene_graph: Any, patches: Iterable[PatchContact]) -> No
         for geometry in _geometries(plant, scene_graph, patch.geometries[0]):
             properties = ProximityProperties(inspector.GetProximityProperties(geometry))
             properties.UpdateProperty(*_MATERIAL, CoulombFriction(0.0, 0.0))
-            scene_graph.AssignRole(plant.get_source_id(), geometry, properties, RoleAssign.kReplace)
+            scene_graph.AssignRole(
+                plant.get_source_id(), geometry, properties, RoleAssign.kReplace
+            )
 
 
 def checked(patches: Iterable[PatchContact]) -> list[PatchContact]:
     """Raise for what is no patch."""
     if isinstance(patches, PatchContact) or not isinstance(patches, Iterable):
         raise InvalidValueError("patches", "be a list of patches", patches)
-    return [validation.instance("patches", patch, PatchContact, "patches") for patch in patches]
+    return [
+        validation.instance("patches", patch, PatchContact, "patches")
+        for patch in patches
+    ]
 
 
-def found(plant: Any, scene_graph: Any, patches: Iterable[PatchContact]) -> list[Placed]:
+def found(
+    plant: Any, scene_graph: Any, patches: Iterable[PatchContact]
+) -> list[Placed]:
     """Find the patches in a plant; raise for the same pair of geometries twice."""
     placed = [Placed(plant, scene_graph, patch) for patch in checked(patches)]
     if not placed:
         raise InvalidValueError("patches", "hold at least one", "none")
     for one, other in itertools.combinations(placed, 2):
         if one.pairs & ({*other.pairs} | {(b, a) for a, b in other.pairs}):
-            raise InvalidValueError("patches", "have each pair of geometries once", " and ".join(one.patch.geometries))
+            raise InvalidValueError(
+                "patches",
+                "have each pair of geometries once",
+                " and ".join(one.patch.geometries),
+            )
     return placed
 
 
@@ -155,7 +214,12 @@ def found(plant: Any, scene_graph: Any, patches: Iterable[PatchContact]) -> list
 
 def _frame(plant: Any, name: str) -> Any:
     frames = [plant.get_frame(FrameIndex(i)) for i in range(plant.num_frames())]
-    return _one("frame", "frame", {frame.scoped_name().get_full(): frame for frame in frames}, name)
+    return _one(
+        "frame",
+        "frame",
+        {frame.scoped_name().get_full(): frame for frame in frames},
+        name,
+    )
 
 
 def _geometries(plant: Any, scene_graph: Any, name: str) -> list[GeometryId]:
@@ -169,10 +233,17 @@ def _geometries(plant: Any, scene_graph: Any, name: str) -> list[GeometryId]:
     if own:
         return [_one("geometries", "geometry", named, name)]
     bodies = [plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())]
-    body = _one("geometries", "collision geometry or body", {b.scoped_name().get_full(): b for b in bodies}, name)
+    body = _one(
+        "geometries",
+        "collision geometry or body",
+        {b.scoped_name().get_full(): b for b in bodies},
+        name,
+    )
     geometries = plant.GetCollisionGeometriesForBody(body)
     if not geometries:
-        raise InvalidValueError("geometries", "be a body with collision geometries", name)
+        raise InvalidValueError(
+            "geometries", "be a body with collision geometries", name
+        )
     return geometries
 
 
@@ -193,7 +264,10 @@ def _ending(named: dict[str, Any], name: str) -> list[str]:
 def _size(inspector: Any, side: list[GeometryId]) -> float:
     """Return the size of a side: half the diagonal of the box around its largest geometry [m]."""
     boxes = [inspector.GetObbInGeometryFrame(each) for each in side]
-    return max(np.inf if box is None else float(np.linalg.norm(box.half_width())) for box in boxes)
+    return max(
+        np.inf if box is None else float(np.linalg.norm(box.half_width()))
+        for box in boxes
+    )
 
 
 def _body_of(plant: Any, scene_graph: Any, geometry: GeometryId) -> Any:

@@ -26,18 +26,24 @@ class Shadow:
     def __init__(self, plant: Any, scene_graph: Any, placed: Sequence[Placed]) -> None:
         from scipy.linalg.lapack import dposv  # pyright: ignore[reportAttributeAccessIssue]
 
-        self.plant, geometry = _copy("plant", plant), _copy("scene_graph", scene_graph)
+        self.plant = _copy("plant", plant)
+        geometry = _copy("scene_graph", scene_graph)
         builder = DiagramBuilder()
         builder.AddSystem(self.plant)
         builder.AddSystem(geometry)
-        builder.Connect(geometry.get_query_output_port(), self.plant.get_geometry_query_input_port())
+        builder.Connect(
+            geometry.get_query_output_port(), self.plant.get_geometry_query_input_port()
+        )
         poses = geometry.get_source_pose_port(plant.get_source_id())
         builder.Connect(self.plant.get_geometry_pose_output_port(), poses)
         self._diagram = builder.Build()
         self._roots = [self._diagram.CreateDefaultContext() for _ in range(3)]
-        contexts = [self.plant.GetMyMutableContextFromRoot(root) for root in self._roots]
+        contexts = [
+            self.plant.GetMyMutableContextFromRoot(root) for root in self._roots
+        ]
         self._begin, self._end, self._backwards = contexts
-        self._sampled, self.dt = plant.has_sampled_output_ports(), plant.time_step()
+        self._sampled = plant.has_sampled_output_ports()
+        self.dt = plant.time_step()
         self._results = self.plant.get_contact_results_output_port()
         force = self.plant.get_applied_generalized_force_input_port()
         self._force = force.FixValue(self._begin, np.zeros(plant.num_velocities()))
@@ -45,17 +51,23 @@ class Shadow:
         self._frames = [self.plant.get_frame(each.frame.index()) for each in placed]
         self._others = [self.plant.get_frame(each.other.index()) for each in placed]
         self._carriers = [self.plant.get_frame(each.carrier.index()) for each in placed]
-        self._placed, self.follows = placed, [each.follows for each in placed]
+        self._placed = placed
+        self.follows = [each.follows for each in placed]
         self._reaches = [placing.reach_of(each.patch.model.patch) for each in placed]
         self._cylinders = [
-            [(self.plant.get_frame(frame.index()), axis) for frame, axis in each.cylinders] for each in placed
+            [
+                (self.plant.get_frame(frame.index()), axis)
+                for frame, axis in each.cylinders
+            ]
+            for each in placed
         ]
         self.faults = [0] * len(placed)
         """Faults of the places of the patches in the step, as those of `placing`."""
         self._pairs = {}
         for p, each in enumerate(placed):
             for own, other in each.pairs:
-                self._pairs[other, own], self._pairs[own, other] = (p, 1.0), (p, -1.0)
+                self._pairs[other, own] = (p, 1.0)
+                self._pairs[own, other] = (p, -1.0)
         self._solve = dposv  # the one of NumPy takes as long as a contact
         self._world = self.plant.world_frame()
         self._seen: list[Any] = [None] * len(placed)
@@ -74,9 +86,13 @@ class Shadow:
         """Return the velocities at the end of a step with generalized forces `[nv]`."""
         self._force.GetMutableData().get_mutable_value().SetFromVector(force)
         if self._sampled:
-            self.plant.CalcForcedUnrestrictedUpdate(self._begin, self._end.get_mutable_state())
+            self.plant.CalcForcedUnrestrictedUpdate(
+                self._begin, self._end.get_mutable_state()
+            )
         else:
-            self.plant.CalcForcedDiscreteVariableUpdate(self._begin, self._end.get_mutable_discrete_state())
+            self.plant.CalcForcedDiscreteVariableUpdate(
+                self._begin, self._end.get_mutable_discrete_state()
+            )
         return self.plant.GetVelocities(self._end)
 
     def pushes(self, *, first: bool) -> np.ndarray:
@@ -92,15 +108,20 @@ class Shadow:
         forces = [[0.0] * 6 for _ in self._frames]
         for i, p, sign in self._points:
             info = results.point_pair_contact_info(i)
-            force, place = info.contact_force().tolist(), info.contact_point().tolist()
+            force = info.contact_force().tolist()
+            place = info.contact_point().tolist()
             self._pressed[p].append((math.hypot(*force), place))
             _add(forces[p], sign, force, _cross(place, force))
         for i, p, sign in self._surfaces:
             info = results.hydroelastic_contact_info(i)
-            spatial, place = info.F_Ac_W(), info.contact_surface().centroid().tolist()
-            force, moment = spatial.translational().tolist(), spatial.rotational().tolist()
+            spatial = info.F_Ac_W()
+            place = info.contact_surface().centroid().tolist()
+            force = spatial.translational().tolist()
+            moment = spatial.rotational().tolist()
             self._pressed[p].append((math.hypot(*force), place))
-            _add(forces[p], -sign, force, map(operator.add, moment, _cross(place, force)))
+            _add(
+                forces[p], -sign, force, map(operator.add, moment, _cross(place, force))
+            )
         return np.array(forces)
 
     def rows(self, p: int, force: np.ndarray, before: np.ndarray) -> tuple[Any, ...]:
@@ -111,28 +132,67 @@ class Shadow:
         the last step, carried along, to these.
         """
         pose = self._frames[p].CalcPoseInWorld(self._begin)
-        turned, site, middle = pose.rotation().matrix(), pose.translation(), self._centre(p)
-        normal, centre = _unit(force.tolist()), self._placed[p].centre
+        turned = pose.rotation().matrix()
+        site = pose.translation()
+        middle = self._centre(p)
+        normal = _unit(force.tolist())
+        centre = self._placed[p].centre
         curved = self._placed[p].round or any(
-            placing.across(frame.CalcRotationMatrixInWorld(self._begin).matrix() @ axis, normal) > placing.CURVED
+            placing.across(
+                frame.CalcRotationMatrixInWorld(self._begin).matrix() @ axis, normal
+            )
+            > placing.CURVED
             for frame, axis in self._cylinders[p]
         )
         at_contact = centre == placing.AT_CONTACT or (centre == placing.AUTO and curved)
-        place = middle if at_contact else list(placing.onto_plane(site.tolist(), middle, normal))
+        place = (
+            middle
+            if at_contact
+            else list(placing.onto_plane(site.tolist(), middle, normal))
+        )
         origin = turned.T @ (place - site)
         last = _across((turned @ before).tolist(), normal)
         x, last = _axis(turned[:, 0].tolist(), turned[:, 1].tolist(), last, normal)
         y = _cross(normal, x)
-        c, s = _dot(last, x), _dot(last, y)
+        c = _dot(last, x)
+        s = _dot(last, y)
         away = list(map(operator.sub, middle, place))
-        beyond = max(placing.excess(_dot(x, away), _dot(y, away), 1.0, self._reaches[p])) > 0.0
-        upright = not curved and placing.across(turned[:, 0], normal) < placing.MARGIN**2
-        self.faults[p] = placing.BEYOND if beyond and not at_contact else placing.ALONG_X if upright else 0
-        measured = JacobianWrtVariable.kV, self._frames[p], origin, self._others[p], self._world
+        beyond = (
+            max(placing.excess(_dot(x, away), _dot(y, away), 1.0, self._reaches[p]))
+            > 0.0
+        )
+        upright = (
+            not curved and placing.across(turned[:, 0], normal) < placing.MARGIN**2
+        )
+        self.faults[p] = (
+            placing.BEYOND
+            if beyond and not at_contact
+            else placing.ALONG_X
+            if upright
+            else 0
+        )
+        measured = (
+            JacobianWrtVariable.kV,
+            self._frames[p],
+            origin,
+            self._others[p],
+            self._world,
+        )
         spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
-        seen = np.array([[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]])
-        self._seen[p] = seen, [self._place(each[p], place) for each in (self._frames, self._others)]
-        return seen @ spatial, normal, [[*_cross(place, x), *x], [*_cross(place, y), *y]], x @ turned, ((c, -s), (s, c))
+        seen = np.array(
+            [[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]]
+        )
+        self._seen[p] = (
+            seen,
+            [self._place(each[p], place) for each in (self._frames, self._others)],
+        )
+        return (
+            seen @ spatial,
+            normal,
+            [[*_cross(place, x), *x], [*_cross(place, y), *y]],
+            x @ turned,
+            ((c, -s), (s, c)),
+        )
 
     def bends(self, patches: Iterable[int]) -> list[np.ndarray]:
         """Return what patches have moved in the step taken last, per dt, beyond their twists at its velocities `[3]`.
@@ -144,17 +204,25 @@ class Shadow:
         The contact moves on, and its normal turns (see `placing.bend`).
         """
         now = self.plant.GetPositions(self._begin)
-        self.plant.SetPositions(self._backwards, 2.0 * now - self.plant.GetPositions(self._end))
+        self.plant.SetPositions(
+            self._backwards, 2.0 * now - self.plant.GetPositions(self._end)
+        )
         return [self._bend(p) for p in patches]
 
     def _bend(self, p: int) -> np.ndarray:
         seen, places = self._seen[p]
         (own, own_back), (other, other_back) = map(self._moves, places)
-        away, normal, placed = own - other, seen[2, :3], self._placed[p]
-        ends, begins = (self._carriers[p].CalcPoseInWorld(each) @ placed.middle for each in (self._end, self._begin))
+        away = own - other
+        normal = seen[2, :3]
+        placed = self._placed[p]
+        ends, begins = (
+            self._carriers[p].CalcPoseInWorld(each) @ placed.middle
+            for each in (self._end, self._begin)
+        )
         over = (own if placed.goes else other)[3:] - (ends - begins)
         bend = 0.5 * (away + own_back - other_back)
-        both, apart = (own + other)[:3], float(normal @ away[3:])
+        both = (own + other)[:3]
+        apart = float(normal @ away[3:])
         given = (each.tolist() for each in (over, away[:3], both, normal))
         bend[3:] += placing.bend(*given, apart, 1.0)
         return seen @ bend / self.dt
@@ -171,15 +239,23 @@ class Shadow:
         if at is None:
             return [np.zeros(6), np.zeros(6)]
         frame, place, point, turned = at
-        poses = [frame.CalcPoseInWorld(context) for context in (self._end, self._backwards)]
-        return [np.array([*_vector(pose.rotation().matrix() @ turned), *(pose @ point - place)]) for pose in poses]
+        poses = [
+            frame.CalcPoseInWorld(context) for context in (self._end, self._backwards)
+        ]
+        return [
+            np.array(
+                [*_vector(pose.rotation().matrix() @ turned), *(pose @ point - place)]
+            )
+            for pose in poses
+        ]
 
     def moved(self, jacobian: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`.
 
         With the size of the momentum as Drake's solver weighs it, `sqrt(v'Mv)` [sqrt(J)].
         """
-        metric, velocity = self.plant.CalcMassMatrix(self._begin), self.plant.GetVelocities(self._begin)
+        metric = self.plant.CalcMassMatrix(self._begin)
+        velocity = self.plant.GetVelocities(self._begin)
         momentum = math.sqrt(velocity @ metric @ velocity)
         metric.flat[:: len(metric) + 1] += self._damping
         _, found, _ = self._solve(metric, jacobian.T)
@@ -192,7 +268,8 @@ class Shadow:
 
     def _find(self, results: Any) -> None:
         """Return the contacts of the patches, and their signs: 1 where the owner is Drake's second body."""
-        self._points, self._surfaces = [], []
+        self._points = []
+        self._surfaces = []
         for i in range(results.num_point_pair_contacts()):
             pair = results.point_pair_contact_info(i).point_pair()
             key = self._pairs.get((pair.id_A.get_value(), pair.id_B.get_value()))
@@ -200,21 +277,27 @@ class Shadow:
                 self._points.append((i, *key))
         for i in range(results.num_hydroelastic_contacts()):
             surface = results.hydroelastic_contact_info(i).contact_surface()
-            key = self._pairs.get((surface.id_M().get_value(), surface.id_N().get_value()))
+            key = self._pairs.get(
+                (surface.id_M().get_value(), surface.id_N().get_value())
+            )
             if key is not None:
                 self._surfaces.append((i, *key))
 
     def _centre(self, p: int) -> list[float]:
         """Return the centre of the contacts of a patch, weighted by their forces."""
         total = sum(force for force, _ in self._pressed[p])
-        return [sum(force * place[i] for force, place in self._pressed[p]) / total for i in range(3)]
+        return [
+            sum(force * place[i] for force, place in self._pressed[p]) / total
+            for i in range(3)
+        ]
 
 
 # NumPy's own functions of three numbers take as long as a contact.
 
 
 def _cross(one: Sequence[float], other: Sequence[float]) -> list[float]:
-    (a, b, c), (d, e, f) = one, other
+    (a, b, c) = one
+    (d, e, f) = other
     return [b * f - c * e, c * d - a * f, a * e - b * d]
 
 
@@ -233,7 +316,9 @@ def _across(vector: Sequence[float], normal: Sequence[float]) -> list[float]:
     return [a - along * b for a, b in zip(vector, normal, strict=True)]
 
 
-def _axis(x: list[float], y: list[float], last: list[float], normal: list[float]) -> tuple[list[float], list[float]]:
+def _axis(
+    x: list[float], y: list[float], last: list[float], normal: list[float]
+) -> tuple[list[float], list[float]]:
     """Return the x axis of a patch, and its last one carried along (see `adapters.mujoco.loops.geometry`)."""
     x = _across(x, normal)
     flat = _dot(x, x)
@@ -250,7 +335,9 @@ def _unit(vector: Sequence[float]) -> list[float]:
     return [each / size for each in vector]
 
 
-def _add(total: list[float], sign: float, force: Sequence[float], moment: Iterable[float]) -> None:
+def _add(
+    total: list[float], sign: float, force: Sequence[float], moment: Iterable[float]
+) -> None:
     """Add a force and its moment to a total of six numbers, in place."""
     for i, each in enumerate((*force, *moment)):
         total[i] += sign * each
@@ -263,7 +350,9 @@ def _damping(plant: Any) -> np.ndarray:
         joint = plant.get_joint(index)
         if joint.num_velocities():
             first = joint.velocity_start()
-            damping[first : first + joint.num_velocities()] = joint.default_damping_vector()
+            damping[first : first + joint.num_velocities()] = (
+                joint.default_damping_vector()
+            )
     return damping
 
 
@@ -271,4 +360,6 @@ def _copy(name: str, system: Any) -> Any:
     try:
         return system.Clone()
     except RuntimeError as error:
-        raise InvalidValueError(name, "be one that Drake can clone", str(error).splitlines()[0]) from None
+        raise InvalidValueError(
+            name, "be one that Drake can clone", str(error).splitlines()[0]
+        ) from None

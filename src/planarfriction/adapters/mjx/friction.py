@@ -120,26 +120,61 @@ class Friction:
         known = list({id(patch.model): patch.model for patch in patches}.values())
         self.models: tuple[FrictionPytree, ...] = tuple(map(_in_jax, known))
         at = memory(patches, m.nv, m.nuserdata)
-        which = tuple(next(i for i, model in enumerate(known) if model is patch.model) for patch in patches)
+        which = tuple(
+            next(i for i, model in enumerate(known) if model is patch.model)
+            for patch in patches
+        )
         radius = np.array([lever_of(patch.model) for patch in patches])
         shapes = tuple(self.models[i].state_shape for i in which)
         follows = tuple(each.follows for each in placed)
-        numbers = {name: view.copy() for name, view in parameters_in(m, place_of_parameters(m), len(patches)).items()}
-        made = zip(numbers, np.array([defaults(patch.model.law) for patch in patches]).T, strict=True)
-        changed = {name: jnp.asarray(numbers[name]) for name, own in made if (numbers[name] != own).any()}
+        numbers = {
+            name: view.copy()
+            for name, view in parameters_in(
+                m, place_of_parameters(m), len(patches)
+            ).items()
+        }
+        made = zip(
+            numbers,
+            np.array([defaults(patch.model.law) for patch in patches]).T,
+            strict=True,
+        )
+        changed = {
+            name: jnp.asarray(numbers[name])
+            for name, own in made
+            if (numbers[name] != own).any()
+        }
         self.parameters: dict[str, jax.Array] = changed
-        columns = (np.array([getattr(each, name) for each in placed]) for name in responses.PatchPlaces._fields[:8])
+        columns = (
+            np.array([getattr(each, name) for each in placed])
+            for name in responses.PatchPlaces._fields[:8]
+        )
         reach = np.array([placing.reach_of(patch.model.patch) for patch in patches])
-        places = responses.PatchPlaces(*columns, reach, radius, surface_velocities(m, placed))
-        self._fixed = _Fixed(placed, set(), places, which, follows, shapes, at, m.nuserdata, check(numbers))
+        places = responses.PatchPlaces(
+            *columns, reach, radius, surface_velocities(m, placed)
+        )
+        self._fixed = _Fixed(
+            placed,
+            set(),
+            places,
+            which,
+            follows,
+            shapes,
+            at,
+            m.nuserdata,
+            check(numbers),
+        )
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """Return the same patches with other models, which must be of the same kinds in the same order.
 
         Raises InvalidValueError for models of other kinds.
         """
-        kinds, given = ([type(model).__name__ for model in each] for each in (self.models, models))
-        if given != kinds or not all(isinstance(model, FrictionPytree) for model in models):
+        kinds, given = (
+            [type(model).__name__ for model in each] for each in (self.models, models)
+        )
+        if given != kinds or not all(
+            isinstance(model, FrictionPytree) for model in models
+        ):
             rule = f"be models of planarfriction.jax: {', '.join(kinds)}"
             raise InvalidValueError("models", rule, ", ".join(given))
         return self.tree_unflatten(self._fixed, (tuple(models), self.parameters))
@@ -158,10 +193,22 @@ class Friction:
         given = {name: jnp.asarray(value) for name, value in parameters.items()}
         for name, value in given.items():
             if value.shape not in ((), (k,)):
-                raise InvalidValueError(name, f"be a number or have shape [{k}]: see jax.vmap", list(value.shape))
+                raise InvalidValueError(
+                    name,
+                    f"be a number or have shape [{k}]: see jax.vmap",
+                    list(value.shape),
+                )
         held = {**self._fixed.numbers, **self.parameters, **given}
-        check({name: np.asarray(value) for name, value in held.items() if not isinstance(value, jax.core.Tracer)})
-        return self.tree_unflatten(self._fixed, (self.models, {**self.parameters, **given}))
+        check(
+            {
+                name: np.asarray(value)
+                for name, value in held.items()
+                if not isinstance(value, jax.core.Tracer)
+            }
+        )
+        return self.tree_unflatten(
+            self._fixed, (self.models, {**self.parameters, **given})
+        )
 
     def tree_flatten(self) -> tuple[Any, _Fixed]:
         """Take the pytree apart (called by JAX)."""
@@ -171,17 +218,22 @@ class Friction:
     def tree_unflatten(cls, fixed: _Fixed, leaves) -> Self:
         """Rebuild the pytree (called by JAX)."""
         friction = object.__new__(cls)
-        friction._fixed, (friction.models, friction.parameters) = fixed, leaves
+        friction._fixed = fixed
+        (friction.models, friction.parameters) = leaves
         return friction
 
     # ------------------------------------------------------------------ what the data hold
 
     def states(self, d: Any) -> list[jax.Array]:
         """Return the state of each patch at the current time of the data."""
-        at, sizes = self._fixed.memory, [math.prod(shape) for shape in self._fixed.shapes]
+        at = self._fixed.memory
+        sizes = [math.prod(shape) for shape in self._fixed.shapes]
         flat = self._now(d, at.after, at.state, sum(sizes))
         parts = jnp.split(flat, np.cumsum(sizes)[:-1], axis=-1)
-        return [z.reshape(*z.shape[:-1], *shape) for z, shape in zip(parts, self._fixed.shapes, strict=True)]
+        return [
+            z.reshape(*z.shape[:-1], *shape)
+            for z, shape in zip(parts, self._fixed.shapes, strict=True)
+        ]
 
     def wrenches(self, d: Any) -> jax.Array:
         """Return the wrenches of the last step on the sites' bodies, in the patches' frames `[k, 3]` [N, N, N m]."""
@@ -198,9 +250,12 @@ class Friction:
     def report(self, d: Any) -> Report:
         """Return the statistics of the last step."""
         self._warn(d)
-        at, u = self._fixed.memory, d.userdata
+        at = self._fixed.memory
+        u = d.userdata
         converged = u[..., at.converged] > 0.0
-        return Report(u[..., at.iterations], u[..., at.passes], u[..., at.residual], converged)
+        return Report(
+            u[..., at.iterations], u[..., at.passes], u[..., at.residual], converged
+        )
 
     def misplaced(self, d: Any) -> str | None:
         """Return a line about a patch that did not lie in its contact in the last step, None if all did.
@@ -208,7 +263,9 @@ class Friction:
         It is that of any environment; see `planarfriction.adapters.mujoco`. What is read from data outside of compiled
         functions, and steps outside of them, warn of it once.
         """
-        return misplaced_line(self._fixed.placed, int(d.userdata[..., self._fixed.memory.misplaced].max()))
+        return misplaced_line(
+            self._fixed.placed, int(d.userdata[..., self._fixed.memory.misplaced].max())
+        )
 
     def _warn(self, d: Any) -> None:
         """Warn, once, of a patch that did not lie in its contact, where data can be read."""
@@ -220,17 +277,23 @@ class Friction:
     def reset(self, d: Any) -> Any:
         """Return the data with all bristles relaxed."""
         at = self._fixed.memory
-        return d.replace(userdata=d.userdata.at[..., at.before : at.converged + 1].set(0.0))
+        return d.replace(
+            userdata=d.userdata.at[..., at.before : at.converged + 1].set(0.0)
+        )
 
     def _each(self, d: Any, first: int, count: int) -> jax.Array:
         self._warn(d)
         k = len(self._fixed.which)
-        return d.userdata[..., first : first + count * k].reshape(*d.userdata.shape[:-1], k, count)
+        return d.userdata[..., first : first + count * k].reshape(
+            *d.userdata.shape[:-1], k, count
+        )
 
     def _now(self, d: Any, after: int, before: int, count: int) -> jax.Array:
         """Return values at the time of the data: those of the end of the last step, or of its beginning, else zeros."""
-        at, u = self._fixed.memory, d.userdata
-        ends, begins = d.time == u[..., at.next], d.time == u[..., at.time]
+        at = self._fixed.memory
+        u = d.userdata
+        ends = d.time == u[..., at.next]
+        begins = d.time == u[..., at.time]
         begun = jnp.where(begins[..., None], u[..., before : before + count], 0.0)
         return jnp.where(ends[..., None], u[..., after : after + count], begun)
 
@@ -243,32 +306,66 @@ class Friction:
         and data without their user data.
         """
         self._check_inputs(m, d)
-        given, dt, at = d, m.opt.timestep, self._fixed.memory
-        states, guess = self.states(d), self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
-        held = self._now(d, at.centre, at.held, 3 * len(self._fixed.which)).reshape(-1, 3)
-        before = self._now(d, at.axis, at.before, 3 * len(self._fixed.which)).reshape(-1, 3)
+        given = d
+        dt = m.opt.timestep
+        at = self._fixed.memory
+        states = self.states(d)
+        guess = self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
+        held = self._now(d, at.centre, at.held, 3 * len(self._fixed.which)).reshape(
+            -1, 3
+        )
+        before = self._now(d, at.axis, at.before, 3 * len(self._fixed.which)).reshape(
+            -1, 3
+        )
         own = self._own()
-        d, begun = _moved(m, d), states
+        d = _moved(m, d)
+        begun = states
         where = responses.geometry(m, d, self._fixed.places, held, before)
         states = [where.carry(p, each) for p, each in enumerate(begun)]
-        guess = jnp.stack([where.carry(p, each) for p, each in enumerate(guess.reshape(-1, 3))])
+        guess = jnp.stack(
+            [where.carry(p, each) for p, each in enumerate(guess.reshape(-1, 3))]
+        )
         guess = wrench_from(xp, guess, own.displaced).ravel()
         guess = jnp.where(jnp.repeat(where.touching, 3), guess, 0.0)
         found = self._search(*jax.lax.stop_gradient((own, m, d, where, states, guess)))
         answer = responses.answer(m, d, where, found.active)
-        centre = where.centres(answer.forces(d, guess))  # that of the search, with its derivatives
-        shift, pressed = self._pressed(own, where, found.centre + centre - jax.lax.stop_gradient(centre))
+        centre = where.centres(
+            answer.forces(d, guess)
+        )  # that of the search, with its derivatives
+        shift, pressed = self._pressed(
+            own, where, found.centre + centre - jax.lax.stop_gradient(centre)
+        )
         unit = self._unit(own, pressed, shift, states, dt)
         wrench = newton.fitting(unit, answer.host, found.wrench)
-        twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
+        twist = answer.host.twists(wrench)
+        load = answer.host.loads(wrench)
         new, _ = self._evaluate(own, pressed, shift, states, twist, load, dt)
         d = self._integrated(m, d, where.jacobian, wrench, answer)
-        kept = {"state": begun, "after": new, "guess": guess, "load": load, "held": held, "centre": where.moved(shift)}
+        kept = {
+            "state": begun,
+            "after": new,
+            "guess": guess,
+            "load": load,
+            "held": held,
+            "centre": where.moved(shift),
+        }
         kept |= {"before": before, "axis": where.axes[:, 0]}
-        kept |= {"misplaced": where.misplaced(load, found.centre - own.displaced, own.scale, self._fixed.places.reach)}
+        kept |= {
+            "misplaced": where.misplaced(
+                load, found.centre - own.displaced, own.scale, self._fixed.places.reach
+            )
+        }
         shift = shift + own.displaced
-        kept |= {"wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift), "twist": twist_at(xp, twist, shift)}
-        kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
+        kept |= {
+            "wrench": wrench_from(xp, wrench.reshape(-1, 3), -shift),
+            "twist": twist_at(xp, twist, shift),
+        }
+        kept |= {
+            "time": given.time,
+            "next": d.time,
+            "iterations": found.iterations,
+            "passes": found.passes,
+        }
         holds = found.slack <= SLACK[found.slack.dtype.name]
         kept |= {"residual": found.residual, "converged": found.converged & holds}
         d = d.replace(userdata=self._written(d.userdata, kept))
@@ -279,7 +376,9 @@ class Friction:
     def _check_inputs(self, m: Any, d: Any) -> None:
         """Refuse models and data that a step cannot take."""
         if m.impl != mjx.Impl.JAX:
-            raise InvalidValueError("impl", "be JAX's: mjx.put_model(m, impl='jax')", m.impl.value)
+            raise InvalidValueError(
+                "impl", "be JAX's: mjx.put_model(m, impl='jax')", m.impl.value
+            )
         if d.qpos.dtype != jnp.result_type(float):
             rule = f"be {jnp.result_type(float)}, that of JAX (see jax_enable_x64)"
             raise InvalidValueError("precision", rule, f"data of {d.qpos.dtype}")
@@ -290,40 +389,86 @@ class Friction:
 
     def _own(self) -> _Own:
         """Return the friction of the environment."""
-        k, models = len(self._fixed.which), []
-        values = {name: jnp.broadcast_to(value, (k,)) for name, value in self.parameters.items()}
+        k = len(self._fixed.which)
+        models = []
+        values = {
+            name: jnp.broadcast_to(value, (k,))
+            for name, value in self.parameters.items()
+        }
         for number, _, own in self._groups():
-            model, law = self.models[number], self.models[number].parameters
-            changed = {name: values[name][np.array(own)] for name in LAW if name in values and name in law._fields}
-            models.append(model.replace(parameters=law._replace(**changed)) if changed else model)
-        scale, *centre = (values.get(name, jnp.full(k, own)) for name, own in SHAPE.items())
+            model = self.models[number]
+            law = self.models[number].parameters
+            changed = {
+                name: values[name][np.array(own)]
+                for name in LAW
+                if name in values and name in law._fields
+            }
+            models.append(
+                model.replace(parameters=law._replace(**changed)) if changed else model
+            )
+        scale, *centre = (
+            values.get(name, jnp.full(k, own)) for name, own in SHAPE.items()
+        )
         return _Own(models, scale, jnp.stack(centre, axis=1))
 
-    def _search(self, own: _Own, m, d, where: responses.Geometry, states, guess) -> _Search:
+    def _search(
+        self, own: _Own, m, d, where: responses.Geometry, states, guess
+    ) -> _Search:
         """Find the constraints that are active in the end, and the wrenches, without derivatives."""
-        applied, dt, radius = d.qfrc_applied, m.opt.timestep, own.scale * self._fixed.places.radius
+        applied = d.qfrc_applied
+        dt = m.opt.timestep
+        radius = own.scale * self._fixed.places.radius
 
         def body(last: _Search) -> _Search:
-            pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + last.wrench @ where.jacobian))
-            active = responses.active_rows(mjx.solve(m, pushed.replace(qacc_warmstart=last.acceleration)))
+            pushed = mjx.fwd_acceleration(
+                m, d.replace(qfrc_applied=applied + last.wrench @ where.jacobian)
+            )
+            active = responses.active_rows(
+                mjx.solve(m, pushed.replace(qacc_warmstart=last.acceleration))
+            )
             answer = responses.answer(m, d, where, active)
-            centre = jnp.where(last.passes == 0, where.centres(answer.forces(d, last.wrench)), last.centre)
+            centre = jnp.where(
+                last.passes == 0,
+                where.centres(answer.forces(d, last.wrench)),
+                last.centre,
+            )
             shift, pressed = self._pressed(own, where, centre)
             unit = self._unit(own, pressed, shift, states, dt)
-            solved = newton.solve(unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS)
+            solved = newton.solve(
+                unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS
+            )
             acceleration = answer.acceleration(solved.wrench)
-            slack = responses.slack(d, active, responses.active_at(d, acceleration), acceleration, dt)
-            iterations, passes = last.iterations + solved.iterations, last.passes + 1
+            slack = responses.slack(
+                d, active, responses.active_at(d, acceleration), acceleration, dt
+            )
+            iterations = last.iterations + solved.iterations
+            passes = last.passes + 1
             ends = solved.residual, solved.converged, slack
-            return _Search(active, solved.wrench, centre, acceleration, iterations, passes, *ends)
+            return _Search(
+                active, solved.wrench, centre, acceleration, iterations, passes, *ends
+            )
 
         def unsettled(last: _Search) -> jax.Array:
-            return (last.passes == 0) | ((last.slack > SLACK[last.slack.dtype.name]) & (last.passes < PASSES))
+            return (last.passes == 0) | (
+                (last.slack > SLACK[last.slack.dtype.name]) & (last.passes < PASSES)
+            )
 
-        none, zero, count = jnp.zeros(where.rows.shape[1]), jnp.asarray(0.0), jnp.asarray(0)
+        none = jnp.zeros(where.rows.shape[1])
+        zero = jnp.asarray(0.0)
+        count = jnp.asarray(0)
         active = responses.Active(none > 0.0, none)
         middle = jnp.zeros((len(where.rows), 2))
-        start = _Search(active, guess, middle, d.qacc_warmstart, count, count, zero, zero > 0.0, zero)
+        start = _Search(
+            active,
+            guess,
+            middle,
+            d.qacc_warmstart,
+            count,
+            count,
+            zero,
+            zero > 0.0,
+            zero,
+        )
         return jax.lax.while_loop(unsettled, body, start)
 
     def _groups(self) -> Iterator[tuple[int, bool, list[int]]]:
@@ -332,12 +477,17 @@ class Friction:
         for kind in dict.fromkeys(kinds):
             yield *kind, [p for p, each in enumerate(kinds) if each == kind]
 
-    def _pressed(self, own: _Own, where: responses.Geometry, centre: jax.Array) -> tuple[jax.Array, list[Any]]:
+    def _pressed(
+        self, own: _Own, where: responses.Geometry, centre: jax.Array
+    ) -> tuple[jax.Array, list[Any]]:
         """Return displacements towards centres `[k, 2]`, and each group's model that presses there, None if fixed."""
         shift = where.share[:, None] * centre
         rest = (centre - shift - own.displaced) / own.scale[:, None]
         groups = zip(self._groups(), own.models, strict=True)
-        return shift, [model.pressed(rest[np.array(at)]) if follow else None for (_, follow, at), model in groups]
+        return shift, [
+            model.pressed(rest[np.array(at)]) if follow else None
+            for (_, follow, at), model in groups
+        ]
 
     def _unit(self, own: _Own, pressed, shift, states, dt) -> newton.Unit:
         """Return the friction of steps, per unit load; that of a fixed stiffness depends on the loads."""
@@ -345,38 +495,62 @@ class Friction:
 
         def wrench(twist, load):
             load = jnp.maximum(load, LIGHTEST) if by_load else jnp.ones_like(load)
-            return self._evaluate(own, pressed, shift, states, twist, load, dt)[1] / load[:, None]
+            return (
+                self._evaluate(own, pressed, shift, states, twist, load, dt)[1]
+                / load[:, None]
+            )
 
         return newton.Unit(wrench, by_load)
 
-    def _evaluate(self, own: _Own, pressed, shift, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
+    def _evaluate(
+        self, own: _Own, pressed, shift, states, twist, load, dt
+    ) -> tuple[list[jax.Array], jax.Array]:
         """Return the new states and wrenches of steps; patches of the same model side by side."""
-        shift, resize = shift + own.displaced, jnp.ones((len(states), 3)).at[:, 2].set(own.scale)
+        shift = shift + own.displaced
+        resize = jnp.ones((len(states), 3)).at[:, 2].set(own.scale)
         twist = resize * twist_at(xp, twist, shift)
-        new, wrenches = [jnp.empty(0)] * len(states), [jnp.empty(0)] * len(states)
-        for (_, _, at), model, followed in zip(self._groups(), own.models, pressed, strict=True):
+        new = [jnp.empty(0)] * len(states)
+        wrenches = [jnp.empty(0)] * len(states)
+        for (_, _, at), model, followed in zip(
+            self._groups(), own.models, pressed, strict=True
+        ):
             index = np.array(at)
             given = jnp.stack([states[p] for p in at]), twist[index], load[index], dt
-            after, wrench = model.step(*given) if followed is None else model.step_pressed(followed, *given)
+            after, wrench = (
+                model.step(*given)
+                if followed is None
+                else model.step_pressed(followed, *given)
+            )
             for i, p in enumerate(at):
-                new[p], wrenches[p] = after[i], wrench[i]
+                new[p] = after[i]
+                wrenches[p] = wrench[i]
         return new, wrench_from(xp, resize * jnp.stack(wrenches), shift)
 
-    def _integrated(self, m, d, jacobian, wrench, answer: responses.WrenchResponse) -> Any:
+    def _integrated(
+        self, m, d, jacobian, wrench, answer: responses.WrenchResponse
+    ) -> Any:
         """Return the data after the step, with the forces of the user as they were."""
         applied = d.qfrc_applied
         d = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + wrench @ jacobian))
         force = answer.forces(d, wrench)
-        d = d.replace(qacc=answer.acceleration(wrench), qfrc_constraint=force @ d._impl.efc_J)
+        d = d.replace(
+            qacc=answer.acceleration(wrench), qfrc_constraint=force @ d._impl.efc_J
+        )
         d = mjx.sensor_acc(m, d.tree_replace({"_impl.efc_force": force}))
         return responses.integrate(m, d).replace(qfrc_applied=applied)
 
     def _written(self, userdata: jax.Array, kept: dict[str, Any]) -> jax.Array:
         """Return the user data with the memory for the next step and the results for users."""
         for name, value in kept.items():
-            flat = jnp.concatenate([jnp.ravel(each) for each in value]) if isinstance(value, list) else jnp.ravel(value)
+            flat = (
+                jnp.concatenate([jnp.ravel(each) for each in value])
+                if isinstance(value, list)
+                else jnp.ravel(value)
+            )
             first = getattr(self._fixed.memory, name)
-            userdata = userdata.at[first : first + len(flat)].set(flat.astype(userdata.dtype))
+            userdata = userdata.at[first : first + len(flat)].set(
+                flat.astype(userdata.dtype)
+            )
         return userdata
 
 
@@ -390,11 +564,15 @@ def _moved(m: Any, d: Any) -> Any:
 def _in_jax(model: models.FrictionModel) -> FrictionPytree:
     """Return the JAX form of a model of NumPy."""
     if model.depends_on_load:
-        rule = "have a shape that does not change with the load: models of JAX keep theirs"
+        rule = (
+            "have a shape that does not change with the load: models of JAX keep theirs"
+        )
         raise InvalidValueError("model", rule, type(model).__name__)
     model = model.reduction
     if isinstance(model, models.ReducedModelPublished):
         return ReducedModelPublished(model.patch, model.law, model.surface)
     if isinstance(model, models.DistributedModel):
         return DistributedModel(model.patch, model.law)
-    raise InvalidValueError("model", "be one that planarfriction.jax has", type(model).__name__)
+    raise InvalidValueError(
+        "model", "be one that planarfriction.jax has", type(model).__name__
+    )

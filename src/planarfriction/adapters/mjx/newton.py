@@ -13,7 +13,13 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from planarfriction._engine.coupled.coupling import DOWNHILL, JOINT, ROUND, ROUNDING, SHORTENINGS
+from planarfriction._engine.coupled.coupling import (
+    DOWNHILL,
+    JOINT,
+    ROUND,
+    ROUNDING,
+    SHORTENINGS,
+)
 
 _GUESS, _REST, _SEARCH = range(3)
 """Kinds of evaluation: the twists that the guess causes, twists at rest, or a point along a Newton step."""
@@ -118,8 +124,14 @@ class _Search(NamedTuple):
             return jax.jvp(self.unit.wrench, (twist, load), (along, more))
 
         eye = jnp.broadcast_to(jnp.eye(3)[:, None], (3, len(twist), 3))
-        unit, slopes = jax.vmap(lambda along: slope(along, 0.0 * load), out_axes=(None, -1))(eye)
-        by_load = load[:, None] * slope(0.0 * twist, jnp.ones_like(load))[1] if self.unit.by_load else 0.0
+        unit, slopes = jax.vmap(
+            lambda along: slope(along, 0.0 * load), out_axes=(None, -1)
+        )(eye)
+        by_load = (
+            load[:, None] * slope(0.0 * twist, jnp.ones_like(load))[1]
+            if self.unit.by_load
+            else 0.0
+        )
         return unit, slopes, unit + by_load
 
     def misfit(self, twist, load, unit):
@@ -128,12 +140,15 @@ class _Search(NamedTuple):
         w = (load[:, None] * unit).ravel()
         gap = abs(host.twists(w) - twist) * self.lever
         missing = abs(host.loads(w) - load)
-        gap = jnp.maximum(gap, self.diagonal * missing[:, None] * jnp.array([1.0, 1.0, 0.0]))
+        gap = jnp.maximum(
+            gap, self.diagonal * missing[:, None] * jnp.array([1.0, 1.0, 0.0])
+        )
         return jnp.where(jnp.isfinite(gap).all(), gap.max(), jnp.inf)
 
     def newton(self, w, twist, load, unit, slopes, by_load, held):
         """Return the step, the twists that it adds, and `A dW . s` at its start."""
-        host, count = self.host, len(load)
+        host = self.host
+        count = len(load)
         lacks = host.load + host.load_response @ w - load
         follows = jnp.where(held | ((load == 0.0) & (lacks < 0.0)), 0.0, 1.0)
         own = load[:, None, None] * slopes
@@ -143,14 +158,22 @@ class _Search(NamedTuple):
             + (follows[:, None] * by_load)[..., None] * (host.load_response[:, None])
         )
         matrix = jnp.eye(3 * count) - caused.reshape(2, 3 * count, -1)
-        base = load[:, None] * unit + (follows * lacks)[:, None] * by_load - w.reshape(-1, 3)
+        base = (
+            load[:, None] * unit
+            + (follows * lacks)[:, None] * by_load
+            - w.reshape(-1, 3)
+        )
         right = base + (both @ (host.twists(w) - twist)[..., None])[..., 0]
         change, sign = _solved(matrix, right.reshape(2, -1))
         move = change @ host.response.T
         towards = move.reshape(2, count, 3)
-        downhill = (towards * (change.reshape(towards.shape) - (own @ towards[..., None])[..., 0])).sum((1, 2))
+        downhill = (
+            towards
+            * (change.reshape(towards.shape) - (own @ towards[..., None])[..., 0])
+        ).sum((1, 2))
         plain = (sign[0] > 0.0) & (downhill[0] > 0.0)
-        change, move = jnp.where(plain, change[0], change[1]), jnp.where(plain, move[0], move[1])
+        change = jnp.where(plain, change[0], change[1])
+        move = jnp.where(plain, move[0], move[1])
         return change, move, (move * ((load[:, None] * unit).ravel() - w)).sum()
 
     def next_round(self, c: _Round) -> _Round:
@@ -159,27 +182,40 @@ class _Search(NamedTuple):
         unit, slopes, by_load = self.evaluate(c.twist, c.load)
         searching = c.phase == _SEARCH
         here = (c.move * ((c.load[:, None] * unit).ravel() - c.w)).sum()
-        far_enough = c.whole | (here >= -DOWNHILL * c.first) | ~(c.first > 0.0) | (c.tries == SHORTENINGS)
+        far_enough = (
+            c.whole
+            | (here >= -DOWNHILL * c.first)
+            | ~(c.first > 0.0)
+            | (c.tries == SHORTENINGS)
+        )
         accepted = ~searching | far_enough
         load = jnp.where(c.held, host.loads(c.w), c.load)
         misfit = self.misfit(c.twist, load, unit)
         # the better of the guess and of rest
         back = (c.phase == _REST) & (misfit > c.misfit)
-        twist, misfit = jnp.where(back, host.twists(c.w), c.twist), jnp.where(back, c.misfit, misfit)
-        unit, slopes = jnp.where(back, c.unit, unit), jnp.where(back, c.slopes, slopes)
+        twist = jnp.where(back, host.twists(c.w), c.twist)
+        misfit = jnp.where(back, c.misfit, misfit)
+        unit = jnp.where(back, c.unit, unit)
+        slopes = jnp.where(back, c.slopes, slopes)
         by_load = jnp.where(back, c.by_load, by_load)
         to_rest = (c.phase == _GUESS) & (misfit > self.near)
         iterations = c.iterations + (searching & far_enough)
         better = accepted & (misfit < c.best)
         best = jnp.where(better, misfit, c.best)
         wrench = jnp.where(better, (load[:, None] * unit).ravel(), c.wrench)
-        done = accepted & ~to_rest & ((misfit <= self.near) | (iterations >= self.most) | (misfit == jnp.inf))
+        done = (
+            accepted
+            & ~to_rest
+            & ((misfit <= self.near) | (iterations >= self.most) | (misfit == jnp.inf))
+        )
         # a new step, or less of the last
         held = jnp.where(accepted, iterations % ROUND >= JOINT, c.held)
         change, move, first = self.newton(c.w, twist, load, unit, slopes, by_load, held)
         change, move, first = (
             jnp.where(accepted, new, old)
-            for new, old in zip((change, move, first), (c.change, c.move, c.first), strict=True)
+            for new, old in zip(
+                (change, move, first), (c.change, c.move, c.first), strict=True
+            )
         )
         slope = jnp.where(c.first == here, 1.0, c.first - here)
         far = jnp.where(accepted, 1.0, c.far * jnp.clip(c.first / slope, 0.1, 0.7))
@@ -194,9 +230,17 @@ class _Search(NamedTuple):
         )  # fmt: skip
 
 
-def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
+def solve(
+    unit: Unit,
+    host: HostResponse,
+    guess: jax.Array,
+    radius: jax.Array,
+    tolerance: float,
+    most: int,
+) -> Solved:
     """Solve for the wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` `[k]` [m]."""
-    count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
+    count = len(host.load)
+    lever = jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
     caused = host.response @ guess
     speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
     rounding = ROUNDING if speeds.dtype == jnp.float64 else ROUNDING_SINGLE
@@ -204,7 +248,8 @@ def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, t
     diagonal = jnp.diagonal(host.response).reshape(-1, 3)
     scale = jnp.where(diagonal > 0.0, jnp.sqrt(abs(diagonal)), 1.0)
     search = _Search(unit, host, lever, diagonal, scale, near, most)
-    none, zeros = jnp.zeros(3 * count), jnp.zeros((count, 3))
+    none = jnp.zeros(3 * count)
+    zeros = jnp.zeros((count, 3))
     first = _Round(
         phase=jnp.asarray(_GUESS), w=guess, twist=host.twists(guess), load=host.loads(guess),
         unit=zeros, slopes=jnp.zeros((count, 3, 3)), by_load=zeros, misfit=jnp.asarray(jnp.inf),
@@ -226,7 +271,9 @@ def fitting(unit: Unit, host: HostResponse, found: jax.Array) -> jax.Array:
     def linear(slope, right):
         return jnp.linalg.solve(jax.jacobian(slope)(right), right)
 
-    return jax.lax.custom_root(gap, jax.lax.stop_gradient(found), lambda _, w: w, linear)
+    return jax.lax.custom_root(
+        gap, jax.lax.stop_gradient(found), lambda _, w: w, linear
+    )
 
 
 def _without_rising(slopes: jax.Array, scale: jax.Array) -> jax.Array:
@@ -241,5 +288,7 @@ def _solved(matrix: jax.Array, right: jax.Array) -> tuple[jax.Array, jax.Array]:
     factors, pivots = jax.scipy.linalg.lu_factor(matrix)
     found = jax.scipy.linalg.lu_solve((factors, pivots), right[..., None])[..., 0]
     swaps = (pivots != jnp.arange(pivots.shape[-1])).sum(-1)
-    sign = jnp.sign(jnp.diagonal(factors, axis1=-2, axis2=-1)).prod(-1) * (1.0 - 2.0 * (swaps % 2))
+    sign = jnp.sign(jnp.diagonal(factors, axis1=-2, axis2=-1)).prod(-1) * (
+        1.0 - 2.0 * (swaps % 2)
+    )
     return jnp.where(jnp.isfinite(found), found, 0.0), sign

@@ -75,25 +75,36 @@ def _active(d: Any, pressed: jax.Array, force: jax.Array) -> Active:
     return Active(quadratic, jnp.where(at_loss, jnp.sign(force), 0.0))
 
 
-def slack(d: Any, before: Active, after: Active, acceleration: jax.Array, dt: jax.Array) -> jax.Array:
+def slack(
+    d: Any, before: Active, after: Active, acceleration: jax.Array, dt: jax.Array
+) -> jax.Array:
     """Return the largest speed [m/s] at which a row is on the wrong side of its range."""
     wrong = (before.quadratic != after.quadratic) | (before.pull != after.pull)
     loss = d._impl.efc_frictionloss / d._impl.efc_D
-    return (jnp.where(wrong, abs(abs(_gap(d, acceleration)) - loss), 0.0) * dt).max(initial=0.0)
+    return (jnp.where(wrong, abs(abs(_gap(d, acceleration)) - loss), 0.0) * dt).max(
+        initial=0.0
+    )
 
 
 def answer(m: Any, d: Any, where: Geometry, active: Active) -> WrenchResponse:
     """Return the response to wrenches on patches; `qfrc_smooth` in the data is without these."""
-    jacobian, rows = where.jacobian, where.rows
-    constraints, inertia = d._impl.efc_J, mjx.full_m(m, d)
+    jacobian = where.jacobian
+    rows = where.rows
+    constraints = d._impl.efc_J
+    inertia = mjx.full_m(m, d)
     stiffness = jnp.where(active.quadratic, d._impl.efc_D, 0.0)
     limit = active.pull * d._impl.efc_frictionloss
     stiff = inertia + constraints.T @ (stiffness[:, None] * constraints)
     pushed = d.qfrc_smooth + constraints.T @ (stiffness * d._impl.efc_aref + limit)
     factor = jax.scipy.linalg.cho_factor(0.5 * (stiff + stiff.T))
-    found = jax.scipy.linalg.cho_solve(factor, jnp.concatenate([pushed[:, None], jacobian.T], axis=1))
-    free, moved = found[:, 0], found[:, 1:]
-    gains = jax.vmap(lambda acceleration: _gained(m, d, inertia, acceleration), in_axes=1, out_axes=1)(found)
+    found = jax.scipy.linalg.cho_solve(
+        factor, jnp.concatenate([pushed[:, None], jacobian.T], axis=1)
+    )
+    free = found[:, 0]
+    moved = found[:, 1:]
+    gains = jax.vmap(
+        lambda acceleration: _gained(m, d, inertia, acceleration), in_axes=1, out_axes=1
+    )(found)
     weights = rows * stiffness
     host = HostResponse(
         twist=jacobian @ (d.qvel + gains[:, 0]) + where.drift.ravel(),
@@ -106,13 +117,19 @@ def answer(m: Any, d: Any, where: Geometry, active: Active) -> WrenchResponse:
 
 def integrate(m: Any, d: Any) -> Any:
     """Run the integrator of the model on known accelerations."""
-    return mjx.euler(m, d) if m.opt.integrator == mjx.IntegratorType.EULER else mjx.implicit(m, d)
+    return (
+        mjx.euler(m, d)
+        if m.opt.integrator == mjx.IntegratorType.EULER
+        else mjx.implicit(m, d)
+    )
 
 
 def _gained(m: Any, d: Any, inertia: jax.Array, acceleration: jax.Array) -> jax.Array:
     """Return the velocity that the integrator gains in a step from an acceleration, which is linear in it."""
     force = inertia @ acceleration
-    d = d.replace(qacc=acceleration, qfrc_smooth=force, qfrc_constraint=jnp.zeros_like(force))
+    d = d.replace(
+        qacc=acceleration, qfrc_smooth=force, qfrc_constraint=jnp.zeros_like(force)
+    )
     return integrate(m, d).qvel - d.qvel
 
 
@@ -175,7 +192,8 @@ class Geometry(NamedTuple):
 
     def carry(self, p: int, vectors: jax.Array) -> jax.Array:
         """Return vectors of patch p, x and y in front, in its axes of this step instead of the last ones."""
-        (c, s), (x, y) = self.carried[p], vectors[:2]
+        (c, s) = self.carried[p]
+        (x, y) = vectors[:2]
         return vectors.at[:2].set(jnp.stack([c * x + s * y, c * y - s * x]))
 
     def centres(self, force: jax.Array) -> jax.Array:
@@ -187,16 +205,25 @@ class Geometry(NamedTuple):
         held = self.origin + jnp.einsum("pi,pij->pj", shift, self.axes[:, :2])
         return jnp.where(self.touching[:, None], held, 0.0)
 
-    def misplaced(self, load: jax.Array, centre: jax.Array, scale: jax.Array, reach: jax.Array) -> jax.Array:
+    def misplaced(
+        self, load: jax.Array, centre: jax.Array, scale: jax.Array, reach: jax.Array
+    ) -> jax.Array:
         """Return the fault of the last patch that has one (see `placing`), with contact forces at these centres."""
-        beyond = jnp.maximum(*jax.vmap(placing.excess)(centre[:, 0], centre[:, 1], scale, reach)) > 0.0
+        beyond = (
+            jnp.maximum(
+                *jax.vmap(placing.excess)(centre[:, 0], centre[:, 1], scale, reach)
+            )
+            > 0.0
+        )
         upright = jnp.where(self.upright, placing.ALONG_X, 0)
         fault = jnp.where(beyond & ~self.at_contact, placing.BEYOND, upright)
         noted = placing.FAULTS * jnp.arange(len(fault)) + fault
         return jnp.where((load > 0.0) & (fault > 0), noted, 0).max()
 
 
-def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Array) -> Geometry:
+def geometry(
+    m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Array
+) -> Geometry:
     """Return the geometry of the contacts of patches with their last origins and x axes `[k, 3]`, in the sites' frames.
 
     See `planarfriction.adapters.mujoco.loops.centres`.
@@ -206,42 +233,77 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
     frames = contact.frame.reshape(-1, 3, 3)
 
     def one(place: PatchPlaces, held: jax.Array, before: jax.Array):
-        forward = (contact.geom[:, 0] == place.other) & (contact.geom[:, 1] == place.own)
-        backward = (contact.geom[:, 0] == place.own) & (contact.geom[:, 1] == place.other)
+        forward = (contact.geom[:, 0] == place.other) & (
+            contact.geom[:, 1] == place.own
+        )
+        backward = (contact.geom[:, 0] == place.own) & (
+            contact.geom[:, 1] == place.other
+        )
         chosen = (forward | backward) & single
         touching = chosen.any()
-        normal = (jnp.where(chosen, jnp.where(forward, 1.0, -1.0), 0.0)[:, None] * frames[:, 0]).sum(0)
+        normal = (
+            jnp.where(chosen, jnp.where(forward, 1.0, -1.0), 0.0)[:, None]
+            * frames[:, 0]
+        ).sum(0)
         normal = _unit(normal, touching)
-        turned, site = d.site_xmat[place.site].reshape(3, 3), d.site_xpos[place.site]
+        turned = d.site_xmat[place.site].reshape(3, 3)
+        site = d.site_xpos[place.site]
         across = turned - jnp.outer(normal, normal @ turned)
-        flat, along = across[:, 0] @ across[:, 0], across @ before
+        flat = across[:, 0] @ across[:, 0]
+        along = across @ before
         kept = touching & (along @ along >= ALONG)
         along = _unit(along, kept)
         sided = jnp.where(kept & (across[:, 0] @ along < 0.0), -1.0, 1.0) * across[:, 0]
         x = _unit(jnp.where(flat >= ALONG, sided, across[:, 1]), touching)
         x = jnp.where(kept & (flat < FLAT), along, x)
-        middle = jnp.where(chosen[:, None], contact.pos, 0.0).sum(0) / jnp.maximum(chosen.sum(), 1)
+        middle = jnp.where(chosen[:, None], contact.pos, 0.0).sum(0) / jnp.maximum(
+            chosen.sum(), 1
+        )
         curved = place.curved & placing.ROUND > 0
         for geom, side in ((place.own, placing.OWN), (place.other, placing.OTHER)):
             axis = d.geom_xmat[geom].reshape(3, 3)[:, 2]
-            curved |= (place.curved & side > 0) & (placing.across(axis, normal) > placing.CURVED)
-        at_contact = (place.centre == placing.AT_CONTACT) | ((place.centre == placing.AUTO) & curved)
+            curved |= (place.curved & side > 0) & (
+                placing.across(axis, normal) > placing.CURVED
+            )
+        at_contact = (place.centre == placing.AT_CONTACT) | (
+            (place.centre == placing.AUTO) & curved
+        )
         new = (held == 0.0).all()
         last = jnp.where(new, middle, site + turned @ held)
-        centre = jnp.stack(placing.onto_plane(jnp.where(at_contact, last, site), middle, normal))
+        centre = jnp.stack(
+            placing.onto_plane(jnp.where(at_contact, last, site), middle, normal)
+        )
         y = jnp.cross(normal, x)
-        carried = jnp.where(kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0]))
-        sides = zip((place.owner, place.support), (place.own, place.other), place.surface, strict=True)
+        carried = jnp.where(
+            kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0])
+        )
+        sides = zip(
+            (place.owner, place.support),
+            (place.own, place.other),
+            place.surface,
+            strict=True,
+        )
         own, other = (_side(m, d, centre, *side) for side in sides)
-        moves, turns, drift, drift_spin, part, spin, _ = jax.tree.map(jnp.subtract, own, other)
+        moves, turns, drift, drift_spin, part, spin, _ = jax.tree.map(
+            jnp.subtract, own, other
+        )
         across = jnp.where(touching, jnp.stack([x, y]), 0.0)
         over = jnp.where(place.carrier == place.own, own.over, other.over)
-        both, dt = own.spin + other.spin, m.opt.timestep
-        drift += jnp.stack(placing.bend(over, spin, both, normal, normal @ (part + drift), dt))
-        drift = jnp.append(across @ drift, jnp.where(touching, normal @ drift_spin, 0.0))
-        jacobian, away = jnp.stack([moves @ x, moves @ y, turns @ normal]), contact.pos - centre
-        own = jnp.where(chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0)
-        rolled, slid = xp.norm(across @ spin, -1)[0], xp.norm(jacobian[:2] @ d.qvel + drift[:2], -1)[0]
+        both = own.spin + other.spin
+        dt = m.opt.timestep
+        drift += jnp.stack(
+            placing.bend(over, spin, both, normal, normal @ (part + drift), dt)
+        )
+        drift = jnp.append(
+            across @ drift, jnp.where(touching, normal @ drift_spin, 0.0)
+        )
+        jacobian = jnp.stack([moves @ x, moves @ y, turns @ normal])
+        away = contact.pos - centre
+        own = jnp.where(
+            chosen, jnp.stack([jnp.ones(len(away)), away @ y, -away @ x]), 0.0
+        )
+        rolled = xp.norm(across @ spin, -1)[0]
+        slid = xp.norm(jacobian[:2] @ d.qvel + drift[:2], -1)[0]
         rolled += jnp.where(place.radius > 0.0, slid / place.radius, 0.0)
         share = jnp.where(new, 1.0, jnp.minimum(1.0, m.opt.timestep * rolled / FOLLOWS))
         share = jnp.where(touching & at_contact, share, 0.0)
@@ -249,10 +311,27 @@ def geometry(m: Any, d: Any, where: PatchPlaces, held: jax.Array, before: jax.Ar
         axes = jnp.where(touching, jnp.stack([x, y, normal]) @ turned, before)
         place_of = turned.T @ (centre - site)
         jacobian = jnp.where(touching, jacobian, 0.0)
-        return jacobian, own, touching, place_of, axes, share, carried, drift, at_contact, upright
+        return (
+            jacobian,
+            own,
+            touching,
+            place_of,
+            axes,
+            share,
+            carried,
+            drift,
+            at_contact,
+            upright,
+        )
 
-    jacobian, own, *others = jax.vmap(one)(jax.tree.map(jnp.asarray, where), held, before)
-    rows = jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0])).at[:, :, contact.efc_address].set(own)
+    jacobian, own, *others = jax.vmap(one)(
+        jax.tree.map(jnp.asarray, where), held, before
+    )
+    rows = (
+        jnp.zeros((len(where.site), 3, d._impl.efc_J.shape[0]))
+        .at[:, :, contact.efc_address]
+        .set(own)
+    )
     return Geometry(jacobian.reshape(-1, m.nv), rows[:, 0], rows[:, 1:], *others)
 
 
@@ -273,9 +352,13 @@ class _Side(NamedTuple):
     """Velocity of the surface less that of the centre of the geom `[3]`."""
 
 
-def _side(m: Any, d: Any, point: jax.Array, body: Any, geom: Any, surface: jax.Array) -> _Side:
+def _side(
+    m: Any, d: Any, point: jax.Array, body: Any, geom: Any, surface: jax.Array
+) -> _Side:
     """Return the motion of the surface of a geom, which has a velocity [6] of its own (see `loops.geometry`)."""
-    dt, frame, away = m.opt.timestep, d.geom_xmat[geom].reshape(3, 3), point - d.geom_xpos[geom]
+    dt = m.opt.timestep
+    frame = d.geom_xmat[geom].reshape(3, 3)
+    away = point - d.geom_xpos[geom]
     moves, turns = mjx.jac(m, d, point, body)
     # by changes of the axes in place of the axes: spatial accelerations of joints that keep their speeds
     gains = mjx.jac(m, d.replace(cdof=d.cdof_dot), point, body)
@@ -284,10 +367,23 @@ def _side(m: Any, d: Any, point: jax.Array, body: Any, geom: Any, surface: jax.A
     move = frame @ surface[:3] + jnp.cross(turn, away)
     first, second = turning_mean(jnp, dt * xp.norm(surface[3:], -1)[0])
     across = jnp.cross(turn, move)
-    mean = move + dt * first * across + dt**2 * second * jnp.cross(turn, across) + dt * jnp.cross(spin, move)
+    mean = (
+        move
+        + dt * first * across
+        + dt**2 * second * jnp.cross(turn, across)
+        + dt * jnp.cross(spin, move)
+    )
     drift = mean + 0.5 * dt * (gain + jnp.cross(spin, velocity))
     drift_spin = turn + 0.5 * dt * (gained + jnp.cross(spin, turn))
-    return _Side(moves, turns, drift, drift_spin, velocity, spin + turn, move + jnp.cross(spin, away))
+    return _Side(
+        moves,
+        turns,
+        drift,
+        drift_spin,
+        velocity,
+        spin + turn,
+        move + jnp.cross(spin, away),
+    )
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:

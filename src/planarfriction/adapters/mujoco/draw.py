@@ -13,7 +13,11 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import ContactPatch
 
-OUTLINE, FRICTION, CENTRE = (0.1, 0.4, 1.0, 1.0), (0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.2, 1.0)
+OUTLINE, FRICTION, CENTRE = (
+    (0.1, 0.4, 1.0, 1.0),
+    (0.9, 0.1, 0.1, 1.0),
+    (0.1, 0.7, 0.2, 1.0),
+)
 """Colours: red, green, blue, opacity."""
 
 STANDS = 1e-6
@@ -37,12 +41,20 @@ def outlines(patch: ContactPatch) -> list[np.ndarray]:
         outer, holes = patch.outline.rims()
         rims = [np.concatenate([rim, rim[:1]]) for rim in (outer, *holes)]
     else:
-        half, gap = 0.5 * np.sqrt(patch.areas)[:, None], _CLOSING * float(np.sqrt(patch.areas.max()))
+        half = 0.5 * np.sqrt(patch.areas)[:, None]
+        gap = _CLOSING * float(np.sqrt(patch.areas.max()))
         cells = shapely.box(*(patch.positions - half).T, *(patch.positions + half).T)
-        whole = shapely.union_all(shapely.buffer(cells, gap, join_style="mitre")).buffer(-gap, join_style="mitre")
-        rims = [shapely.get_coordinates(rim) for rim in shapely.get_parts(shapely.boundary(whole))]
+        whole = shapely.union_all(
+            shapely.buffer(cells, gap, join_style="mitre")
+        ).buffer(-gap, join_style="mitre")
+        rims = [
+            shapely.get_coordinates(rim)
+            for rim in shapely.get_parts(shapely.boundary(whole))
+        ]
     error = _FINE * _size(patch)
-    return [shapely.get_coordinates(shapely.LineString(rim).simplify(error)) for rim in rims]
+    return [
+        shapely.get_coordinates(shapely.LineString(rim).simplify(error)) for rim in rims
+    ]
 
 
 def draw_patch(
@@ -65,14 +77,32 @@ def draw_patch(
     for rim in outlines(patch):
         corners = origin + scale * rim @ axes[:2]
         for start, end in itertools.pairwise(corners):
-            _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.04 * size, start, end, OUTLINE)
+            _connect(
+                scene, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.04 * size, start, end, OUTLINE
+            )
     force = wrench[:2] @ axes[:2]
     if force.any():
-        _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, 0.08 * size, origin, origin + newton * force, FRICTION)
+        _connect(
+            scene,
+            mujoco.mjtGeom.mjGEOM_ARROW,
+            0.08 * size,
+            origin,
+            origin + newton * force,
+            FRICTION,
+        )
     vx, vy, omega = twist
-    if max(np.hypot(vx, vy), size * abs(omega)) > STANDS and np.hypot(vx, vy) < FAR * size * abs(omega):
+    if max(np.hypot(vx, vy), size * abs(omega)) > STANDS and np.hypot(
+        vx, vy
+    ) < FAR * size * abs(omega):
         centre = origin + np.array([-vy, vx]) / omega @ axes[:2]
-        _connect(scene, mujoco.mjtGeom.mjGEOM_CYLINDER, 0.1 * size, centre, centre + 0.1 * size * axes[2], CENTRE)
+        _connect(
+            scene,
+            mujoco.mjtGeom.mjGEOM_CYLINDER,
+            0.1 * size,
+            centre,
+            centre + 0.1 * size * axes[2],
+            CENTRE,
+        )
 
 
 def _size(patch: ContactPatch) -> float:
@@ -80,11 +110,22 @@ def _size(patch: ContactPatch) -> float:
     return float(np.hypot(*patch.positions.T).max() + np.sqrt(patch.areas.max()))
 
 
-def _connect(scene: Any, kind: Any, width: float, start: np.ndarray, end: np.ndarray, colour: tuple) -> None:
+def _connect(
+    scene: Any,
+    kind: Any,
+    width: float,
+    start: np.ndarray,
+    end: np.ndarray,
+    colour: tuple,
+) -> None:
     if scene.ngeom >= scene.maxgeom:
-        raise InvalidValueError("scene", "have room for more geoms (maxgeom)", scene.maxgeom)
+        raise InvalidValueError(
+            "scene", "have room for more geoms (maxgeom)", scene.maxgeom
+        )
     geom = scene.geoms[scene.ngeom]
-    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(colour, np.float32))
+    mujoco.mjv_initGeom(
+        geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(colour, np.float32)
+    )
     mujoco.mjv_connector(geom, kind, width, start, end)
     geom.emission = 0.7  # seen in the dark of a contact too
     geom.category = mujoco.mjtCatBit.mjCAT_DECOR

@@ -65,7 +65,9 @@ class Friction:
 
     def __init__(self, m: Any, patches: Sequence[PatchContact]) -> None:
         check_once(patches)
-        self.m, self.patches, self.placed = m, tuple(patches), [Placed(m, patch) for patch in patches]
+        self.m = m
+        self.patches = tuple(patches)
+        self.placed = [Placed(m, patch) for patch in patches]
         self.coupled = CoupledPatches([patch.model for patch in patches])
         for patch in patches:
             if patch.model.depends_on_load:
@@ -106,14 +108,20 @@ class Friction:
         values = check(parameters)
         counts = [len(value) for value in values.values() if value.ndim]
         if not counts:
-            raise InvalidValueError("parameters", "hold an array, with a number for each environment", "none")
+            raise InvalidValueError(
+                "parameters",
+                "hold an array, with a number for each environment",
+                "none",
+            )
         models = [copy.copy(self.m) for _ in range(counts[0])]
         shapes = (), (len(models),), (len(models), len(self.patches))
         for name, value in values.items():
             if value.shape not in shapes:
                 rule = f"have shape {' or '.join(str(list(each)) for each in shapes)}"
                 raise InvalidValueError(name, rule, value.shape)
-            rows = np.broadcast_to(value.reshape(*value.shape, *[1] * (2 - value.ndim)), shapes[2])
+            rows = np.broadcast_to(
+                value.reshape(*value.shape, *[1] * (2 - value.ndim)), shapes[2]
+            )
             for m, row in zip(models, rows, strict=True):
                 self.parameters(m)[name][:] = row
         for m in models:
@@ -129,9 +137,16 @@ class Friction:
     def _say_alone(self, d: Any) -> None:
         """Warn, once, if data have moved on by steps without friction."""
         self._used[:] = [True]
-        last = d.userdata[self._memory.next]  # 0 before the first step: the data may come from elsewhere
+        last = d.userdata[
+            self._memory.next
+        ]  # 0 before the first step: the data may come from elsewhere
         steps = (d.time - last) / d.model.opt.timestep
-        if last != 0.0 and 0.5 < steps < 1e9 and abs(steps - round(steps)) < 1e-6 and _ALONE not in self._said:
+        if (
+            last != 0.0
+            and 0.5 < steps < 1e9
+            and abs(steps - round(steps)) < 1e-6
+            and _ALONE not in self._said
+        ):
             self._said.add(_ALONE)
             line = f"the time of these data went on by {round(steps)} steps without patch friction"
             warnings.warn(f"{line}: {_ALONE}", stacklevel=4)
@@ -140,7 +155,9 @@ class Friction:
         """Return the state of all patches now, as a view of `userdata`, which `coupled.states` gives its shape."""
         at = self._memory
         stepped = d.time == d.userdata[at.next]
-        return self._own(d, at.after if stepped else at.state, self.coupled.state_shape[0])
+        return self._own(
+            d, at.after if stepped else at.state, self.coupled.state_shape[0]
+        )
 
     def wrenches(self, d: Any) -> np.ndarray:
         """Return the last wrenches `[k, 3]` [N, N, N m] on the sites' bodies, in the patches' frames; a view."""
@@ -159,11 +176,15 @@ class Friction:
 
         It is that of the last step; without contact it is the site, and its axes are not numbers.
         """
-        placed, at, own = self.placed[p], self._memory.centre + 3 * p, self.parameters(d.model)
+        placed = self.placed[p]
+        at = self._memory.centre + 3 * p
+        own = self.parameters(d.model)
         axis = self._memory.axis + 3 * p
         kept = d.userdata[at : at + 3], d.userdata[axis : axis + 3]
         origin, axes = placed.frame(d, *placed.contacts(d), *kept)
-        return origin + own["centre_x"][p] * axes[0] + own["centre_y"][p] * axes[1], axes
+        return origin + own["centre_x"][p] * axes[0] + own["centre_y"][p] * axes[
+            1
+        ], axes
 
     def misplaced(self, d: Any) -> str | None:
         """Return a line about a patch that did not lie in its contact in the last step, None if all did.
@@ -175,8 +196,14 @@ class Friction:
 
     def report(self, d: Any) -> Report:
         """Return the statistics of the last step."""
-        at, u = self._memory, d.userdata
-        return Report(int(u[at.iterations]), int(u[at.passes]), float(u[at.residual]), bool(u[at.converged]))
+        at = self._memory
+        u = d.userdata
+        return Report(
+            int(u[at.iterations]),
+            int(u[at.passes]),
+            float(u[at.residual]),
+            bool(u[at.converged]),
+        )
 
     def reset(self, d: Any) -> None:
         """Relax all bristles."""
@@ -191,15 +218,29 @@ class Friction:
 
         Raises `InvalidValueError` if the scene has no room for more geoms.
         """
-        newton, wrenches, twists = self.m.vis.map.force / self.m.stat.meanmass, self.wrenches(d), self.twists(d)
-        for p, (placed, wrench, twist) in enumerate(zip(self.placed, wrenches, twists, strict=True)):
+        newton = self.m.vis.map.force / self.m.stat.meanmass
+        wrenches = self.wrenches(d)
+        twists = self.twists(d)
+        for p, (placed, wrench, twist) in enumerate(
+            zip(self.placed, wrenches, twists, strict=True)
+        ):
             chosen, _ = placed.contacts(d)
             if len(chosen):
                 origin, axes = self.frame(d, p)
                 # between the two surfaces, which overlap by what the contact gives
-                middle = origin + axes[2] * (axes[2] @ (d.contact.pos[chosen].mean(axis=0) - origin))
+                middle = origin + axes[2] * (
+                    axes[2] @ (d.contact.pos[chosen].mean(axis=0) - origin)
+                )
                 scale = float(self.parameters(d.model)["scale"][p])
-                draw_patch(scene, placed.patch.model.patch, (middle, axes), wrench, twist, newton, scale)
+                draw_patch(
+                    scene,
+                    placed.patch.model.patch,
+                    (middle, axes),
+                    wrench,
+                    twist,
+                    newton,
+                    scale,
+                )
 
     # ------------------------------------------------------------------ steps
 
@@ -211,7 +252,11 @@ class Friction:
         """
         m = d.model
         if m is not self.m and not loops.is_served(self._row, m._address):
-            raise InvalidValueError("d", "be data of the model of the patches, or of a copy", "data of another model")
+            raise InvalidValueError(
+                "d",
+                "be data of the model of the patches, or of a copy",
+                "data of another model",
+            )
         if d.time != d.userdata[self._memory.next]:
             self._say_alone(d)
         self._used[:] = [True]
@@ -242,7 +287,9 @@ class Friction:
         self._check(self.m)
         self._used[:] = [True]
         if mujoco.get_mjcb_control() is not None or loops.INSTALLED[0] != 0:
-            raise FrictionError("a control callback is installed already: remove it with mujoco.set_mjcb_control(None)")
+            raise FrictionError(
+                "a control callback is installed already: remove it with mujoco.set_mjcb_control(None)"
+            )
         loops.INSTALLED[0] = place_of(self._row)
         mujoco.set_mjcb_control(_callback())
         try:
@@ -259,16 +306,26 @@ class Friction:
         return self._host_row()
 
     def _host_row(self) -> np.ndarray:
-        packed, k = self.coupled._packed, len(self.patches)
+        packed = self.coupled._packed
+        k = len(self.patches)
         problem = self.coupled._blank_problem([each.follows for each in self.placed])
-        scratch = scratch_layout(packed.layout.size, int(packed.sizes.sum()), k, self.m.nv)
-        columns = np.array([[getattr(each, name) for each in self.placed] for name in _COLUMNS], np.int64)
+        scratch = scratch_layout(
+            packed.layout.size, int(packed.sizes.sum()), k, self.m.nv
+        )
+        columns = np.array(
+            [[getattr(each, name) for each in self.placed] for name in _COLUMNS],
+            np.int64,
+        )
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
         extents = np.array([each.extent() for each in self.placed])
-        laws = np.array([not is_rate_law(patch.model.law) for patch in self.patches], np.int64)
+        laws = np.array(
+            [not is_rate_law(patch.model.law) for patch in self.patches], np.int64
+        )
         self._kept = problem, columns, free, packed, extents, laws
-        places = {name: place_of(columns) + 8 * k * i for i, name in enumerate(_COLUMNS)}
+        places = {
+            name: place_of(columns) + 8 * k * i for i, name in enumerate(_COLUMNS)
+        }
         host = Host(
             m=self.m._address, same_count=len(same()), same=place_of(same()),
             nv=self.m.nv, nuserdata=self.m.nuserdata, count=k, states=self.coupled.state_shape[0],
@@ -281,7 +338,18 @@ class Friction:
         return row_of(host)
 
 
-_COLUMNS = "site", "own", "other", "owner", "support", "pair", "centre", "curved", "carrier", "on_box"
+_COLUMNS = (
+    "site",
+    "own",
+    "other",
+    "owner",
+    "support",
+    "pair",
+    "centre",
+    "curved",
+    "carrier",
+    "on_box",
+)
 """Attributes of `Placed` that compiled steps read, and fields of `Host` with their addresses."""
 
 _ALONE = "mj_step has none by itself; call friction.step(d) instead, or mj_step within friction.install()"
@@ -296,4 +364,6 @@ def _say_unused(used: list[bool]) -> None:
 @functools.cache
 def _callback() -> Any:
     """Return the compiled control callback."""
-    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(loops.control_address())
+    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(
+        loops.control_address()
+    )

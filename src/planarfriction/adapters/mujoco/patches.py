@@ -37,10 +37,16 @@ EDGE = 0.01
 """Displacement across the edge of a box in which a cell loses its load, in largest distances of cells from the origin:
 less than the distance of the outermost centres from the rim of a patch, so that a face is borne to its rim."""
 
-_ROUND = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("SPHERE", "CAPSULE", "ELLIPSOID")}
+_ROUND = {
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
+    for name in ("SPHERE", "CAPSULE", "ELLIPSOID")
+}
 """Geoms that touch in points, not faces."""
 
-_IMPLICIT = {int(getattr(mujoco.mjtIntegrator, f"mjINT_{name}")) for name in ("IMPLICIT", "IMPLICITFAST")}
+_IMPLICIT = {
+    int(getattr(mujoco.mjtIntegrator, f"mjINT_{name}"))
+    for name in ("IMPLICIT", "IMPLICITFAST")
+}
 
 _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 
@@ -88,13 +94,17 @@ def memory(patches: Sequence[PatchContact], nv: int, nuserdata: int) -> Any:
     """Return the places of what patches remember in the user data, at their end; raise where there is no room."""
     layout = layout_of(patches, nv)
     if nuserdata < layout.size:
-        raise InvalidValueError("nuserdata", f"be at least {layout.size} (prepare adds them)", nuserdata)
+        raise InvalidValueError(
+            "nuserdata", f"be at least {layout.size} (prepare adds them)", nuserdata
+        )
     return Memory(*(nuserdata - layout.size + place for place in layout.offsets))
 
 
 def layout_of(patches: Sequence[PatchContact], nv: int) -> Layout:
     """Return the layout of the numbers that patches remember."""
-    return memory_layout(sum(math.prod(patch.model.state_shape) for patch in patches), len(patches), nv)
+    return memory_layout(
+        sum(math.prod(patch.model.state_shape) for patch in patches), len(patches), nv
+    )
 
 
 def prepare(spec: Any, patches: Sequence[PatchContact]) -> Any:
@@ -113,18 +123,34 @@ def prepare(spec: Any, patches: Sequence[PatchContact]) -> Any:
         spec = mujoco.MjSpec.from_file(str(spec))
     if not isinstance(spec, mujoco.MjSpec):
         rule = "be an MjSpec or the path of a model file (MjSpec.from_string takes XML; compile the model afterwards)"
-        raise InvalidValueError("spec", rule, spec if isinstance(spec, str | Path) else type(spec).__name__)
+        raise InvalidValueError(
+            "spec", rule, spec if isinstance(spec, str | Path) else type(spec).__name__
+        )
     check_once(patches)
     for patch in patches:
         _choose("site", patch.site, [each.name for each in spec.sites])
         for name in patch.geoms:
-            _choose("geoms", name, [each.name for each in spec.geoms], [each.name for each in spec.flexes])
+            _choose(
+                "geoms",
+                name,
+                [each.name for each in spec.geoms],
+                [each.name for each in spec.flexes],
+            )
     compiled = spec.copy().compile()
     for patch in patches:
-        pair = next((each for each in spec.pairs if {each.geomname1, each.geomname2} == set(patch.geoms)), None)
+        pair = next(
+            (
+                each
+                for each in spec.pairs
+                if {each.geomname1, each.geomname2} == set(patch.geoms)
+            ),
+            None,
+        )
         if pair is None:
             pair = spec.add_pair(geomname1=patch.geoms[0], geomname2=patch.geoms[1])
-            for name, value in _between(compiled, [compiled.geom(name).id for name in patch.geoms]).items():
+            for name, value in _between(
+                compiled, [compiled.geom(name).id for name in patch.geoms]
+            ).items():
                 setattr(pair, name, value)
         pair.condim = 1
     room = layout_of(patches, compiled.nv).size
@@ -153,7 +179,9 @@ def _between(m: Any, geoms: Sequence[int]) -> dict[str, Any]:
         for geom in geoms:
             body = spec.worldbody.add_body()
             body.add_freejoint()
-            sphere = body.add_geom(size=[1.0, 0.0, 0.0], margin=getattr(m, f"geom_{margin}")[geom])
+            sphere = body.add_geom(
+                size=[1.0, 0.0, 0.0], margin=getattr(m, f"geom_{margin}")[geom]
+            )
             for name in _MIXED:
                 if hasattr(m, f"geom_{name}"):
                     setattr(sphere, name, getattr(m, f"geom_{name}")[geom])
@@ -161,19 +189,29 @@ def _between(m: Any, geoms: Sequence[int]) -> dict[str, Any]:
         mujoco.mj_forward(d.model, d)
         return d.contact
 
-    found, gap = contact("margin"), contact("gap").includemargin[0]
-    same = {name: getattr(found, name)[0] for name in dir(mujoco.MjsPair) if hasattr(found, name) and name[0] != "_"}
+    found = contact("margin")
+    gap = contact("gap").includemargin[0]
+    same = {
+        name: getattr(found, name)[0]
+        for name in dir(mujoco.MjsPair)
+        if hasattr(found, name) and name[0] != "_"
+    }
     return {**same, "margin": found.includemargin[0], "gap": gap}
 
 
 def place_of_parameters(m: Any) -> int:
     """Return the place of the parameters of the patches in the numerics of a prepared model, or raise."""
-    return int(m.numeric_adr[_named(m, "numeric", RECORD, mujoco.mjtObj.mjOBJ_NUMERIC)]) + DIGEST
+    return (
+        int(m.numeric_adr[_named(m, "numeric", RECORD, mujoco.mjtObj.mjOBJ_NUMERIC)])
+        + DIGEST
+    )
 
 
 def parameters_in(m: Any, place: int, k: int) -> dict[str, np.ndarray]:
     """Return views `[k]` of the parameters of k patches in a model."""
-    rows = m.numeric_data[place : place + k * len(PARAMETERS)].reshape(k, len(PARAMETERS))
+    rows = m.numeric_data[place : place + k * len(PARAMETERS)].reshape(
+        k, len(PARAMETERS)
+    )
     return dict(zip(PARAMETERS, rows.T, strict=True))
 
 
@@ -183,7 +221,12 @@ def _digest(patches: Sequence[PatchContact]) -> list[int]:
     for each in patches:
         cells = each.model.patch
         found.update(repr((each, each.model.law)).encode())
-        found.update(b"".join(numbers.tobytes() for numbers in (cells.positions, cells.radii, cells.areas)))
+        found.update(
+            b"".join(
+                numbers.tobytes()
+                for numbers in (cells.positions, cells.radii, cells.areas)
+            )
+        )
         if not cells.depends_on_load:
             found.update(cells.weights().tobytes())
     return np.frombuffer(found.digest(), ">u2", 4).tolist()
@@ -192,28 +235,44 @@ def _digest(patches: Sequence[PatchContact]) -> list[int]:
 def check_once(patches: Sequence[PatchContact]) -> None:
     """Raise for what is no list of patches, and for the same pair twice."""
     if not (isinstance(patches, Sequence) and patches):
-        raise InvalidValueError("patches", "be a list of PatchContact, not empty", patches)
+        raise InvalidValueError(
+            "patches", "be a list of PatchContact, not empty", patches
+        )
     for patch in patches:
         validation.instance("patches", patch, PatchContact, "patches")
     pairs = [frozenset(patch.geoms) for patch in patches]
     for pair in pairs:
         if pairs.count(pair) > 1:
-            raise InvalidValueError("patches", "have each pair of geoms once", ", ".join(sorted(pair)))
+            raise InvalidValueError(
+                "patches", "have each pair of geoms once", ", ".join(sorted(pair))
+            )
 
 
-def check_options(m: Any, *integrators: str, cone: str = "", sleeps: bool = False) -> None:
+def check_options(
+    m: Any, *integrators: str, cone: str = "", sleeps: bool = False
+) -> None:
     """Refuse options of a model that do not fit; `cone` is the reason why contacts have to have pyramidal ones."""
     options = m.opt
     integrator = mujoco.mjtIntegrator(options.integrator).name.removeprefix("mjINT_")
     if integrator.lower() not in map(str.lower, integrators):
-        raise InvalidValueError("integrator", f"be {', '.join(integrators)}", integrator)
+        raise InvalidValueError(
+            "integrator", f"be {', '.join(integrators)}", integrator
+        )
     if cone and options.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
         name = mujoco.mjtCone(options.cone).name.removeprefix("mjCONE_").lower()
         raise InvalidValueError("cone", f"be pyramidal{cone}", name)
     if options.noslip_iterations > 0:
-        raise InvalidValueError("noslip_iterations", "be 0: they would change the solution", options.noslip_iterations)
-    if not sleeps and options.enableflags & int(getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)):
-        raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
+        raise InvalidValueError(
+            "noslip_iterations",
+            "be 0: they would change the solution",
+            options.noslip_iterations,
+        )
+    if not sleeps and options.enableflags & int(
+        getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)
+    ):
+        raise InvalidValueError(
+            "sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled"
+        )
 
 
 class Placed:
@@ -222,23 +281,40 @@ class Placed:
     `unprepared`: geoms without a pair will do, if their own contacts have no friction (condim 1); `pair` is -1 then.
     """
 
-    def __init__(self, m: Any, patch: PatchContact, *, unprepared: bool = False) -> None:
-        self.patch, self.site = patch, _named(m, "site", patch.site, mujoco.mjtObj.mjOBJ_SITE)
-        self.geoms = np.array([_named(m, "geoms", name, mujoco.mjtObj.mjOBJ_GEOM) for name in patch.geoms])
-        bodies, owner = m.geom_bodyid[self.geoms], m.site_bodyid[self.site]
+    def __init__(
+        self, m: Any, patch: PatchContact, *, unprepared: bool = False
+    ) -> None:
+        self.patch = patch
+        self.site = _named(m, "site", patch.site, mujoco.mjtObj.mjOBJ_SITE)
+        self.geoms = np.array(
+            [_named(m, "geoms", name, mujoco.mjtObj.mjOBJ_GEOM) for name in patch.geoms]
+        )
+        bodies = m.geom_bodyid[self.geoms]
+        owner = m.site_bodyid[self.site]
         if bodies[0] == bodies[1]:
-            raise InvalidValueError("geoms", "be on two bodies", " and ".join(patch.geoms))
+            raise InvalidValueError(
+                "geoms", "be on two bodies", " and ".join(patch.geoms)
+            )
         if owner not in bodies:
-            raise InvalidValueError("site", f"be on the body of one of the geoms {patch.geoms}", patch.site)
+            raise InvalidValueError(
+                "site", f"be on the body of one of the geoms {patch.geoms}", patch.site
+            )
         own = int(bodies[1] == owner)
-        self.own, self.other = int(self.geoms[own]), int(self.geoms[1 - own])
-        self.owner, self.support = int(owner), int(bodies[1 - own])
+        self.own = int(self.geoms[own])
+        self.other = int(self.geoms[1 - own])
+        self.owner = int(owner)
+        self.support = int(bodies[1 - own])
         kinds = set(m.geom_type[self.geoms].tolist())
         faces = kinds == {_BOX} or (_PLANE in kinds and not _ROUND.intersection(kinds))
         free = faces and patch.model.law.reference_load is None
-        self.follows = patch.pressure == "follows" or (patch.pressure == "auto" and free)
+        self.follows = patch.pressure == "follows" or (
+            patch.pressure == "auto" and free
+        )
         """True if the pressure follows the contact forces."""
-        reach = [math.inf if m.geom_type[geom] == _PLANE else m.geom_rbound[geom] for geom in (self.own, self.other)]
+        reach = [
+            math.inf if m.geom_type[geom] == _PLANE else m.geom_rbound[geom]
+            for geom in (self.own, self.other)
+        ]
         self.carrier = self.own if reach[0] <= reach[1] else self.other
         """The smaller geom, along with which the patch goes over the other."""
         self.centre = CENTRES.index(patch.centre)
@@ -249,13 +325,17 @@ class Placed:
             self.curved |= bit if int(m.geom_type[geom]) == _CYLINDER else 0
         self.on_box = int(m.geom_type[self.other]) == _BOX
         for pair in range(m.npair):
-            if {int(m.pair_geom1[pair]), int(m.pair_geom2[pair])} == set(self.geoms.tolist()):
+            if {int(m.pair_geom1[pair]), int(m.pair_geom2[pair])} == set(
+                self.geoms.tolist()
+            ):
                 self.pair = pair
                 self.check(m)
                 return
         self.pair = -1
         if not (unprepared and (m.geom_condim[self.geoms] == 1).all()):
-            raise InvalidValueError("pair", "be in the model (prepare adds it)", " and ".join(patch.geoms))
+            raise InvalidValueError(
+                "pair", "be in the model (prepare adds it)", " and ".join(patch.geoms)
+            )
 
     def check(self, m: Any) -> None:
         """Refuse a pair with friction of its own, and time steps at which MuJoCo's own normal contact is lost.
@@ -266,8 +346,12 @@ class Placed:
         if m.pair_dim[self.pair] != 1:
             rule = f"have condim 1 between {' and '.join(self.patch.geoms)} (prepare does that)"
             raise InvalidValueError("pair", rule, int(m.pair_dim[self.pair]))
-        constant, dt = float(m.pair_solref[self.pair, 0]), m.opt.timestep
-        safe = m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE) == 0 and m.opt.integrator in _IMPLICIT
+        constant = float(m.pair_solref[self.pair, 0])
+        dt = m.opt.timestep
+        safe = (
+            m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_REFSAFE) == 0
+            and m.opt.integrator in _IMPLICIT
+        )
         if not (safe and dt <= LONGEST) and 0.0 < 0.5 * constant < dt:
             rule = f"be at most half of solref[0] = {constant:g} s of the pair {' and '.join(self.patch.geoms)}"
             rule += f", or {LONGEST:g} s with refsafe and implicit or implicitfast"
@@ -282,7 +366,12 @@ class Placed:
         return chosen, np.where(forward[chosen], 1.0, -1.0)
 
     def frame(
-        self, d: Any, chosen: np.ndarray, sign: np.ndarray, centre: np.ndarray, axis: np.ndarray
+        self,
+        d: Any,
+        chosen: np.ndarray,
+        sign: np.ndarray,
+        centre: np.ndarray,
+        axis: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return origin [3] and axes [3, 3], as rows, of its frame in the world.
 
@@ -294,7 +383,9 @@ class Placed:
         x = turned @ axis
         x -= (x @ normal) * normal
         x /= np.linalg.norm(x)
-        return d.site_xpos[self.site] + turned @ centre, np.array([x, np.cross(normal, x), normal])
+        return d.site_xpos[self.site] + turned @ centre, np.array(
+            [x, np.cross(normal, x), normal]
+        )
 
     def extent(self) -> tuple[float, ...]:
         """Return the reach of the patch (see `placing`) and the width of its edge, [5] [m]."""
@@ -320,12 +411,18 @@ def _named(m: Any, what: str, name: str, kind: Any) -> int:
     found = mujoco.mj_name2id(m, kind, name)
     if found < 0:
         count = getattr(m, f"n{kind.name.removeprefix('mjOBJ_').lower()}")
-        flexes = [mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, i) for i in range(m.nflex)]
-        _choose(what, name, [mujoco.mj_id2name(m, kind, i) for i in range(count)], flexes)
+        flexes = [
+            mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_FLEX, i) for i in range(m.nflex)
+        ]
+        _choose(
+            what, name, [mujoco.mj_id2name(m, kind, i) for i in range(count)], flexes
+        )
     return found
 
 
-def _choose(what: str, name: str, names: Iterable[str | None], flexes: Iterable[str | None] = ()) -> None:
+def _choose(
+    what: str, name: str, names: Iterable[str | None], flexes: Iterable[str | None] = ()
+) -> None:
     """Raise unless a name is among these, and tell some of them, like ones first."""
     known = sorted(filter(None, names))
     if what == "geoms" and name not in known and name in flexes:

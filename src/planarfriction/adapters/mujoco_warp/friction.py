@@ -84,12 +84,17 @@ class Friction:
         njmax: int | None = None,
     ) -> None:
         check_once(patches)
-        self.m, self.patches, self.placed = m, tuple(patches), [Placed(m, each, unprepared=True) for each in patches]
+        self.m = m
+        self.patches = tuple(patches)
+        self.placed = [Placed(m, each, unprepared=True) for each in patches]
         _check(m, self.placed)
         worlds = data.nworld if data is not None else validation.count("worlds", worlds)
         own = _parameters(m, self.placed, worlds) | dict(parameters or {})
-        models, follows = [patch.model for patch in patches], [each.follows for each in self.placed]
-        self.coupled = CoupledPatches(models, worlds=worlds, follows=follows, parameters=own)
+        models = [patch.model for patch in patches]
+        follows = [each.follows for each in self.placed]
+        self.coupled = CoupledPatches(
+            models, worlds=worlds, follows=follows, parameters=own
+        )
         self.model = mjw.put_model(m) if model is None else model
         """Model of MuJoCo Warp."""
         self.data: Any = data
@@ -100,7 +105,9 @@ class Friction:
             self.data = mjw.put_data(m, d, nworld=worlds, nconmax=nconmax, njmax=njmax)
         prepared = m.nuserdata if any(each.pair >= 0 for each in self.placed) else 0
         size = layout_of(patches, m.nv).size
-        self._memory = self.data.userdata if prepared else wp.zeros((worlds, size), dtype=float)
+        self._memory = (
+            self.data.userdata if prepared else wp.zeros((worlds, size), dtype=float)
+        )
         self._at = memory(patches, m.nv, prepared or size)
         self._said: set[str] = set()
         self._steps = 0
@@ -129,7 +136,8 @@ class Friction:
         self._warn()
         u: Any = self._memory.numpy().copy()
         at = self._at
-        rounds, passes = u[:, at.iterations].astype(int), u[:, at.passes].astype(int)
+        rounds = u[:, at.iterations].astype(int)
+        passes = u[:, at.passes].astype(int)
         return Report(rounds, passes, u[:, at.residual], u[:, at.converged] > 0.0)
 
     def misplaced(self) -> str | None:
@@ -138,7 +146,9 @@ class Friction:
         It is that of any world, and None if all lay there; see `planarfriction.adapters.mujoco`. `report` warns of it
         once, and `step`, which looks after 1, 2, 4, 8 and so on steps.
         """
-        return misplaced_line(self.placed, int(self._memory.numpy()[:, self._at.misplaced].max()))
+        return misplaced_line(
+            self.placed, int(self._memory.numpy()[:, self._at.misplaced].max())
+        )
 
     def _warn(self) -> None:
         """Warn, once, of a patch that did not lie in its contact."""
@@ -164,7 +174,10 @@ class Friction:
         with self.install():
             mjw.step(self.model, self.data)
         self._steps += 1
-        if self._steps & (self._steps - 1) == 0 and not self._memory.device.is_capturing:
+        if (
+            self._steps & (self._steps - 1) == 0
+            and not self._memory.device.is_capturing
+        ):
             self._warn()
 
     @contextmanager
@@ -192,80 +205,188 @@ class Friction:
 
         Raises InvalidValueError for another model and other data than `model` and `data`.
         """
-        host, patches, frames, scratch = self._bound(m, d), self._patches, self._frames, self._scratch
-        problem, results = self._problem, self._results
+        host = self._bound(m, d)
+        patches = self._patches
+        frames = self._frames
+        scratch = self._scratch
+        problem = self._problem
+        results = self._results
         host.timestep = m.opt.timestep
 
         def launch(kernel: Any, *inputs: Any) -> None:
             wp.launch(kernel, dim=d.nworld, inputs=inputs)
 
-        launch(geometry.recall, patches, self._places, host, frames, problem, self._memory)
+        launch(
+            geometry.recall, patches, self._places, host, frames, problem, self._memory
+        )
         launch(geometry.place, patches, host, frames, problem)
         mjw.fwd_actuation(m, d)
         mjw.fwd_acceleration(m, d, factorize=True)
         mjw.solve(m, d)
-        launch(centres.follow_centres, patches, host, frames, problem, self.coupled.parameters)
+        launch(
+            centres.follow_centres,
+            patches,
+            host,
+            frames,
+            problem,
+            self.coupled.parameters,
+        )
         launch(arcs.bend, patches, host, frames)
         if host.implicit == 2:
             mjw.deriv_smooth_vel(m, d, self._metric)
         for i in range(PASSES):
-            launch(responses.respond, patches, host, frames, scratch, problem, int(i == 0))
-            self.coupled.step(self._state, self._host, self._dt, results, skip=scratch.done)
-            launch(responses.settle, host, frames, scratch, problem, results.wrench, results.iterations)
+            launch(
+                responses.respond, patches, host, frames, scratch, problem, int(i == 0)
+            )
+            self.coupled.step(
+                self._state, self._host, self._dt, results, skip=scratch.done
+            )
+            launch(
+                responses.settle,
+                host,
+                frames,
+                scratch,
+                problem,
+                results.wrench,
+                results.iterations,
+            )
         found = *results[:4], results.residual, results.converged
-        launch(responses.remember, patches, self._places, host, frames, scratch, problem, *found, self._memory)
+        launch(
+            responses.remember,
+            patches,
+            self._places,
+            host,
+            frames,
+            scratch,
+            problem,
+            *found,
+            self._memory,
+        )
 
     # ------------------------------------------------------------------ what is made once
 
     def _make(self, worlds: int) -> None:
         """Make the arrays that steps work with."""
-        m, k, nv, n, njmax = self.m, len(self.patches), self.m.nv, 3 * len(self.patches), self.data.efc.force.shape[1]
+        m = self.m
+        k = len(self.patches)
+        nv = self.m.nv
+        n = 3 * len(self.patches)
+        njmax = self.data.efc.force.shape[1]
 
-        def zeros(struct: Any, others: tuple[int, ...], **shapes: tuple[int, ...]) -> Any:
+        def zeros(
+            struct: Any, others: tuple[int, ...], **shapes: tuple[int, ...]
+        ) -> Any:
             """Return a struct with arrays of zeros, of these shapes behind the axis of worlds."""
-            made, device = struct(), self.coupled.device
+            made = struct()
+            device = self.coupled.device
             for name, each in struct.vars.items():
                 shape = worlds, *shapes.get(name, others)
-                setattr(made, name, wp.zeros(shape, dtype=each.type.dtype, device=device))
+                setattr(
+                    made, name, wp.zeros(shape, dtype=each.type.dtype, device=device)
+                )
             return made
 
         self._dt = float(m.opt.timestep)
-        self._places, self._patches = _filled(geometry.Places(), self._at._asdict()), self._numbers()
-        self._frames = zeros(geometry.Frames, (k,), owner=(njmax,), lever=(njmax,), jacobian=(n, nv))
-        both = {"answers": (nv, n + 1), "gains": (nv, n + 1), "stiff": (nv, nv), "acceleration": (nv,)}
-        self._scratch = zeros(responses.Scratch, (), active=(njmax,), pressed=(k,), **both)
-        wide = {"response": (n, n), "load_response": (k, n), "moments": (k, 2), "state": self.coupled.state_shape}
+        self._places, self._patches = (
+            _filled(geometry.Places(), self._at._asdict()),
+            self._numbers(),
+        )
+        self._frames = zeros(
+            geometry.Frames, (k,), owner=(njmax,), lever=(njmax,), jacobian=(n, nv)
+        )
+        both = {
+            "answers": (nv, n + 1),
+            "gains": (nv, n + 1),
+            "stiff": (nv, nv),
+            "acceleration": (nv,),
+        }
+        self._scratch = zeros(
+            responses.Scratch, (), active=(njmax,), pressed=(k,), **both
+        )
+        wide = {
+            "response": (n, n),
+            "load_response": (k, n),
+            "moments": (k, 2),
+            "state": self.coupled.state_shape,
+        }
         self._problem = p = zeros(geometry.Problem, (k, 3), load=(k,), **wide)
-        self._host = HostStep(p.twist, p.load, p.guess, p.response, p.load_response, p.moments)
-        self._state, self._results = p.state, self.coupled.results()
-        self._metric = wp.zeros((worlds, self.model.nC), dtype=float, device=self.coupled.device)
-        damped = bool(m.dof_damping.any()) and not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
-        self._implicit = int(damped) if m.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER else 2
+        self._host = HostStep(
+            p.twist, p.load, p.guess, p.response, p.load_response, p.moments
+        )
+        self._state = p.state
+        self._results = self.coupled.results()
+        self._metric = wp.zeros(
+            (worlds, self.model.nC), dtype=float, device=self.coupled.device
+        )
+        damped = bool(m.dof_damping.any()) and not m.opt.disableflags & int(
+            mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+        )
+        self._implicit = (
+            int(damped) if m.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER else 2
+        )
 
     def _numbers(self) -> Any:
         """Return the numbers of the patches for kernels."""
         shapes = [each.model.state_shape for each in self.patches]
-        names = "site", "own", "other", "owner", "support", "centre", "curved", "carrier"
-        found = {name: [int(getattr(each, name)) for each in self.placed] for name in names}
+        names = (
+            "site",
+            "own",
+            "other",
+            "owner",
+            "support",
+            "centre",
+            "curved",
+            "carrier",
+        )
+        found = {
+            name: [int(getattr(each, name)) for each in self.placed] for name in names
+        }
         found |= {"bristles": [math.prod(shape[1:]) for shape in shapes]}
         found |= {"first": np.cumsum([0, *map(math.prod, shapes)])[:-1].tolist()}
         found |= {"radius": [lever_of(each.model) for each in self.patches]}
-        found |= {"reach": [placing.reach_of(each.model.patch) for each in self.patches]}
-        found |= {"scale": [end - 1 for end in np.cumsum([len(names) for names in self.coupled.names]).tolist()]}
+        found |= {
+            "reach": [placing.reach_of(each.model.patch) for each in self.patches]
+        }
+        found |= {
+            "scale": [
+                end - 1
+                for end in np.cumsum(
+                    [len(names) for names in self.coupled.names]
+                ).tolist()
+            ]
+        }
         found |= {"surface": surface_velocities(self.m, self.placed).astype(np.float32)}
-        kinds, device = geometry.Patches.vars, self.coupled.device
-        arrays = {name: wp.array(each, dtype=kinds[name].type.dtype, device=device) for name, each in found.items()}
-        return _filled(geometry.Patches(), arrays | {"count": len(shapes), "states": self.coupled.state_shape[0]})
+        kinds = geometry.Patches.vars
+        device = self.coupled.device
+        arrays = {
+            name: wp.array(each, dtype=kinds[name].type.dtype, device=device)
+            for name, each in found.items()
+        }
+        return _filled(
+            geometry.Patches(),
+            arrays | {"count": len(shapes), "states": self.coupled.state_shape[0]},
+        )
 
     def _bound(self, m: Any, d: Any) -> Any:
         """Return the arrays of model and data for kernels."""
         if m is not self.model or d is not self.data:
             raise InvalidValueError("model, data", "be those of the friction", "others")
         if not hasattr(self, "_arrays"):
-            efc, c, own = d.efc, d.contact, ("time", "site_xpos", "site_xmat", "geom_xpos", "geom_xmat", "qvel")
+            efc = d.efc
+            c = d.contact
+            own = ("time", "site_xpos", "site_xmat", "geom_xpos", "geom_xmat", "qvel")
             arrays = {name: getattr(d, name) for name in own}
-            arrays |= {"passive": d.qfrc_passive, "smooth": d.qfrc_smooth, "warmstart": d.qacc_warmstart}
-            arrays |= {"nefc": d.nefc, "type": efc.type, "id": efc.id, "force": efc.force}
+            arrays |= {
+                "passive": d.qfrc_passive,
+                "smooth": d.qfrc_smooth,
+                "warmstart": d.qacc_warmstart,
+            }
+            arrays |= {
+                "nefc": d.nefc,
+                "type": efc.type,
+                "id": efc.id,
+                "force": efc.force,
+            }
             arrays |= {"geom": c.geom, "frame": c.frame, "pos": c.pos}
             arrays |= {
                 "sparse": int(m.is_sparse), "nnz": efc.J_rownnz, "first": efc.J_rowadr, "column": efc.J_colind,
@@ -273,7 +394,12 @@ class Friction:
                 "metric": self._metric, "inertia_nnz": m.M_rownnz, "inertia_first": m.M_rowadr,
                 "inertia_column": m.M_colind, "damping": m.dof_damping, "implicit": self._implicit,
             }  # fmt: skip
-            arrays |= {"root": m.body_rootid, "ancestor": m.body_isdofancestor, "centre": d.subtree_com, "axis": d.cdof}
+            arrays |= {
+                "root": m.body_rootid,
+                "ancestor": m.body_isdofancestor,
+                "centre": d.subtree_com,
+                "axis": d.cdof,
+            }
             arrays |= {"turned": d.cdof_dot, "velocity": d.cvel}
             self._arrays = _filled(geometry.Host(), arrays)
         return self._arrays
@@ -286,8 +412,14 @@ def _parameters(m: Any, placed: Sequence[Placed], worlds: int) -> dict[str, np.n
     found = parameters_in(m, place_of_parameters(m), len(placed))
     for name in DISPLACEMENT:
         if found[name].any():
-            raise InvalidValueError(name, "be 0: in Warp patches lie at their sites", found[name].tolist())
-    own = {name: np.tile(values, (worlds, 1)) for name, values in found.items() if name not in DISPLACEMENT}
+            raise InvalidValueError(
+                name, "be 0: in Warp patches lie at their sites", found[name].tolist()
+            )
+    own = {
+        name: np.tile(values, (worlds, 1))
+        for name, values in found.items()
+        if name not in DISPLACEMENT
+    }
     if not any(each.patch.model.law.numbers.elasto_plastic for each in placed):
         del own["breakaway_ratio"]
     return own
@@ -302,7 +434,12 @@ def _filled(struct: Any, values: Mapping[str, Any]) -> Any:
 
 def _check(m: Any, placed: Sequence[Placed]) -> None:
     """Refuse options of a model that do not fit."""
-    check_options(m, "Euler", "implicitfast", cone=", where constraints are linear in their ranges")
+    check_options(
+        m,
+        "Euler",
+        "implicitfast",
+        cone=", where constraints are linear in their ranges",
+    )
     if m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION):
         rule = "be enabled: MuJoCo Warp calls control callbacks with it alone"
         raise InvalidValueError("actuation", rule, "disabled")

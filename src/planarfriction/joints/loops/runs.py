@@ -49,13 +49,17 @@ def level(joint, speed, tau_motor, tau_external):
 @kernel
 def viscous(joint, speed):
     """Compute the viscous torque [N m]."""
-    return joint.law.sigma_2 * speed + joint.viscous_asymmetry * xp.maximum(speed, -speed)
+    return joint.law.sigma_2 * speed + joint.viscous_asymmetry * xp.maximum(
+        speed, -speed
+    )
 
 
 @kernel
 def within(torque, side, joint, load):
     """Return the torque of the bristles brought back onto the static level of its side [N m]."""
-    most = joint.law.mu_s + load + xp.where(side < 0.0, -joint.asymmetry, joint.asymmetry)
+    most = (
+        joint.law.mu_s + load + xp.where(side < 0.0, -joint.asymmetry, joint.asymmetry)
+    )
     return xp.minimum(xp.maximum(torque, -most), most)
 
 
@@ -73,10 +77,13 @@ def friction(joint, z, speed, tau_motor, tau_external):
 
     The damping of bristles that bend back fast would exceed the level.
     """
-    law, most = joint.law, level(joint, speed, tau_motor, tau_external)
+    law = joint.law
+    most = level(joint, speed, tau_motor, tau_external)
     zdot = speed - xp.maximum(speed, -speed) * law.sigma_0 / most * z
     bristles = law.sigma_0 * z + law.sigma_1 * zdot
-    return within(bristles, bristles, joint, load_level(joint, tau_motor, tau_external)) + viscous(joint, speed)
+    return within(
+        bristles, bristles, joint, load_level(joint, tau_motor, tau_external)
+    ) + viscous(joint, speed)
 
 
 @kernel
@@ -86,7 +93,10 @@ def joint_step(joint, z, speed, tau_motor, tau_external, dt):
     Bristles that a falling level has left beyond their limit come back onto it first, as those of a patch do.
     """
     stiffness = joint.law.sigma_0
-    start = within(stiffness * z, z, joint, load_level(joint, tau_motor, tau_external)) / stiffness
+    start = (
+        within(stiffness * z, z, joint, load_level(joint, tau_motor, tau_external))
+        / stiffness
+    )
     new = advance(joint, start, speed, dt, level(joint, speed, tau_motor, tau_external))
     return new, friction(joint, new, speed, tau_motor, tau_external)
 
@@ -112,7 +122,9 @@ def run_measured(joint, time, speed, tau_motor, tau_external, taken):
     for i in range(len(time)):
         if i > 0:
             middle = 0.5 * (speed[i] + speed[i - 1])
-            z = joint_step(joint, z, middle, tau_motor[i], tau_external[i], time[i] - time[i - 1])[0]
+            z = joint_step(
+                joint, z, middle, tau_motor[i], tau_external[i], time[i] - time[i - 1]
+            )[0]
         taken[i] = friction(joint, z, speed[i], tau_motor[i], tau_external[i])
 
 
@@ -145,7 +157,8 @@ def bent_step(law, v, z, dt, k, pushed, most):
     to which all torque at rest points.
     """
     b = pushed + law.sigma_1 / dt * z
-    a, c = law.sigma_0 + law.sigma_1 / dt, dt * law.sigma_0 / most
+    a = law.sigma_0 + law.sigma_1 / dt
+    c = dt * law.sigma_0 / most
     side = 1.0 if b > a * z else -1.0
     net = side * b
     middle = 0.5 * (k - net * c + a * dt)
@@ -169,7 +182,9 @@ def rigid_step(v, k, pushed, push, most):
 
 
 @jit
-def run_plant(joint, plant, time, given, enabled, external, measured, again, step, motion):
+def run_plant(
+    joint, plant, time, given, enabled, external, measured, again, step, motion
+):
     """Simulate a joint; write q and dq at each sample into `motion` `[T, 2]`.
 
     It begins at the first row of `measured` `[T, 2]`, q and dq, and once more every `again` samples. `given` is the
@@ -180,20 +195,26 @@ def run_plant(joint, plant, time, given, enabled, external, measured, again, ste
     Viscous terms decay exactly (`formulas.relaxation`), dry friction is implicit.
     """
     law = joint.law
-    q, v = measured[0, 0], measured[0, 1]
+    q = measured[0, 0]
+    v = measured[0, 1]
     z = 0.0
-    motion[0, 0], motion[0, 1] = q, v
+    motion[0, 0] = q
+    motion[0, 1] = v
     for i in range(1, len(time)):
         if i % again == 0:
-            q, v = measured[i - 1, 0], measured[i - 1, 1]
+            q = measured[i - 1, 0]
+            v = measured[i - 1, 1]
         count = max(1, math.ceil((time[i] - time[i - 1]) / step - 1e-9))
         dt = (time[i] - time[i - 1]) / count
         on = enabled[i - 1]
         # k v' = (k - damping) v + push - friction
         damping = law.sigma_2 + on * plant.back_emf
-        k = plant.inertia / (dt * formulas.relaxation(xp, damping * dt / plant.inertia)[1])
+        k = plant.inertia / (
+            dt * formulas.relaxation(xp, damping * dt / plant.inertia)[1]
+        )
         for j in range(count):
-            middle, share = q + 0.5 * dt * v, (j + 0.5) / count
+            middle = q + 0.5 * dt * v
+            share = (j + 0.5) / count
             outside = external[i - 1] + share * (external[i] - external[i - 1])
             outside -= plant.moment * math.sin(middle - plant.offset)
             volts = given[i - 1] + share * (given[i] - given[i - 1])
@@ -209,4 +230,5 @@ def run_plant(joint, plant, time, given, enabled, external, measured, again, ste
             else:
                 v, mean = rigid_step(v, k, pushed, push, most)
             q += dt * mean
-        motion[i, 0], motion[i, 1] = q, v
+        motion[i, 0] = q
+        motion[i, 1] = v

@@ -14,7 +14,12 @@ from planarfriction._engine.bristles.discs import sliding
 from planarfriction._engine.codegen.derive import derive
 from planarfriction._engine.codegen.vectors import dot, norm, plus, times
 from planarfriction._engine.compiler import jit, kernel
-from planarfriction.limit_surface.loops.twists import lean_of, newton_move, of_each, plane
+from planarfriction.limit_surface.loops.twists import (
+    lean_of,
+    newton_move,
+    of_each,
+    plane,
+)
 
 _BALANCED = 1e-13
 """Slope of the dissipation at which a rounded minimum is found, per `mu f_N` [-]."""
@@ -64,12 +69,16 @@ def _seen_along(levers, spins, i, axis):
 @jit
 def cell_sums(levers, spins, weights, units, h, slopes):
     """Write h `[M, 3]` and `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`; cells are those of `cell_twists`."""
-    h[:], slopes[:] = 0.0, 0.0
+    h[:] = 0.0
+    slopes[:] = 0.0
     for m in range(units.shape[0]):
         for i in range(weights.shape[0]):
-            by_x, by_y = _seen_along(levers, spins, i, 0), _seen_along(levers, spins, i, 1)
+            by_x = _seen_along(levers, spins, i, 0)
+            by_y = _seen_along(levers, spins, i, 1)
             along = by_x, by_y, _seen_along(levers, spins, i, 2)
-            u = plus(plus(times(units[m, 0], by_x), units[m, 1], by_y), units[m, 2], along[2])
+            u = plus(
+                plus(times(units[m, 0], by_x), units[m, 1], by_y), units[m, 2], along[2]
+            )
             if norm(u) <= _AT_REST:
                 continue
             (pull,), tape = _FORTH(u)
@@ -83,12 +92,18 @@ def cell_sums(levers, spins, weights, units, h, slopes):
 @kernel
 def _of_disc(seen, i, a, b):
     """Return slope and Hessian of the mean speed of a disc at a place, and that speed."""
-    along_a, along_b = (seen[2, i], seen[3, i], seen[7, i]), (seen[4, i], seen[5, i], seen[8, i])
+    along_a = (seen[2, i], seen[3, i], seen[7, i])
+    along_b = (seen[4, i], seen[5, i], seen[8, i])
     u = plus(plus((seen[0, i], seen[1, i], seen[6, i]), a, along_a), b, along_b)
     (pull,), tape = _FORTH(u)
-    (by_a,), (by_b,) = _BACK(tape, (along_a,)), _BACK(tape, (along_b,))
+    (by_a,) = _BACK(tape, (along_a,))
+    (by_b,) = _BACK(tape, (along_b,))
     slopes = dot(pull, along_a), dot(pull, along_b)
-    return slopes, (dot(by_a, along_a), dot(by_a, along_b), dot(by_b, along_b)), dot(pull, u)
+    return (
+        slopes,
+        (dot(by_a, along_a), dot(by_a, along_b), dot(by_b, along_b)),
+        dot(pull, u),
+    )
 
 
 @kernel
@@ -99,18 +114,30 @@ def _is_disc(seen, i):
 @kernel
 def _rounded(seen, weights, by_lean, a, b, rounding):
     """Return slope and Hessian of `sum w_i sqrt(|u_i|^2 + rounding^2)`, with the share of the asymmetry, at a place."""
-    ga, gb, aa, ab, bb = by_lean[0], by_lean[1], 0.0, 0.0, 0.0
+    ga = by_lean[0]
+    gb = by_lean[1]
+    aa = 0.0
+    ab = 0.0
+    bb = 0.0
     for i in range(weights.shape[0]):
-        ax, ay, bx, by = seen[2, i], seen[3, i], seen[4, i], seen[5, i]
+        ax = seen[2, i]
+        ay = seen[3, i]
+        bx = seen[4, i]
+        by = seen[5, i]
         if _is_disc(seen, i):
             slope, bend, _ = _of_disc(seen, i, a, b)
-            ga, gb = ga + weights[i] * slope[0], gb + weights[i] * slope[1]
-            aa, ab, bb = aa + weights[i] * bend[0], ab + weights[i] * bend[1], bb + weights[i] * bend[2]
+            ga = ga + weights[i] * slope[0]
+            gb = gb + weights[i] * slope[1]
+            aa = aa + weights[i] * bend[0]
+            ab = ab + weights[i] * bend[1]
+            bb = bb + weights[i] * bend[2]
             continue
-        ux, uy = seen[0, i] + a * ax + b * bx, seen[1, i] + a * ay + b * by
+        ux = seen[0, i] + a * ax + b * bx
+        uy = seen[1, i] + a * ay + b * by
         square = ux * ux + uy * uy + rounding * rounding
         pull = weights[i] / math.sqrt(square)
-        along_a, along_b = ux * ax + uy * ay, ux * bx + uy * by
+        along_a = ux * ax + uy * ay
+        along_b = ux * bx + uy * by
         less = pull / square
         ga += pull * along_a
         gb += pull * along_b
@@ -128,15 +155,18 @@ def _descend(seen, weights, by_lean, a, b, rounding, balanced):
         if math.sqrt(ga * ga + gb * gb) <= balanced:
             break
         da, db = newton_move(ga, gb, aa, ab, bb)
-        downhill, length = da * ga + db * gb, 1.0
+        downhill = da * ga + db * gb
+        length = 1.0
         while length > 1e-12:
-            ta, tb = a + length * da, b + length * db
+            ta = a + length * da
+            tb = b + length * db
             ga, gb, aa, ab, bb = _rounded(seen, weights, by_lean, ta, tb, rounding)
             # convex along the step: it is short enough while the slope at its end is not steeply uphill
             if da * ga + db * gb <= -_UPHILL * downhill:
                 break
             length *= 0.5
-        a, b = ta, tb
+        a = ta
+        b = tb
         # at a kink the slope stays above the wanted one: a place is only so exact
         if length * math.sqrt(da * da + db * db) <= _PLACED * (1.0 + abs(a) + abs(b)):
             break
@@ -146,24 +176,33 @@ def _descend(seen, weights, by_lean, a, b, rounding, balanced):
 @kernel
 def _unborne(seen, weights, a, b, ga, gb):
     """Return what is left of a slope after the slowest cell, if it rests, has taken its share; and the dissipation."""
-    slowest, rests, power = math.inf, 0, 0.0
+    slowest = math.inf
+    rests = 0
+    power = 0.0
     for i in range(weights.shape[0]):
         if _is_disc(seen, i):
             power += weights[i] * _of_disc(seen, i, a, b)[2]
             continue
-        ux, uy = seen[0, i] + a * seen[2, i] + b * seen[4, i], seen[1, i] + a * seen[3, i] + b * seen[5, i]
+        ux = seen[0, i] + a * seen[2, i] + b * seen[4, i]
+        uy = seen[1, i] + a * seen[3, i] + b * seen[5, i]
         speed = math.sqrt(ux * ux + uy * uy)
         power += weights[i] * speed
         if speed < slowest:
-            slowest, rests = speed, i
+            slowest = speed
+            rests = i
     left = math.sqrt(ga * ga + gb * gb)
     i = rests
-    ax, ay, bx, by = seen[2, i], seen[3, i], seen[4, i], seen[5, i]
+    ax = seen[2, i]
+    ay = seen[3, i]
+    bx = seen[4, i]
+    by = seen[5, i]
     turn = ax * by - ay * bx
     if slowest < _RESTS and turn != 0.0:
-        ux, uy = seen[0, i] + a * ax + b * bx, seen[1, i] + a * ay + b * by
+        ux = seen[0, i] + a * ax + b * bx
+        uy = seen[1, i] + a * ay + b * by
         pull = weights[i] / math.sqrt(ux * ux + uy * uy + _LAST * _LAST)
-        fx, fy = pull * ux - (ga * by - gb * ay) / turn, pull * uy - (gb * ax - ga * bx) / turn
+        fx = pull * ux - (ga * by - gb * ay) / turn
+        fy = pull * uy - (gb * ax - ga * bx) / turn
         if math.sqrt(fx * fx + fy * fy) <= _FULL * weights[i]:
             left = 0.0
     return left, power
@@ -176,11 +215,21 @@ def _in_cells(surface, target):
     for i in range(weights.shape[0]):
         for k in range(2):
             c = (levers[k, 0, i], levers[k, 1, i], levers[k, 2, i])
-            seen[k, i], seen[2 + k, i], seen[4 + k, i] = dot(c, target), dot(c, first), dot(c, second)
+            seen[k, i], seen[2 + k, i], seen[4 + k, i] = (
+                dot(c, target),
+                dot(c, first),
+                dot(c, second),
+            )
         spin = spins[i]
-        seen[6, i], seen[7, i], seen[8, i] = spin * target[2], spin * first[2], spin * second[2]
+        seen[6, i] = spin * target[2]
+        seen[7, i] = spin * first[2]
+        seen[8, i] = spin * second[2]
     by_lean = (dot(lean, first), dot(lean, second))
-    a, b, ga, gb, rounding = 0.0, 0.0, 0.0, 0.0, 1.0
+    a = 0.0
+    b = 0.0
+    ga = 0.0
+    gb = 0.0
+    rounding = 1.0
     while rounding > 2.0 * _LAST:
         rounding *= 0.1
         balanced = _ROUGH if rounding > 2.0 * _LAST else _BALANCED

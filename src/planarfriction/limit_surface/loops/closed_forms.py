@@ -92,27 +92,42 @@ def _segment(ax, ay, bx, by):
     `d = h n + t tau`: with `S = |a| + |b|` and length L, `int 1/|d| = log((S + L)/(S - L))`; differences between the
     two ends are written without cancellation.
     """
-    ex, ey = bx - ax, by - ay
+    ex = bx - ax
+    ey = by - ay
     length = math.sqrt(ex * ex + ey * ey)
     per_length = 1.0 / xp.maximum(length, _TINY)
-    tx, ty = ex * per_length, ey * per_length
+    tx = ex * per_length
+    ty = ey * per_length
     h = ax * ty - ay * tx
-    t1, t2 = ax * tx + ay * ty, bx * tx + by * ty
-    d1, d2 = math.sqrt(h * h + t1 * t1), math.sqrt(h * h + t2 * t2)
-    per_d1, per_d2 = 1.0 / xp.maximum(d1, _TINY), 1.0 / xp.maximum(d2, _TINY)
+    t1 = ax * tx + ay * ty
+    t2 = bx * tx + by * ty
+    d1 = math.sqrt(h * h + t1 * t1)
+    d2 = math.sqrt(h * h + t2 * t2)
+    per_d1 = 1.0 / xp.maximum(d1, _TINY)
+    per_d2 = 1.0 / xp.maximum(d2, _TINY)
     total = xp.maximum(d1 + d2, _TINY)
-    both, product = t1 + t2, t1 * t2
+    both = t1 + t2
+    product = t1 * t2
     if product > 0.0:  # the foot of the height is outside the segment
         half_gap = d1 * d2 + product + h * h
         turn = h * h * length * both / (t2 * d1 + t1 * d2) * per_d1 * per_d2
     else:
-        half_gap = h * h * (1.0 + (t1 * t1 + t2 * t2 + h * h) / xp.maximum(d1 * d2 - product, _TINY * _TINY))
+        half_gap = (
+            h
+            * h
+            * (
+                1.0
+                + (t1 * t1 + t2 * t2 + h * h)
+                / xp.maximum(d1 * d2 - product, _TINY * _TINY)
+            )
+        )
         turn = t2 * per_d2 - t1 * per_d1
     half_gap = xp.maximum(half_gap, (_ON_SEGMENT * length) ** 2 + _TINY)
     inverse = math.log1p(length * (total + length) / half_gap)
     rise = length * both / total
     f = 0.25 * length * (total + both * both / total) + 0.5 * h * h * inverse
-    gx, gy = ty * h * inverse + tx * rise, -tx * h * inverse + ty * rise
+    gx = ty * h * inverse + tx * rise
+    gy = -tx * h * inverse + ty * rise
     side = h * rise * per_d1 * per_d2
     along = inverse - turn
     mxx = ty * ty * turn + 2.0 * tx * ty * side + tx * tx * along
@@ -126,7 +141,8 @@ def _to_twist(density, s, cx, cy, f, gx, gy, mxx, mxy, myy):
     """Return the gradient (3) and second derivatives (xx, xy, xs, yy, ys, ss) by the twist, from f, G and M."""
     signed = xp.where(s < 0.0, -density, density)
     per = density / abs(s)
-    x, y = mxy * cx - mxx * cy, myy * cx - mxy * cy
+    x = mxy * cx - mxx * cy
+    y = myy * cx - mxy * cy
     return (
         -signed * gy, signed * gx, signed * (f + cx * gx + cy * gy),
         per * mxx, per * mxy, per * x, per * myy, per * y, per * (y * cx - x * cy),
@@ -138,14 +154,25 @@ def _near(corners, i, count, density, s, cx, cy):
     """Return the closed form of element i: a segment, or a signed sum over the sides of a quad."""
     if count == SEGMENTS:
         _, f, gx, gy, mxx, mxy, myy = _segment(
-            corners[i, 0, 0] - cx, corners[i, 0, 1] - cy, corners[i, 1, 0] - cx, corners[i, 1, 1] - cy
+            corners[i, 0, 0] - cx,
+            corners[i, 0, 1] - cy,
+            corners[i, 1, 0] - cx,
+            corners[i, 1, 1] - cy,
         )
         return _to_twist(density, s, cx, cy, f, gx, gy, mxx, mxy, myy)
-    f, gx, gy, mxx, mxy, myy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    f = 0.0
+    gx = 0.0
+    gy = 0.0
+    mxx = 0.0
+    mxy = 0.0
+    myy = 0.0
     for k in range(4):
         n = (k + 1) % 4
         h, sf, sgx, sgy, sxx, sxy, syy = _segment(
-            corners[i, k, 0] - cx, corners[i, k, 1] - cy, corners[i, n, 0] - cx, corners[i, n, 1] - cy
+            corners[i, k, 0] - cx,
+            corners[i, k, 1] - cy,
+            corners[i, n, 0] - cx,
+            corners[i, n, 1] - cy,
         )
         f += h * sf * (1.0 / 3.0)
         gx += 0.5 * h * sgx
@@ -162,17 +189,41 @@ def _far(block, tier, count, rules, points, x, y, s):
 
     The elements run innermost, so that the loop vectorises.
     """
-    hx, hy, hs, xx, xy, xs, yy, ys, ss = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    hx = 0.0
+    hy = 0.0
+    hs = 0.0
+    xx = 0.0
+    xy = 0.0
+    xs = 0.0
+    yy = 0.0
+    ys = 0.0
+    ss = 0.0
     for k in range(points):
-        xi, eta, weight = rules[tier, 0, k], rules[tier, 1, k], rules[tier, 2, k]
+        xi = rules[tier, 0, k]
+        eta = rules[tier, 1, k]
+        weight = rules[tier, 2, k]
         both = xi * eta
         for n in range(count):
-            qx = block[tier, 0, n] + xi * block[tier, 2, n] + eta * block[tier, 4, n] + both * block[tier, 6, n]
-            qy = block[tier, 1, n] + xi * block[tier, 3, n] + eta * block[tier, 5, n] + both * block[tier, 7, n]
-            ux, uy = x - s * qy, y + s * qx
+            qx = (
+                block[tier, 0, n]
+                + xi * block[tier, 2, n]
+                + eta * block[tier, 4, n]
+                + both * block[tier, 6, n]
+            )
+            qy = (
+                block[tier, 1, n]
+                + xi * block[tier, 3, n]
+                + eta * block[tier, 5, n]
+                + both * block[tier, 7, n]
+            )
+            ux = x - s * qy
+            uy = y + s * qx
             per = 1.0 / math.sqrt(ux * ux + uy * uy)
-            w = weight * (block[tier, 8, n] + xi * block[tier, 9, n] + eta * block[tier, 10, n])
-            ex, ey = ux * per, uy * per
+            w = weight * (
+                block[tier, 8, n] + xi * block[tier, 9, n] + eta * block[tier, 10, n]
+            )
+            ex = ux * per
+            ey = uy * per
             lever = qx * ex + qy * ey
             hx += w * ex
             hy += w * ey
@@ -202,13 +253,17 @@ def element_sum(elements, x, y, s, block, held, sums):
 
     `block` [J, 11, N] and `held` [J] are scratch.
     """
-    corners, shape, tiers = elements.corners, elements.shape, elements.points.shape[0]
-    number, count = corners.shape[0], corners.shape[1]
+    corners = elements.corners
+    shape = elements.shape
+    tiers = elements.points.shape[0]
+    number = corners.shape[0]
+    count = corners.shape[1]
     for tier in range(tiers):
         held[tier] = 0
     clear(sums, 9)
     for i in range(number):
-        ux, uy = x - s * shape[i, 1], y + s * shape[i, 0]
+        ux = x - s * shape[i, 1]
+        uy = y + s * shape[i, 0]
         speed = math.sqrt(ux * ux + uy * uy)
         if count == POINTS:
             tier = 0
@@ -217,13 +272,22 @@ def element_sum(elements, x, y, s, block, held, sums):
         else:
             tier = _tier(elements.reach, speed, abs(s) * shape[i, 11])
         if tier < 0:
-            accumulate(sums, 0, 1, _near(corners, i, count, shape[i, 12], s, -y / s, x / s))
+            accumulate(
+                sums, 0, 1, _near(corners, i, count, shape[i, 12], s, -y / s, x / s)
+            )
         else:
             for k in range(11):
                 block[tier, k, held[tier]] = shape[i, k]
             held[tier] += 1
     for tier in range(tiers):
-        accumulate(sums, 0, 1, _far(block, tier, held[tier], elements.rules, elements.points[tier], x, y, s))
+        accumulate(
+            sums,
+            0,
+            1,
+            _far(
+                block, tier, held[tier], elements.rules, elements.points[tier], x, y, s
+            ),
+        )
 
 
 @jit
@@ -232,7 +296,9 @@ def element_sums(elements, twist, sums):
     block = np.empty((elements.points.shape[0], 11, elements.corners.shape[0]))
     held = np.empty(elements.points.shape[0], np.int64)
     for m in range(twist.shape[0]):
-        element_sum(elements, twist[m, 0], twist[m, 1], twist[m, 2], block, held, sums[m])
+        element_sum(
+            elements, twist[m, 0], twist[m, 1], twist[m, 2], block, held, sums[m]
+        )
 
 
 @kernel
@@ -250,7 +316,8 @@ def _elliptic(complement):
     # from 1 - m = 1e-32 on, these are enough; a loop that stops by itself does not vectorise
     means = _means(_means(_means(means, 2.0), 4.0), 8.0)
     means = _means(_means(_means(_means(means, 16.0), 32.0), 64.0), 128.0)
-    size, total = 0.5 * math.pi / means[0], means[4]
+    size = 0.5 * math.pi / means[0]
+    total = means[4]
     return size * (0.5 - m * total), size * (0.5 + m * total), 2.0 * size * total
 
 
@@ -259,7 +326,9 @@ def _means(means, power):
     """Return the next arithmetic and geometric mean, c_n, its square over m^2, and their sum weighted with `power`."""
     a, b, c, square, total = means
     mean = 0.5 * (a + b)
-    ratio = c / (4.0 * mean)  # c_(n+1) = c_n^2/(4 a_(n+1)), and so is its square over m^2
+    ratio = c / (
+        4.0 * mean
+    )  # c_(n+1) = c_n^2/(4 a_(n+1)), and so is its square over m^2
     square *= ratio * ratio
     return mean, math.sqrt(a * b), c * ratio, square, total + power * square
 
@@ -268,7 +337,9 @@ def _means(means, power):
 def _axial(x, y, s, v, across, spin, along, twirl):
     """Return gradient and second derivatives of a function of the slide speed v and the spin alone."""
     per = 1.0 / v if v > 0.0 else 0.0
-    ex, ey, more = x * per, y * per, along - across
+    ex = x * per
+    ey = y * per
+    more = along - across
     return (
         across * x, across * y, spin * s,
         across + more * ex * ex, more * ex * ey, -twirl * x * s, across + more * ey * ey, -twirl * y * s, twirl * v * v,
@@ -288,19 +359,26 @@ def disc_sum(discs, x, y, s):
     """Compute as `element_sum` for evenly loaded discs, in closed form (docs/physics.md, "Exact limit surfaces")."""
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(discs.radii.shape[0]):
-        radius, px, py = discs.radii[k], discs.places[0, k], discs.places[1, k]
-        ux, uy = x - s * py, y + s * px
-        v, q = math.sqrt(ux * ux + uy * uy), abs(s) * radius
+        radius = discs.radii[k]
+        px = discs.places[0, k]
+        py = discs.places[1, k]
+        ux = x - s * py
+        uy = y + s * px
+        v = math.sqrt(ux * ux + uy * uy)
+        q = abs(s) * radius
         large, ratio, complement = _ratio(v, q)
         b, d, c = _elliptic(complement)
-        e, w = complement * d, discs.loads[k] * 4.0 / (math.pi * large)
+        e = complement * d
+        w = discs.loads[k] * 4.0 / (math.pi * large)
         if v < q:
             by_spin = b * (3.0 - ratio * ratio) + e * (3.0 - 2.0 * ratio * ratio)
             curve = b + 2.0 * e
         else:
-            by_spin, curve = 3.0 * b + c - d, d - c
+            by_spin = 3.0 * b + c - d
+            curve = d - c
         curve *= w / (3.0 * large * large)
-        across, spin = w * (2.0 * b + e) * (1.0 / 3.0), w * by_spin * radius * radius * (1.0 / 9.0)
+        across = w * (2.0 * b + e) * (1.0 / 3.0)
+        spin = w * by_spin * radius * radius * (1.0 / 9.0)
         own = _axial(ux, uy, s, v, across, spin, curve * q * q, curve * radius * radius)
         total = plus(total, 1.0, _about_origin(own, px, py))
     return total
@@ -310,8 +388,19 @@ def disc_sum(discs, x, y, s):
 def _about_origin(sums, px, py):
     """Return gradient and second derivatives by the twist at the origin, from those by the twist at (px, py)."""
     fx, fy, fs, xx, xy, xs, yy, ys, ss = sums
-    x_turn, y_turn = px * xy - py * xx + xs, px * yy - py * xy + ys
-    return fx, fy, fs + px * fy - py * fx, xx, xy, x_turn, yy, y_turn, px * (y_turn + ys) - py * (x_turn + xs) + ss
+    x_turn = px * xy - py * xx + xs
+    y_turn = px * yy - py * xy + ys
+    return (
+        fx,
+        fy,
+        fs + px * fy - py * fx,
+        xx,
+        xy,
+        x_turn,
+        yy,
+        y_turn,
+        px * (y_turn + ys) - py * (x_turn + xs) + ss,
+    )
 
 
 @jit
@@ -324,7 +413,11 @@ def disc_sums(discs, twist, sums):
 @kernel
 def _rings(rings, start, end, s, v, sums):
     """Add the rings between two radii to `sums`: the load, then the arguments of `_axial`."""
-    load, spin, along, across, twirl = 0.0, 0.0, 0.0, 0.0, 0.0
+    load = 0.0
+    spin = 0.0
+    along = 0.0
+    across = 0.0
+    twirl = 0.0
     for n in range(rings.share.shape[0]):
         rho = start + (end - start) * rings.share[n]
         q = abs(s) * rho
@@ -332,7 +425,9 @@ def _rings(rings, start, end, s, v, sums):
         b, d, _ = _elliptic(complement)
         e = b + complement * d
         inside = xp.minimum(rho / rings.radius, 1.0)
-        pressure = xp.exp(formulas.soft_finger(xp, inside, rings.exponent) / rings.exponent)
+        pressure = xp.exp(
+            formulas.soft_finger(xp, inside, rings.exponent) / rings.exponent
+        )
         part = (end - start) * rings.weight[n] * rho * pressure
         w = part * 2.0 / (math.pi * large)
         curve = w * d / (large * large)
@@ -357,12 +452,19 @@ def ring_sum(rings, x, y, s, sums):
     """
     v = math.sqrt(x * x + y * y)
     # where the rim runs as fast as the ring slides, the sum over the radii has a kink
-    kink = rings.outer if v >= abs(s) * rings.outer else xp.maximum(v / abs(s), rings.inner)
+    kink = (
+        rings.outer
+        if v >= abs(s) * rings.outer
+        else xp.maximum(v / abs(s), rings.inner)
+    )
     clear(sums, 5)
     _rings(rings, rings.inner, kink, s, v, sums)
     _rings(rings, kink, rings.outer, s, v, sums)
     per = 1.0 / sums[0]
-    across, spin, along, twirl = per * sums[1], per * sums[2], per * sums[3], per * sums[4]
+    across = per * sums[1]
+    spin = per * sums[2]
+    along = per * sums[3]
+    twirl = per * sums[4]
     put_all(sums, _axial(x, y, s, v, across, spin, along, twirl))
 
 

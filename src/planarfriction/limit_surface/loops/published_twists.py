@@ -25,8 +25,10 @@ def _signs(data, row, start, first, second, across, sides):
     for j in range(across.shape[1]):
         p = start + 4 * j
         h = (data[p], data[p + 1], data[p + 2])
-        a, b = dot(h, first), dot(h, second)
-        across[row, j, 0], across[row, j, 1] = a, b
+        a = dot(h, first)
+        b = dot(h, second)
+        across[row, j, 0] = a
+        across[row, j, 1] = b
         side = (1 if a > _AT_EDGE else 0) | (2 if a < -_AT_EDGE else 0)
         sides[row, j] = side | (4 if b > _AT_EDGE else 0) | (8 if b < -_AT_EDGE else 0)
 
@@ -45,11 +47,20 @@ def _answer(data, size, i, j, position, corners, target):
     `corners` are `h . first` and `h . second` at the corners, the lower polar angle first.
     """
     ax, ay, bx, by, cx, cy, dx, dy = corners
-    start_x, start_y = ax + position * (bx - ax), ay + position * (by - ay)
-    step_x, step_y = cx - ax + position * (dx - cx - bx + ax), cy - ay + position * (dy - cy - by + ay)
-    along = _share(-(start_x * step_x + start_y * step_y), step_x * step_x + step_y * step_y)
-    polar, azimuth = 0.5 * math.pi / size * (i + along), 0.5 * math.pi / size * (j + position)
-    v = (math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar))
+    start_x = ax + position * (bx - ax)
+    start_y = ay + position * (by - ay)
+    step_x = cx - ax + position * (dx - cx - bx + ax)
+    step_y = cy - ay + position * (dy - cy - by + ay)
+    along = _share(
+        -(start_x * step_x + start_y * step_y), step_x * step_x + step_y * step_y
+    )
+    polar = 0.5 * math.pi / size * (i + along)
+    azimuth = 0.5 * math.pi / size * (j + position)
+    v = (
+        math.sin(polar) * math.cos(azimuth),
+        math.sin(polar) * math.sin(azimuth),
+        math.cos(polar),
+    )
     h = sliding(BILINEAR, data, 0, size, v[0], v[1], v[2], 1.0)
     with_target = dot(h, target)
     cross = (
@@ -58,17 +69,27 @@ def _answer(data, size, i, j, position, corners, target):
         h[0] * target[1] - h[1] * target[0],
     )
     v = times(-1.0 if with_target < 0.0 else 1.0, v)
-    return v, abs(dot(h, v)), math.atan2(math.sqrt(dot(cross, cross)), abs(with_target)), abs(with_target)
+    return (
+        v,
+        abs(dot(h, v)),
+        math.atan2(math.sqrt(dot(cross, cross)), abs(with_target)),
+        abs(with_target),
+    )
 
 
 @kernel
 def _positions(corners):
     """Return the azimuths of common roots of both equations, `q2 b^2 + q1 b + q0 = 0`, or the edge."""
     ax, ay, bx, by, cx, cy, dx, dy = corners
-    b_x, b_y, a_x, a_y = bx - ax, by - ay, cx - ax, cy - ay
-    t_x, t_y = dx - cx - b_x, dy - cy - b_y
+    b_x = bx - ax
+    b_y = by - ay
+    a_x = cx - ax
+    a_y = cy - ay
+    t_x = dx - cx - b_x
+    t_y = dy - cy - b_y
     # (corner + along_b b) x (along_a + twisted b) = 0
-    q2, q0 = b_x * t_y - b_y * t_x, ax * a_y - ay * a_x
+    q2 = b_x * t_y - b_y * t_x
+    q0 = ax * a_y - ay * a_x
     q1 = ax * t_y - ay * t_x + b_x * a_y - b_y * a_x
     root = math.sqrt(xp.maximum(q1 * q1 - 4.0 * q2 * q0, 0.0))
     half = -0.5 * (q1 + (-root if q1 < 0.0 else root))
@@ -81,10 +102,14 @@ def _in_table(surface, target):
     data, size, across, sides = surface
     columns = 4 * size + 1
     first, second = plane(target)
-    best, angle, least, power = (0.0, 0.0, 1.0), math.inf, math.inf, 1.0
+    best = (0.0, 0.0, 1.0)
+    angle = math.inf
+    least = math.inf
+    power = 1.0
     _signs(data, 0, 0, first, second, across, sides)
     for i in range(size):
-        low, high = i % 2, (i + 1) % 2
+        low = i % 2
+        high = (i + 1) % 2
         _signs(data, high, 4 * (i + 1) * columns, first, second, across, sides)
         for j in range(columns - 1):
             if sides[low, j] & sides[low, j + 1] & sides[high, j] & sides[high, j + 1]:
@@ -94,10 +119,19 @@ def _in_table(surface, target):
                 across[high, j, 0], across[high, j, 1], across[high, j + 1, 0], across[high, j + 1, 1],
             )  # fmt: skip
             for position in _positions(corners):
-                v, phi, miss, size_here = _answer(data, size, i, j, position, corners, target)
-                better = size_here < least if miss <= _SAME_ANSWER and angle <= _SAME_ANSWER else miss < angle
+                v, phi, miss, size_here = _answer(
+                    data, size, i, j, position, corners, target
+                )
+                better = (
+                    size_here < least
+                    if miss <= _SAME_ANSWER and angle <= _SAME_ANSWER
+                    else miss < angle
+                )
                 if better:
-                    best, angle, least, power = v, miss, size_here, phi
+                    best = v
+                    angle = miss
+                    least = size_here
+                    power = phi
     return best, power, angle
 
 

@@ -18,7 +18,11 @@ import numpy as np
 from planarfriction._engine.codegen.vectors import dot, norm, plus, put_all, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel
-from planarfriction._engine.published.surfaces import POTENTIAL, sliding, sliding_jacobian
+from planarfriction._engine.published.surfaces import (
+    POTENTIAL,
+    sliding,
+    sliding_jacobian,
+)
 from planarfriction.limit_surface.loops import closed_forms
 
 BAD_WRENCH = -1.0
@@ -112,9 +116,16 @@ class _Exact(NamedTuple):
 def target_of(frame, wrench):
     """Return the unit vector that h has to be parallel to; a zero vector for a wrench that is zero or not finite."""
     largest = xp.maximum(xp.maximum(abs(wrench[0]), abs(wrench[1])), abs(wrench[2]))
-    sound = xp.is_finite(wrench[0]) and xp.is_finite(wrench[1]) and xp.is_finite(wrench[2]) and largest > 0.0
+    sound = (
+        xp.is_finite(wrench[0])
+        and xp.is_finite(wrench[1])
+        and xp.is_finite(wrench[2])
+        and largest > 0.0
+    )
     per = 1.0 / xp.maximum(largest, NORMAL) if sound else 0.0
-    x, y, s = wrench[0] * per, wrench[1] * per, wrench[2] * per
+    x = wrench[0] * per
+    y = wrench[1] * per
+    s = wrench[2] * per
     t = (
         frame[0] * x + frame[1] * y + frame[2] * s,
         frame[3] * x + frame[4] * y + frame[5] * s,
@@ -137,26 +148,36 @@ def plane(n):
     sign = -1.0 if n[2] < 0.0 else 1.0
     a = -1.0 / (sign + n[2])
     b = n[0] * n[1] * a
-    return (1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]), (b, sign + n[1] * n[1] * a, -n[1])
+    return (1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]), (
+        b,
+        sign + n[1] * n[1] * a,
+        -n[1],
+    )
 
 
 @kernel
 def newton_move(ga, gb, aa, ab, bb):
     """Return Newton's step; downhill also where the surface curves downwards, and long where it hardly curves."""
-    det, trace = aa * bb - ab * ab, aa + bb
+    det = aa * bb - ab * ab
+    trace = aa + bb
     if trace > 0.0 and det > 1e-6 * trace * trace:
         return (ab * gb - bb * ga) / det, (ab * ga - aa * gb) / det
-    middle, half = 0.5 * trace, math.sqrt(0.25 * (aa - bb) * (aa - bb) + ab * ab)
-    high = middle + half if middle >= 0.0 else middle - half  # the larger one, which loses no digits
+    middle = 0.5 * trace
+    half = math.sqrt(0.25 * (aa - bb) * (aa - bb) + ab * ab)
+    high = (
+        middle + half if middle >= 0.0 else middle - half
+    )  # the larger one, which loses no digits
     if high == 0.0:
         return 0.0, 0.0
     low = xp.maximum(abs(det / high), _FLATTEST * abs(high))
     # of high: its direction is across (ab, bb - high) and across (aa - high, ab)
     angle = 0.5 * math.atan2(2.0 * ab, aa - bb)
-    cos, sin = math.cos(angle), math.sin(angle)
+    cos = math.cos(angle)
+    sin = math.sin(angle)
     if middle < 0.0:
         cos, sin = -sin, cos
-    steep, flat = (cos * ga + sin * gb) / abs(high), (cos * gb - sin * ga) / low
+    steep = (cos * ga + sin * gb) / abs(high)
+    flat = (cos * gb - sin * ga) / low
     return sin * flat - cos * steep, -sin * steep - cos * flat
 
 
@@ -168,8 +189,12 @@ def table_at(table, lean, v, scratch):
     """Return `h` and the second derivatives (xx, xy, xs, yy, ys, ss) of the dissipation of a stored potential."""
     size = norm(v)
     per = 1.0 / size
-    h = times(per, sliding(POTENTIAL, table.data, 0, table.size, v[0], v[1], v[2], size))
-    sliding_jacobian(POTENTIAL, table.data, 0, table.size, v[0], v[1], v[2], size, scratch)
+    h = times(
+        per, sliding(POTENTIAL, table.data, 0, table.size, v[0], v[1], v[2], size)
+    )
+    sliding_jacobian(
+        POTENTIAL, table.data, 0, table.size, v[0], v[1], v[2], size, scratch
+    )
     n = times(per, v)
     second = (
         per * (scratch[0] - h[0] * n[0]), per * (scratch[1] - h[0] * n[1]), per * (scratch[2] - h[0] * n[2]),
@@ -188,7 +213,9 @@ def _exact_at(surface, lean, v, scratch):
     elif surface.discs.radii.shape[0] > 0:
         put_all(scratch, closed_forms.disc_sum(surface.discs, n[0], n[1], n[2]))
     else:
-        closed_forms.element_sum(surface.elements, n[0], n[1], n[2], surface.block, surface.held, scratch)
+        closed_forms.element_sum(
+            surface.elements, n[0], n[1], n[2], surface.block, surface.held, scratch
+        )
     second = (
         per * scratch[3], per * scratch[4], per * scratch[5],
         per * scratch[6], per * scratch[7], per * scratch[8],
@@ -211,9 +238,12 @@ def begin_search(target, guess):
     """Return the axes of the plane in which twists are searched, and a search that tries the guess first."""
     first, second = plane(target)
     per = 1.0 / dot(target, guess)
-    a, b = per * dot(first, guess), per * dot(second, guess)
+    a = per * dot(first, guess)
+    b = per * dot(second, guess)
     most = math.inf
-    return (target, first, second), Search(a, b, a, b, 0.0, 0.0, 0.0, 1.0, most, most, most, most, 0.0, True)
+    return (target, first, second), Search(
+        a, b, a, b, 0.0, 0.0, 0.0, 1.0, most, most, most, most, 0.0, True
+    )
 
 
 @kernel
@@ -226,20 +256,44 @@ def place_of(axes, a, b):
 def _accepted(axes, v, h, slopes, trial, slope, limits, s):
     """Return a search that has gone where it tried, with Newton's step from there."""
     target, first, second = axes
-    ga, gb = dot(h, first), dot(h, second)
+    ga = dot(h, first)
+    gb = dot(h, second)
     angle = math.atan2(slope, dot(h, target))
     da, db = newton_move(
-        ga, gb, _across(first, slopes, first), _across(first, slopes, second), _across(second, slopes, second)
+        ga,
+        gb,
+        _across(first, slopes, first),
+        _across(first, slopes, second),
+        _across(second, slopes, second),
     )
     move = math.sqrt(da * da + db * db)
     going = (angle > limits.balanced) & (move > 0.0)
     # where the last step had to be shortened, the next one begins as short: the curvature there says little
     most = xp.where(s.length < 1.0, 2.0 * s.length * s.last, 4.0 * s.most)
-    length = xp.minimum(xp.minimum(most, norm(v)) / xp.where(move > 0.0, move, 1.0), 1.0)
-    da, db = da * length, db * length
+    length = xp.minimum(
+        xp.minimum(most, norm(v)) / xp.where(move > 0.0, move, 1.0), 1.0
+    )
+    da = da * length
+    db = db * length
     downhill = abs(da * ga + db * gb)
-    ta, tb = s.ta + da, s.tb + db
-    return Search(s.ta, s.tb, ta, tb, da, db, downhill, 1.0, most, trial, slope, angle, move * length, going)
+    ta = s.ta + da
+    tb = s.tb + db
+    return Search(
+        s.ta,
+        s.tb,
+        ta,
+        tb,
+        da,
+        db,
+        downhill,
+        1.0,
+        most,
+        trial,
+        slope,
+        angle,
+        move * length,
+        going,
+    )
 
 
 @kernel
@@ -250,7 +304,9 @@ def try_place(evaluate, surface, lean, axes, limits, s, scratch):
     """
     v = place_of(axes, s.ta, s.tb)
     h, slopes = evaluate(surface, lean, v, scratch)
-    trial, ga, gb = dot(h, v), dot(h, axes[1]), dot(h, axes[2])
+    trial = dot(h, v)
+    ga = dot(h, axes[1])
+    gb = dot(h, axes[2])
     slope = math.sqrt(ga * ga + gb * gb)
     gain = s.power - trial
     level = (abs(gain) < limits.level * trial) & (slope < 0.9 * s.slope)
@@ -258,7 +314,8 @@ def try_place(evaluate, surface, lean, axes, limits, s, scratch):
         return _accepted(axes, v, h, slopes, trial, slope, limits, s)
     length = 0.5 * s.length
     going = (s.angle >= limits.good) & (length >= limits.shortest)
-    ta, tb = s.a + length * s.da, s.b + length * s.db
+    ta = s.a + length * s.da
+    tb = s.b + length * s.db
     return Search(
         s.a, s.b, ta, tb, s.da, s.db, s.downhill, length, s.most, s.power, s.slope, s.angle, s.last, going
     )  # fmt: skip
@@ -278,7 +335,10 @@ def _least(evaluate, surface, lean, target, guess, limits, scratch):
 @kernel
 def _most(duals, row, target, mirror):
     """Return the largest power of a row of duals, as an integer."""
-    x, y, s, most = target[0], target[1], target[2], 0
+    x = target[0]
+    y = target[1]
+    s = target[2]
+    most = 0
     for j in range(duals.shape[2]):
         power = x * duals[0, row, j] + y * duals[1, row, j] + s * duals[2, row, j]
         most = max(most, xp.in_order(xp.maximum(power, mirror * power)))
@@ -288,18 +348,34 @@ def _most(duals, row, target, mirror):
 @kernel
 def _nearest(table, target):
     """Return the stored direction of least dissipation per unit of power that `target` would have."""
-    duals, mirror = table.duals, table.mirror
-    most, row, best, column, sign = 0, 0, 0.0, 0, 1.0
+    duals = table.duals
+    mirror = table.mirror
+    most = 0
+    row = 0
+    best = 0.0
+    column = 0
+    sign = 1.0
     for i in range(duals.shape[1]):
         here = _most(duals, i, target, mirror)
         if here > most:
-            most, row = here, i
+            most = here
+            row = i
     for j in range(duals.shape[2]):
-        power = target[0] * duals[0, row, j] + target[1] * duals[1, row, j] + target[2] * duals[2, row, j]
+        power = (
+            target[0] * duals[0, row, j]
+            + target[1] * duals[1, row, j]
+            + target[2] * duals[2, row, j]
+        )
         size = xp.maximum(power, mirror * power)
         if size > best:
-            best, column, sign = size, j, (1.0 if size == power else -1.0)
-    return sign * duals[0, row, column], sign * duals[1, row, column], sign * duals[2, row, column]
+            best = size
+            column = j
+            sign = 1.0 if size == power else -1.0
+    return (
+        sign * duals[0, row, column],
+        sign * duals[1, row, column],
+        sign * duals[2, row, column],
+    )
 
 
 # ---------------------------------------------------------------------- entry points
@@ -338,13 +414,17 @@ def _in_table(surface, target):
 @jit
 def table_twists(table, frame, wrenches, twists):
     """Find twists with `of_each` for a stored potential."""
-    return of_each(_in_table, (table, lean_of(frame), np.empty(9)), frame, wrenches, twists)
+    return of_each(
+        _in_table, (table, lean_of(frame), np.empty(9)), frame, wrenches, twists
+    )
 
 
 @kernel
 def _in_exact(surface, target):
     exact, table, lean, scratch = surface
-    guess, _, _ = _least(table_at, table, lean, target, _nearest(table, target), _ROUGH, scratch)
+    guess, _, _ = _least(
+        table_at, table, lean, target, _nearest(table, target), _ROUGH, scratch
+    )
     return _least(_exact_at, exact, lean, target, guess, FINE, scratch)
 
 
@@ -352,15 +432,23 @@ def _in_exact(surface, target):
 def exact_twists(elements, discs, rings, table, frame, wrenches, twists):
     """Find twists with `of_each` for elements, or for rings or discs if there are any, from those of their `table`."""
     block = np.empty((elements.points.shape[0], 11, elements.corners.shape[0]))
-    exact = _Exact(elements, discs, rings, block, np.empty(elements.points.shape[0], np.int64))
-    return of_each(_in_exact, (exact, table, lean_of(frame), np.empty(9)), frame, wrenches, twists)
+    exact = _Exact(
+        elements, discs, rings, block, np.empty(elements.points.shape[0], np.int64)
+    )
+    return of_each(
+        _in_exact, (exact, table, lean_of(frame), np.empty(9)), frame, wrenches, twists
+    )
 
 
 @kernel
 def _in_ellipsoid(lean, target):
     # h = V/|V| + lean is parallel to the target: the target's line meets the shifted unit sphere
     along = dot(target, lean)
-    v = plus(times(along + math.sqrt(along * along + 1.0 - dot(lean, lean)), target), -1.0, lean)
+    v = plus(
+        times(along + math.sqrt(along * along + 1.0 - dot(lean, lean)), target),
+        -1.0,
+        lean,
+    )
     return v, norm(v) + dot(lean, v), 0.0
 
 

@@ -26,7 +26,8 @@ def time_step(s, now):
     Time is odd if it is missing, does not go on, or jumps. A jump is a pause if it stays alone; if odd times go on, the
     clock is wrong, and samples are the last good period apart.
     """
-    dt, period = now - s[at.TIME], s[at.PERIOD]
+    dt = now - s[at.TIME]
+    period = s[at.PERIOD]
     known = s[at.STEADY] >= STEADIES
     there = xp.in_range(now)
     far = there and known and dt > ODD * period

@@ -19,13 +19,23 @@ REST = PLACE + 3  # the time since the last velocity [s]
 SUM = REST + 1  # the sum of the wrench over load since the last velocity (3)
 LOADS = SUM + 3  # the sum of the load since the last velocity
 COUNT = LOADS + 1  # the number of samples since the last velocity
-OLD = COUNT + 1  # sum (3), loads and count of the samples before the last velocity, with that velocity (3) and its time
+OLD = (
+    COUNT + 1
+)  # sum (3), loads and count of the samples before the last velocity, with that velocity (3) and its time
 CHAIN = OLD + 9  # the number of velocities in a row that were those of sliding
 BACK = CHAIN + 1  # the number of samples in a row whose time was odd
 LEVER = BACK + 1  # the share of the torque in the gauge of the wrench
-DISSIPATED = LEVER + 1  # the recent mean of the dissipated power over that of the force times the speed [-]
-TARED = DISSIPATED + 1  # 1 once the bias is known: an empty hand showed it, or it is as small as the noise
+DISSIPATED = (
+    LEVER + 1
+)  # the recent mean of the dissipated power over that of the force times the speed [-]
+TARED = (
+    DISSIPATED + 1
+)  # 1 once the bias is known: an empty hand showed it, or it is as small as the noise
 PERIOD = TARED + 1  # the mean time between samples [s]
-STEADY = PERIOD + 1  # the number of samples of which it is the mean, as far as they count
-MISFIT = STEADY + 1  # the recent mean of the squares of the innovations over their variances
+STEADY = (
+    PERIOD + 1
+)  # the number of samples of which it is the mean, as far as they count
+MISFIT = (
+    STEADY + 1
+)  # the recent mean of the squares of the innovations over their variances
 STATE = MISFIT + 1  # length of the state

@@ -20,7 +20,14 @@ from planarfriction._engine.compiler import jit, kernel
 from planarfriction._engine.published.surfaces import sliding, sliding_jacobian
 from planarfriction.online.loops import filter_state as at
 from planarfriction.online.loops.clock import time_step
-from planarfriction.online.loops.square_root import ROOT, N, measure, reset, spread, variance_of
+from planarfriction.online.loops.square_root import (
+    ROOT,
+    N,
+    measure,
+    reset,
+    spread,
+    variance_of,
+)
 
 PEAK_TIME, SEEN_TIME, PLACE_TIME = 0.1, 0.004, 0.06
 """Times in which the peak of the wrench, its filter and the recent displacement fade [s]."""
@@ -149,9 +156,16 @@ def _scale(settings, s, load):
 @kernel
 def _gauge(settings, s, scale, best):
     """Return the gauge of the filtered wrench, the largest `w . dual`; the dual, a twist, goes to `best`."""
-    x, y, z, most = s[at.SEEN], s[at.SEEN + 1], s[at.SEEN + 2] / scale, 0.0
+    x = s[at.SEEN]
+    y = s[at.SEEN + 1]
+    z = s[at.SEEN + 2] / scale
+    most = 0.0
     for m in range(settings.duals.shape[0]):
-        each = x * settings.duals[m, 0] + y * settings.duals[m, 1] + z * settings.duals[m, 2]
+        each = (
+            x * settings.duals[m, 0]
+            + y * settings.duals[m, 1]
+            + z * settings.duals[m, 2]
+        )
         if abs(each) > most:
             most = abs(each)
             sign = 1.0 if each > 0.0 else -1.0
@@ -192,34 +206,56 @@ def _learn(settings, s, h, column, jacobian):
     if count == 0.0:
         return
     load = s[at.OLD + 3] / count
-    before, power, force2, speed2, misfit = s[at.SCALE], 0.0, 0.0, 0.0, 0.0
+    before = s[at.SCALE]
+    power = 0.0
+    force2 = 0.0
+    speed2 = 0.0
+    misfit = 0.0
     for i in range(3):
         w = load * s[at.OLD + i] / count - s[at.BIAS + i]
-        power, force2, speed2 = power + w * s[at.TWIST + i], force2 + w * w, speed2 + s[at.TWIST + i] * s[at.TWIST + i]
-    s[at.DISSIPATED] += (power / math.sqrt(max(force2 * speed2, 1e-300)) - s[at.DISSIPATED]) / POWERS
+        power = power + w * s[at.TWIST + i]
+        force2 = force2 + w * w
+        speed2 = speed2 + s[at.TWIST + i] * s[at.TWIST + i]
+    s[at.DISSIPATED] += (
+        power / math.sqrt(max(force2 * speed2, 1e-300)) - s[at.DISSIPATED]
+    ) / POWERS
     if s[at.DISSIPATED] < 0.0:
         return  # friction that drives teaches nothing
     for row in range(3):
-        mu, ratio, scale = math.exp(s[at.MU]), math.exp(s[at.RATIO]), _scale(settings, s, load)
-        x, y, z = s[at.TWIST], s[at.TWIST + 1], scale * s[at.TWIST + 2]
+        mu = math.exp(s[at.MU])
+        ratio = math.exp(s[at.RATIO])
+        scale = _scale(settings, s, load)
+        x = s[at.TWIST]
+        y = s[at.TWIST + 1]
+        z = scale * s[at.TWIST + 2]
         speed = math.sqrt(x * x + y * y + z * z)
         u = sliding(settings.kind, settings.data, 0, settings.size, x, y, z, speed)
-        sliding_jacobian(settings.kind, settings.data, 0, settings.size, x, y, z, speed, jacobian)
+        sliding_jacobian(
+            settings.kind, settings.data, 0, settings.size, x, y, z, speed, jacobian
+        )
         power = math.pow(speed / settings.v_s, settings.gamma)
         fade = math.exp(-power)
         steady = mu * (1.0 + (ratio - 1.0) * fade)
         g = steady + settings.sigma_2 * speed  # viscous friction along h: it is small
-        by_speed = settings.sigma_2 - mu * (ratio - 1.0) * fade * settings.gamma * power / speed
+        by_speed = (
+            settings.sigma_2
+            - mu * (ratio - 1.0) * fade * settings.gamma * power / speed
+        )
         along = (u[0] if row == 0 else (u[1] if row == 1 else u[2])) / speed
         factor = load * (scale if row == 2 else 1.0)
         clear(h, N)
         for j in range(3):
             unit = (x if j == 0 else (y if j == 1 else z)) / speed
-            slope = g * (jacobian[3 * row + j] - along * unit) / speed + by_speed * along * unit
+            slope = (
+                g * (jacobian[3 * row + j] - along * unit) / speed
+                + by_speed * along * unit
+            )
             h[at.TWIST + j] = factor * slope * (scale if j == 2 else 1.0)
         h[at.MU] = factor * steady * along
         h[at.RATIO] = factor * along * mu * ratio * fade
-        h[at.SCALE] = h[at.TWIST + 2] * s[at.TWIST + 2] + (factor * g * along if row == 2 else 0.0)
+        h[at.SCALE] = h[at.TWIST + 2] * s[at.TWIST + 2] + (
+            factor * g * along if row == 2 else 0.0
+        )
         h[at.BIAS + row] = 1.0
         error = settings.model_error * factor * g
         variance = settings.noise[row] / count + error * error
@@ -234,24 +270,35 @@ def _learn(settings, s, h, column, jacobian):
 def _see(settings, s, v, h, column, jacobian):
     """Take a slip velocity, the mean since the last; return the log of the odds that it is a slip."""
     span = min(s[at.REST], PLACE_TIME)
-    odds, rest, sd2, speed2, far2 = 0.0, 0.7 * settings.quantum, FRESH * FRESH, 0.0, 0.0
+    odds = 0.0
+    rest = 0.7 * settings.quantum
+    sd2 = FRESH * FRESH
+    speed2 = 0.0
+    far2 = 0.0
     for i in range(3):
         s[at.PLACE + i] = s[at.PLACE + i] * math.exp(-span / PLACE_TIME) + v[i] * span
         far2 += s[at.PLACE + i] * s[at.PLACE + i]
         speed2 += v[i] * v[i]
         miss = v[i] - (s[at.TWIST + i] if s[at.SLIP] > 0.5 else 0.0)
-        odds += 0.5 * (v[i] * v[i] / (rest * rest) - miss * miss / sd2) - 0.5 * math.log(sd2 / (rest * rest))
+        odds += 0.5 * (
+            v[i] * v[i] / (rest * rest) - miss * miss / sd2
+        ) - 0.5 * math.log(sd2 / (rest * rest))
     moves = speed2 > SLOW * SLOW * settings.quantum * settings.quantum
     if moves and s[at.CHAIN] >= 2.0:
         _learn(settings, s, h, column, jacobian)
     s[at.CHAIN] = s[at.CHAIN] + 1.0 if moves else 0.0
     for i in range(3):
-        s[at.OLD + i], s[at.OLD + 5 + i] = s[at.SUM + i], v[i]
+        s[at.OLD + i] = s[at.SUM + i]
+        s[at.OLD + 5 + i] = v[i]
         s[at.SUM + i] = 0.0
         reset(s, at.TWIST + i, v[i], settings.quantum, column)
     s[at.OLD + 3], s[at.OLD + 4], s[at.OLD + 8] = s[at.LOADS], s[at.COUNT], s[at.REST]
-    s[at.LOADS], s[at.COUNT], s[at.REST] = 0.0, 0.0, 0.0
-    return min(max(odds, -8.0), 8.0) + (8.0 if far2 > 16.0 * settings.place * settings.place else 0.0)
+    s[at.LOADS] = 0.0
+    s[at.COUNT] = 0.0
+    s[at.REST] = 0.0
+    return min(max(odds, -8.0), 8.0) + (
+        8.0 if far2 > 16.0 * settings.place * settings.place else 0.0
+    )
 
 
 @kernel
@@ -264,7 +311,9 @@ def _tare(settings, s, wrench, load, h, column):
             w += settings.conjugate[i, j] * wrench[j]
         friction = math.exp(s[at.MU]) * load
         variance = settings.noise[i] + friction * friction
-        if w * w < EMPTY * EMPTY * (variance + variance_of(s, at.BIAS + i, at.BIAS + i)):
+        if w * w < EMPTY * EMPTY * (
+            variance + variance_of(s, at.BIAS + i, at.BIAS + i)
+        ):
             for k in range(N):
                 h[k] = 1.0 if k == at.BIAS + i else 0.0
             _measure(s, h, w, variance, column)
@@ -291,11 +340,16 @@ def _judge(settings, s, load, dt, best):
 @kernel
 def _doubt(settings, s):
     """Return the sum of the flags of numbers that contradict what was assumed."""
-    flags = (0 if s[at.TARED] > 0.0 else NO_BIAS) + (NO_SIGN if s[at.DISSIPATED] < 0.0 else 0)
+    flags = (0 if s[at.TARED] > 0.0 else NO_BIAS) + (
+        NO_SIGN if s[at.DISSIPATED] < 0.0 else 0
+    )
     reach = FAR * math.hypot(settings.prior_spread[0], settings.prior_spread[1])
     far = s[at.GAUGE] > settings.prior[0] + settings.prior[1] + reach
     for i in range(3):
-        far = far or abs(s[at.MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
+        far = (
+            far
+            or abs(s[at.MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
+        )
     return flags + (NO_RANGE if far else (NO_FIT if s[at.MISFIT] > UNLIKELY else 0))
 
 
@@ -305,22 +359,38 @@ def _estimate(settings, s, e):
     for i in range(3):
         e.twist[i] = 0.0
         for j in range(3):
-            e.twist[i] += settings.back[i, j] * s[at.TWIST + j] if s[at.SLIP] > 0.5 else 0.0
+            e.twist[i] += (
+                settings.back[i, j] * s[at.TWIST + j] if s[at.SLIP] > 0.5 else 0.0
+            )
             e.wrench[i] += settings.frame[j, i] * s[at.BIAS + j]
     log_s = max(s[at.MU] + max(s[at.RATIO], 0.0), s[at.BOUND])
-    e.mu_c, e.mu_s, e.radius = math.exp(s[at.MU]), math.exp(log_s), settings.radius * math.exp(s[at.SCALE])
+    e.mu_c = math.exp(s[at.MU])
+    e.mu_s = math.exp(log_s)
+    e.radius = settings.radius * math.exp(s[at.SCALE])
     for i in range(3):
         for k in range(3):
             total = 0.0
             for j in range(N):
-                a = s[ROOT + N * (at.MU if i < 2 else at.SCALE) + j] + (s[ROOT + N * at.RATIO + j] if i == 1 else 0.0)
-                b = s[ROOT + N * (at.MU if k < 2 else at.SCALE) + j] + (s[ROOT + N * at.RATIO + j] if k == 1 else 0.0)
+                a = s[ROOT + N * (at.MU if i < 2 else at.SCALE) + j] + (
+                    s[ROOT + N * at.RATIO + j] if i == 1 else 0.0
+                )
+                b = s[ROOT + N * (at.MU if k < 2 else at.SCALE) + j] + (
+                    s[ROOT + N * at.RATIO + j] if k == 1 else 0.0
+                )
                 total += a * b
-            floor = settings.model_error * settings.model_error * (0.5 if i == 0 else 1.0) * (0.5 if k == 0 else 1.0)
+            floor = (
+                settings.model_error
+                * settings.model_error
+                * (0.5 if i == 0 else 1.0)
+                * (0.5 if k == 0 else 1.0)
+            )
             e.covariance[i, k] = total + (floor if (i < 2) == (k < 2) else 0.0)
-        e.determined[i] = 1 if e.covariance[i, i] <= settings.variance and e.flags < NO_BIAS else 0
+        e.determined[i] = (
+            1 if e.covariance[i, i] <= settings.variance and e.flags < NO_BIAS else 0
+        )
     sd = math.sqrt(e.covariance[1, 1] + SEEN_ERROR * SEEN_ERROR)
-    e.slip, e.about_to_slip = s[at.SLIP], (1.0 - s[at.SLIP]) * _normal((s[at.GAUGE] + NEAR - log_s) / sd)
+    e.slip = s[at.SLIP]
+    e.about_to_slip = (1.0 - s[at.SLIP]) * _normal((s[at.GAUGE] + NEAR - log_s) / sd)
     e.margin = 1.0 - math.exp(min(s[at.GAUGE] - log_s, 50.0))
     e.gauge = math.exp(s[at.GAUGE])
 
@@ -334,18 +404,29 @@ def update(settings, states, samples, found):
     drives the slip (a sign), 32 friction or radius far from what was assumed (a unit), 64 wrench
     and slip velocity contradict what was found.
     """
-    h, column, jacobian, best, v = np.empty(N), np.empty(N), np.empty(9), np.empty(3), np.empty(3)
+    h = np.empty(N)
+    column = np.empty(N)
+    jacobian = np.empty(9)
+    best = np.empty(3)
+    v = np.empty(3)
     for p in range(states.shape[0]):
-        s, e = states[p], found[p]
-        now, wrench, load, velocity = samples[p, 0], samples[p, 1:4], samples[p, 4], samples[p, 5:]
+        s = states[p]
+        e = found[p]
+        now = samples[p, 0]
+        wrench = samples[p, 1:4]
+        load = samples[p, 4]
+        velocity = samples[p, 5:]
         dt = time_step(s, now)
         flags = 2 if s[at.BACK] > 0.0 else 0
         force = math.hypot(wrench[0], wrench[1])
         good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
-        lost = good and load <= settings.least_load and s[at.GAUGE] > NONE  # after a grip no load is not an empty hand
+        lost = (
+            good and load <= settings.least_load and s[at.GAUGE] > NONE
+        )  # after a grip no load is not an empty hand
         flags += 0 if good and not lost else 1
         if good and force >= settings.saturation:
-            flags, good = flags + 4, False
+            flags = flags + 4
+            good = False
         if dt > 0.0:
             if settings.drift > 0.0:
                 spread(s, at.MU, settings.drift * settings.drift * dt, column)
@@ -368,7 +449,12 @@ def update(settings, states, samples, found):
             s[at.PEAK] = max(s[at.PEAK], s[at.GAUGE])
             if s[at.SLIP] < 0.1:
                 s[at.BOUND] = max(s[at.BOUND], s[at.GAUGE])
-        if xp.in_range(velocity[0]) and xp.in_range(velocity[1]) and xp.in_range(velocity[2]) and dt > 0.0:
+        if (
+            xp.in_range(velocity[0])
+            and xp.in_range(velocity[1])
+            and xp.in_range(velocity[2])
+            and dt > 0.0
+        ):
             for i in range(3):
                 v[i] = 0.0
                 for j in range(3):
@@ -380,9 +466,18 @@ def update(settings, states, samples, found):
             for i in range(N):
                 h[i] = 1.0 if i in (at.MU, at.RATIO) else 0.0
             h[at.SCALE] = s[at.LEVER]
-            _measure(s, h, s[at.PEAK] - s[at.MU] - s[at.RATIO], PEAK_ERROR * PEAK_ERROR, column)
-        e.flags, e.dt, e.normal_force = flags + _doubt(settings, s), dt, load
+            _measure(
+                s,
+                h,
+                s[at.PEAK] - s[at.MU] - s[at.RATIO],
+                PEAK_ERROR * PEAK_ERROR,
+                column,
+            )
+        e.flags = flags + _doubt(settings, s)
+        e.dt = dt
+        e.normal_force = load
         e.seen = 1 if good and not lost else 0
         for i in range(3):
-            e.wrench[i], e.velocity[i] = wrench[i], velocity[i]
+            e.wrench[i] = wrench[i]
+            e.velocity[i] = velocity[i]
         _estimate(settings, s, e)

@@ -18,10 +18,28 @@ STATE = np.dtype(
     [
         *((name, float) for name in ("age", "span", "since", "start", "load", "grip")),
         *((name, float, 3) for name in ("slid", "velocity")),
-        *((name, float) for name in ("found", "goal", "began", "balance", "caught", "eased", "force", "torque")),
+        *(
+            (name, float)
+            for name in (
+                "found",
+                "goal",
+                "began",
+                "balance",
+                "caught",
+                "eased",
+                "force",
+                "torque",
+            )
+        ),
         *((name, float) for name in ("blind", "weight", "lately", "pressed", "count")),
-        *((name, float) for name in ("broke", "dipped", "before", "borne", "stood", "quiet")),
-        *((name, float) for name in ("mute", "weighed", "pulls", "felt", "sent", "still", "silent")),
+        *(
+            (name, float)
+            for name in ("broke", "dipped", "before", "borne", "stood", "quiet")
+        ),
+        *(
+            (name, float)
+            for name in ("mute", "weighed", "pulls", "felt", "sent", "still", "silent")
+        ),
         ("same", float, 3),
         *((name, float, EARLY) for name in ("forces", "loads")),
     ]
@@ -39,7 +57,22 @@ asked for when it came [N], and the time for which it has been the same [s], 1 w
 of slip velocities in a row that were equal, each component."""
 
 _FAR = math.inf
-FRESH = (-_FAR, -_FAR, 0.0, _FAR, *[0.0] * 6, -_FAR, 0.0, 0.0, 1.0, *[0.0] * 8, _FAR, *[0.0] * 12, _FAR, _FAR)
+FRESH = (
+    -_FAR,
+    -_FAR,
+    0.0,
+    _FAR,
+    *[0.0] * 6,
+    -_FAR,
+    0.0,
+    0.0,
+    1.0,
+    *[0.0] * 8,
+    _FAR,
+    *[0.0] * 12,
+    _FAR,
+    _FAR,
+)
 """State before the first sample; what has not begun is infinitely far."""
 
 LOAD_TIME = 0.3
@@ -133,9 +166,14 @@ def trapezoid(xp, time, size, duration):
     top = size / (duration - ramp)
     t = xp.minimum(xp.maximum(time, 0.0), duration)
     left = duration - t
-    rise, fall = xp.minimum(t, ramp), xp.minimum(left, ramp)
-    place = top * (t - rise + 0.5 * (rise * rise - (ramp - fall) * (ramp - fall)) / ramp)
-    push = xp.where((t > 0.0) & (t < ramp), 1.0, 0.0) - xp.where((left > 0.0) & (left < ramp), 1.0, 0.0)
+    rise = xp.minimum(t, ramp)
+    fall = xp.minimum(left, ramp)
+    place = top * (
+        t - rise + 0.5 * (rise * rise - (ramp - fall) * (ramp - fall)) / ramp
+    )
+    push = xp.where((t > 0.0) & (t < ramp), 1.0, 0.0) - xp.where(
+        (left > 0.0) & (left < ramp), 1.0, 0.0
+    )
     return place, top * xp.minimum(rise, fall) / ramp, top / ramp * push
 
 
@@ -162,31 +200,44 @@ def _follow(c, e, least_load, quantum, turns):
         return 0.0, 0.0  # nothing begins before the hand grips
     dt = min(e.dt, PAUSE) if c.age >= 0.0 else 0.0  # the first sample has none
     share = min(dt / LATE, 1.0) if c.age >= SETTLED else 1.0
-    force, turn = math.hypot(e.wrench[0], e.wrench[1]), turns * e.wrench[2] / e.radius
+    force = math.hypot(e.wrench[0], e.wrench[1])
+    turn = turns * e.wrench[2] / e.radius
     size = math.hypot(force, turn)
     if e.seen > 0:
         c.borne += share * (size - c.borne)
         c.pulls += share * (force - c.pulls)
     c.still += dt
     if e.normal_force != c.felt:
-        c.felt, c.sent, c.still = e.normal_force, c.grip, 0.0
+        c.felt = e.normal_force
+        c.sent = c.grip
+        c.still = 0.0
     frozen = c.still >= PAUSE and abs(c.grip - c.sent) > FOLLOWS * c.sent
     if frozen:
         c.sent = 0.0  # until the sensor says something else
-    bears = e.seen > 0 and not frozen and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
+    bears = (
+        e.seen > 0 and not frozen and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
+    )
     c.mute = 0.0 if bears else c.mute + dt
-    if e.seen > 0:  # filtered as the gauge is, else a grip that falls fast seems to lose load
-        grown = c.pressed + (e.normal_force - c.pressed) * (1.0 - math.exp(-dt / SEEN_TIME))
+    if (
+        e.seen > 0
+    ):  # filtered as the gauge is, else a grip that falls fast seems to lose load
+        grown = c.pressed + (e.normal_force - c.pressed) * (
+            1.0 - math.exp(-dt / SEEN_TIME)
+        )
         c.pressed = grown if c.pressed > 0.0 else e.normal_force
     needed = e.gauge * c.pressed if bears else c.lately
-    c.load, c.age = max(needed, c.load * math.exp(-dt / LOAD_TIME)), max(c.age, 0.0) + dt
+    c.load = max(needed, c.load * math.exp(-dt / LOAD_TIME))
+    c.age = max(c.age, 0.0) + dt
     c.span += dt
-    v, c.quiet = e.velocity, c.quiet + dt
+    v = e.velocity
+    c.quiet = c.quiet + dt
     if dt > 0.0 and xp.in_range(v[0]) and xp.in_range(v[1]) and xp.in_range(v[2]):
         same = 0.0
         for i in range(3):
             c.slid[i] += v[i] * c.span if c.span >= 0.0 else 0.0
-            c.same[i] = c.same[i] + 1.0 if v[i] == c.velocity[i] and v[i] != 0.0 else 0.0
+            c.same[i] = (
+                c.same[i] + 1.0 if v[i] == c.velocity[i] and v[i] != 0.0 else 0.0
+            )
             same = max(same, c.same[i])
             c.velocity[i] = v[i]
         along = -(e.wrench[0] * v[0] + e.wrench[1] * v[1] + turn * e.radius * v[2])
@@ -196,10 +247,14 @@ def _follow(c, e, least_load, quantum, turns):
     if c.age < SETTLED and bears:  # one wrong sample is not the grip, nor the load
         for i in range(EARLY - 1):
             c.forces[i], c.loads[i] = c.forces[i + 1], c.loads[i + 1]
-        c.forces[EARLY - 1], c.loads[EARLY - 1] = e.normal_force, needed
+        c.forces[EARLY - 1] = e.normal_force
+        c.loads[EARLY - 1] = needed
         c.count = min(c.count + 1.0, float(EARLY))
-        c.grip, c.load = _median(c.forces, c.count), _median(c.loads, c.count)
-        c.weight, c.lately, c.weighed = c.load, c.load, c.pulls
+        c.grip = _median(c.forces, c.count)
+        c.load = _median(c.loads, c.count)
+        c.weight = c.load
+        c.lately = c.load
+        c.weighed = c.pulls
     if bears:
         c.lately += share * (min(needed, 1.5 * c.lately) - c.lately)
     return needed, dt
@@ -216,7 +271,9 @@ def _unsure(c, e, dt, silence, seeks, lost):
     elif c.blind < LATE:
         c.weight = max(c.weight, c.lately)
         c.stood += max(c.borne - c.stood, 0.0) * dt / LOAD_TIME  # not by a tap
-        c.blind = c.blind + dt if c.quiet > LATE and c.borne < (1.0 - lost) * c.stood else 0.0
+        c.blind = (
+            c.blind + dt if c.quiet > LATE and c.borne < (1.0 - lost) * c.stood else 0.0
+        )
     none = c.span < 0.0 and c.age >= max(silence, PAUSE)
     c.silent = 1.0 if c.span >= silence or none else 0.0
     return c.silent > 0.0 or c.blind >= LATE or c.mute >= LATE or e.flags >= NO_SIGN
@@ -242,14 +299,34 @@ def _set(c, asked, most):
 
 
 @jit
-def hold(states, found, least_load, quantum, silence, most, least_mu, z, reserve, gain, explore):
+def hold(
+    states,
+    found,
+    least_load,
+    quantum,
+    silence,
+    most,
+    least_mu,
+    z,
+    reserve,
+    gain,
+    explore,
+):
     """Set the grips of `Hold` in states `[P]` from what an observer found `[P]`; `z` is the quantile of mu_c."""
     for p in range(states.shape[0]):
-        c, e = states[p], found[p]
+        c = states[p]
+        e = found[p]
         _, dt = _follow(c, e, least_load, quantum, 1.0)
-        slips, slid, v = e.slip > 0.5, c.slid, c.velocity
+        slips = e.slip > 0.5
+        slid = c.slid
+        v = c.velocity
         path = math.hypot(slid[0], slid[1]) + e.radius * abs(slid[2])
-        if slips and c.quiet <= LATE and c.age >= SETTLED and (e.determined[0] > 0 or path >= explore):
+        if (
+            slips
+            and c.quiet <= LATE
+            and c.age >= SETTLED
+            and (e.determined[0] > 0 or path >= explore)
+        ):
             c.found = 1.0
         unsure = _unsure(c, e, dt, silence, c.found == 0.0, LOST)
         low = e.mu_c * math.exp(-z * math.sqrt(e.covariance[0, 0]))
@@ -267,27 +344,49 @@ def hold(states, found, least_load, quantum, silence, most, least_mu, z, reserve
 
 @jit
 def slip(
-    states, found, least_load, quantum, silence, most, least_mu, axis, tolerance, duration, acceleration, adapt, delay
+    states,
+    found,
+    least_load,
+    quantum,
+    silence,
+    most,
+    least_mu,
+    axis,
+    tolerance,
+    duration,
+    acceleration,
+    adapt,
+    delay,
 ):
     """Set the grips of `SlideBy` (axis 1) and `TurnBy` (axis 2) in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
-        c, e = states[p], found[p]
+        c = states[p]
+        e = found[p]
         needed, dt = _follow(c, e, least_load, quantum, 1.0)
-        slips, goal = e.slip > 0.5, abs(c.goal)
+        slips = e.slip > 0.5
+        goal = abs(c.goal)
         sign = 1.0 if c.goal > 0.0 else -1.0
-        v, x = sign * c.velocity[axis] if slips else 0.0, sign * c.slid[axis]
+        v = sign * c.velocity[axis] if slips else 0.0
+        x = sign * c.slid[axis]
         c.began += dt
         if slips and c.began < 0.0 and c.age >= SETTLED:
-            c.began, c.balance = 0.0, 1.05 * needed / max(e.gauge, 1e-9)
-        rests = c.since > SURE and c.quiet > STICKS  # if the slip sensor is right, the wrench stays as it is
-        unsure = _unsure(c, e, dt, silence, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES)
+            c.began = 0.0
+            c.balance = 1.05 * needed / max(e.gauge, 1e-9)
+        rests = (
+            c.since > SURE and c.quiet > STICKS
+        )  # if the slip sensor is right, the wrench stays as it is
+        unsure = _unsure(
+            c, e, dt, silence, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES
+        )
         balance = c.balance
         time = c.began + delay if c.began >= 0.0 else 0.0
         place, speed, push = trapezoid(xp, time, goal, duration)
         there = x + v * delay
         left = goal - there
         c.since = 0.0 if slips and c.quiet <= STICKS else c.since + dt
-        stuck = c.since > STICKS  # then the wrench is that of the load, and says which grip balances it
+        stuck = (
+            c.since > STICKS
+        )  # then the wrench is that of the load, and says which grip balances it
         braking = 0.5 * acceleration
         if c.caught == 0.0 and c.pressed > 0.0:
             c.broke = max(c.broke * math.exp(-FADES * dt), c.lately / c.pressed)
@@ -295,9 +394,15 @@ def slip(
         span = DIP + LONGER * math.sqrt(max(left / tolerance, 0.0))
         far = left - AIM * tolerance - v * REACTS - 0.5 * v * v / braking
         if c.began >= 0.0 and c.caught == 0.0 and (near or far <= 0.0):
-            c.caught, c.dipped = 1.0, APPROACH + span  # it may be on its way already: no dip before this is seen
+            c.caught = 1.0
+            c.dipped = (
+                APPROACH + span
+            )  # it may be on its way already: no dip before this is seen
         if slips and c.quiet <= LATE:
-            c.balance = min(c.balance * math.exp(adapt * (v - speed - 2.0 * (place - there)) * dt), LARGEST)
+            c.balance = min(
+                c.balance * math.exp(adapt * (v - speed - 2.0 * (place - there)) * dt),
+                LARGEST,
+            )
         if stuck and c.began >= 0.0:
             c.balance = 1.1 * needed / e.mu_c
         a = push + SPEED_GAIN * (speed - v) + PLACE_GAIN * (place - there)
@@ -306,17 +411,31 @@ def slip(
         c.dipped += dt
         if c.caught > 0.0:
             if stuck and c.dipped > span + WAIT and left > ENOUGH * tolerance:
-                share = (x - c.before) / (goal - c.before)  # before the first dip, of all: it is less deep
-                c.broke *= 1.0 + (DEEPER if share < LITTLE else (-0.5 * DEEPER if share > MUCH else 0.0))
-                c.dipped, c.before = 0.0, x
+                share = (x - c.before) / (
+                    goal - c.before
+                )  # before the first dip, of all: it is less deep
+                c.broke *= 1.0 + (
+                    DEEPER
+                    if share < LITTLE
+                    else (-0.5 * DEEPER if share > MUCH else 0.0)
+                )
+                c.dipped = 0.0
+                c.before = x
             dips = c.dipped < APPROACH + span and not unsure
-            level = c.lately / max(c.broke, 1e-9) * (ABOVE if c.dipped < APPROACH else 1.0)
+            level = (
+                c.lately / max(c.broke, 1e-9) * (ABOVE if c.dipped < APPROACH else 1.0)
+            )
             asked = level if dips else CAUGHT * max(c.balance, c.load / e.mu_c)
         elif c.began < 0.0:
             asked = min(start, c.grip) * math.exp(-RELEASE * dt)
         else:
             brake = BRAKE if stuck and c.since < STICKS + BRAKES else 1.0
-            asked = brake * balance * (1.0 - lead) * math.exp(-STUCK * max(c.since - STICKS - BRAKES, 0.0))
+            asked = (
+                brake
+                * balance
+                * (1.0 - lead)
+                * math.exp(-STUCK * max(c.since - STICKS - BRAKES, 0.0))
+            )
         if unsure:
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)
@@ -326,27 +445,44 @@ def slip(
 def hinge(states, found, least_load, quantum, silence, most, least_mu, reserve, gain):
     """Set the grips of `Hinge` in states `[P]` from what an observer found `[P]`."""
     for p in range(states.shape[0]):
-        c, e = states[p], found[p]
+        c = states[p]
+        e = found[p]
         # a part that is to turn loses torque, but carries its weight
         _, dt = _follow(c, e, least_load, quantum, 1.0 - c.found)
-        force, torque = math.hypot(e.wrench[0], e.wrench[1]), e.wrench[2]
+        force = math.hypot(e.wrench[0], e.wrench[1])
+        torque = e.wrench[2]
         if xp.in_range(force) and xp.in_range(torque):
             share = dt / FORCE_TIME
             c.force += share * (force - c.force)
             c.torque += share * (torque - c.torque)
-        slips, v = e.slip > 0.5, c.velocity
+        slips = e.slip > 0.5
+        v = c.velocity
         if slips and c.age >= SETTLED:
             c.found = 1.0
-        moves = slips and (v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0)  # near the surface a slip is probable, unseen
+        moves = slips and (
+            v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0
+        )  # near the surface a slip is probable, unseen
         c.since = 0.0 if moves else c.since + dt
-        sticks, brakes = c.since > STICKS + BRAKES, c.found > 0.0 and STICKS < c.since < STICKS + BRAKES
+        sticks = c.since > STICKS + BRAKES
+        brakes = c.found > 0.0 and STICKS < c.since < STICKS + BRAKES
         eases = sticks and abs(c.torque) > HANGS * e.radius * c.force
         rate = -RELEASE if eases else (REGRIP if moves or sticks else 0.0)
         c.eased = min(c.eased * math.exp(rate * dt), 1.0)
         start = _begin(c, 2.5 * c.load / e.mu_c, most)
         speed = math.hypot(v[0], v[1]) if slips else 0.0
-        carried = reserve * (BRAKE if brakes else c.eased) * c.force / e.mu_c + gain * speed
-        asked = carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt))
-        if _unsure(c, e, dt, silence, c.found == 0.0 or c.since > SURE, LOST if c.found == 0.0 else LOSES):
+        carried = (
+            reserve * (BRAKE if brakes else c.eased) * c.force / e.mu_c + gain * speed
+        )
+        asked = (
+            carried if c.found > 0.0 else min(start, c.grip * math.exp(-RELEASE * dt))
+        )
+        if _unsure(
+            c,
+            e,
+            dt,
+            silence,
+            c.found == 0.0 or c.since > SURE,
+            LOST if c.found == 0.0 else LOSES,
+        ):
             asked = UNSURE * max(c.load, c.weight) / least_mu
         _set(c, asked, most)

@@ -27,10 +27,14 @@ def measure(s, h, innovation, variance, column):
         for i in range(j, N):
             v += s[ROOT + N * i + j] * h[i]
         size = math.sqrt(corner * corner + v * v)
-        cosine, sine, corner = corner / size, v / size, size
+        cosine = corner / size
+        sine = v / size
+        corner = size
         for i in range(j, N):
-            a, b = column[i], s[ROOT + N * i + j]
-            column[i], s[ROOT + N * i + j] = cosine * a + sine * b, cosine * b - sine * a
+            a = column[i]
+            b = s[ROOT + N * i + j]
+            column[i] = cosine * a + sine * b
+            s[ROOT + N * i + j] = cosine * b - sine * a
     for i in range(N):
         s[i] += column[i] * innovation / corner
     return innovation / corner
@@ -40,13 +44,17 @@ def measure(s, h, innovation, variance, column):
 def _take_in(s, first, column):
     """Rotate a column, zero above its row `first`, into the root: the covariance grows by its outer product."""
     for j in range(first, N):
-        a, b = s[ROOT + N * j + j], column[j]
+        a = s[ROOT + N * j + j]
+        b = column[j]
         size = math.sqrt(a * a + b * b)
         if size > 0.0:
-            cosine, sine = a / size, b / size
+            cosine = a / size
+            sine = b / size
             for k in range(j, N):
-                a, b = s[ROOT + N * k + j], column[k]
-                s[ROOT + N * k + j], column[k] = cosine * a + sine * b, cosine * b - sine * a
+                a = s[ROOT + N * k + j]
+                b = column[k]
+                s[ROOT + N * k + j] = cosine * a + sine * b
+                column[k] = cosine * b - sine * a
 
 
 @kernel
@@ -66,7 +74,8 @@ def reset(s, i, value, deviation, column):
         s[ROOT + N * i + j] = 0.0
     for k in range(i + 1, N):
         s[ROOT + N * k + i] = 0.0
-    s[i], s[ROOT + N * i + i] = value, deviation
+    s[i] = value
+    s[ROOT + N * i + i] = deviation
     _take_in(s, i + 1, column)  # what the others had in that column goes on
 
 

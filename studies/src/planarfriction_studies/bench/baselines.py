@@ -13,7 +13,12 @@ from planarfriction.scenes import Scene
 from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
 from planarfriction.solvers import RODAS4, Statistics, integrate
 
-LSODA: dict[str, Any] = {"method": "LSODA", "rtol": 1e-6, "atol": 1e-8, "max_step": 1e-3}
+LSODA: dict[str, Any] = {
+    "method": "LSODA",
+    "rtol": 1e-6,
+    "atol": 1e-8,
+    "max_step": 1e-3,
+}
 """Settings of the general solver, as published."""
 
 START_TOLERANCE = 1e-8
@@ -54,7 +59,9 @@ class Window:
     def of(cls, scene: Scene, begin: float, end: float) -> Window:
         """Make the window from `begin` to `end` [s]: 0 or jumps of a signal, or the end of the scene."""
         whole = SegmentBatches(scene, end, most=MOST_PIECES)
-        packed = PackedScene(next(iter(whole)), whole.state, whole.state_scale, len(whole.models))
+        packed = PackedScene(
+            next(iter(whole)), whole.state, whole.state_scale, len(whole.models)
+        )
         breaks = packed.system.motion.breaks
         first = int(np.argmin(np.abs(breaks - begin)))
         assert abs(breaks[first] - begin) < 1e-9, f"no jump at {begin} s"
@@ -63,7 +70,14 @@ class Window:
         before = _pieces(packed, slice(0, first))
         output = _output(before, breaks[first : first + 1], bristles=True)
         tolerance = START_TOLERANCE * before.state_scale
-        run = integrate([before.system], output, before.state, method=RODAS4, rtol=START_TOLERANCE, atol=tolerance)
+        run = integrate(
+            [before.system],
+            output,
+            before.state,
+            method=RODAS4,
+            rtol=START_TOLERANCE,
+            atol=tolerance,
+        )
         assert run.status == "success", run.message
         state = np.concatenate([run.output.bristles[-1], run.output.body[-1]])
         return cls(_pieces(packed._replace(state=state), slice(first, len(breaks) - 1)))
@@ -78,21 +92,35 @@ class Window:
         """Number of states."""
         return len(self.packed.state)
 
-    def ours(self, *, rtol: float, atol: float, method: Method = RODAS4) -> tuple[Poses, Statistics]:
+    def ours(
+        self, *, rtol: float, atol: float, method: Method = RODAS4
+    ) -> tuple[Poses, Statistics]:
         """Solve with the structured solver; `atol` is a share of the natural scales."""
         packed = self.packed
         output = _output(packed, self.ends, bristles=False)
-        run = integrate([packed.system], output, packed.state, method=method, rtol=rtol, atol=atol * packed.state_scale)
+        run = integrate(
+            [packed.system],
+            output,
+            packed.state,
+            method=method,
+            rtol=rtol,
+            atol=atol * packed.state_scale,
+        )
         assert run.status == "success", run.message
-        return Poses(run.statistics.wall_time, run.output.body[:, 3:], run.statistics.evaluations), run.statistics
+        return Poses(
+            run.statistics.wall_time, run.output.body[:, 3:], run.statistics.evaluations
+        ), run.statistics
 
-    def general(self, *, method: str, rtol: float, atol: Any, max_step: float = np.inf) -> Poses:
+    def general(
+        self, *, method: str, rtol: float, atol: Any, max_step: float = np.inf
+    ) -> Poses:
         """Solve with a method of SciPy's `solve_ivp`, restarted at every jump; `atol` in the units of the states."""
         from scipy.integrate import solve_ivp
 
         from planarfriction.extend import right_hand_side
 
-        system, y = self.packed.system, self.packed.state.copy()
+        system = self.packed.system
+        y = self.packed.state.copy()
 
         def rate(since: float, y: np.ndarray, piece: int) -> np.ndarray:
             nonlocal evaluations
@@ -102,11 +130,14 @@ class Window:
             return dy
 
         options = {"method": method, "rtol": rtol, "atol": atol, "max_step": max_step}
-        poses, evaluations = [], -1
+        poses = []
+        evaluations = -1
         rate(0.0, y, 0)  # compiles
         begin = time.perf_counter()
         for piece, length in enumerate(np.diff(system.motion.breaks)):
-            solution = solve_ivp(rate, (0.0, length), y, t_eval=[length], args=(piece,), **options)
+            solution = solve_ivp(
+                rate, (0.0, length), y, t_eval=[length], args=(piece,), **options
+            )
             assert solution.success, solution.message
             y = solution.y[:, -1]
             poses.append(y[-3:])
@@ -121,14 +152,23 @@ def lsoda_time(scene: Scene, t_end: float) -> float:
 def _pieces(packed: PackedScene, kept: slice) -> PackedScene:
     """Return the pieces `kept` of the motion."""
     motion = packed.system.motion
-    per_piece = {name: getattr(motion, name)[kept] for name in ("load", "force", "acceleration", "row")}
+    per_piece = {
+        name: getattr(motion, name)[kept]
+        for name in ("load", "force", "acceleration", "row")
+    }
     velocity = motion.velocity[kept] if len(motion.velocity) else motion.velocity
     breaks = motion.breaks[kept.start : kept.stop + 1]
     motion = motion._replace(breaks=breaks, velocity=velocity, **per_piece)
-    return packed._replace(system=System(packed.system.contacts, motion, packed.system.keepalive))
+    return packed._replace(
+        system=System(packed.system.contacts, motion, packed.system.keepalive)
+    )
 
 
 def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output:
-    count, contacts = len(times), packed.contacts
+    count = len(times)
+    contacts = packed.contacts
     states = (count, len(packed.state) - 6) if bristles else (0, 0)
-    return Output(times.copy(), *map(np.empty, ((count, 6), (count, contacts, 3), (count, contacts), states)))
+    return Output(
+        times.copy(),
+        *map(np.empty, ((count, 6), (count, contacts, 3), (count, contacts), states)),
+    )

@@ -44,9 +44,14 @@ class Change(NamedTuple):
 def read_run(path: Path) -> dict[str, Measurement]:
     """Read what `planarfriction bench --json` printed; raise FileError in one line if the file is something else."""
     try:
-        rows = [Measurement(**row) for row in json.loads(read_text(path, "a run of planarfriction bench"))]
+        rows = [
+            Measurement(**row)
+            for row in json.loads(read_text(path, "a run of planarfriction bench"))
+        ]
     except (ValueError, TypeError):
-        raise FileError(f"{path}: is not what planarfriction bench --json prints") from None
+        raise FileError(
+            f"{path}: is not what planarfriction bench --json prints"
+        ) from None
     return {row.name: row for row in rows}
 
 
@@ -57,7 +62,8 @@ def changes(now: Sequence[Measurement], then: dict[str, Measurement]) -> list[Ch
         before = then.get(each.name)
         if before is None or not each.ratio or not before.ratio:
             continue
-        new, old = each.ratios or (each.ratio,), before.ratios or (before.ratio,)
+        new = each.ratios or (each.ratio,)
+        old = before.ratios or (before.ratio,)
         spread = min(new) / max(old), max(new) / min(old)
         found.append(Change(each, before, each.ratio / before.ratio, *spread))
     return found
@@ -71,7 +77,14 @@ def rows(compared: Sequence[Change]) -> list[list[str]]:
         values = [f"{one.value:.4g} {one.unit}" for one in (each.then, each.now)]
         ratios = [f"{one.ratio:.4g}" for one in (each.then, each.now)]
         table.append(
-            [each.now.name, *values, *ratios, f"{each.change:.3f}", f"{each.low:.3f} to {each.high:.3f}", verdict]
+            [
+                each.now.name,
+                *values,
+                *ratios,
+                f"{each.change:.3f}",
+                f"{each.low:.3f} to {each.high:.3f}",
+                verdict,
+            ]
         )
     return table
 
@@ -79,11 +92,18 @@ def rows(compared: Sequence[Change]) -> list[list[str]]:
 def free_share() -> float:
     """Measure which share of a processor busy loops get, one on each processor at once: the smallest of them."""
     command = [sys.executable, "-c", _LOOP]
-    loops = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(processors())]
+    loops = [
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        for _ in range(processors())
+    ]
     return min(float(each.communicate()[0]) for each in loops)
 
 
 def check_idle() -> None:
     """Raise InvalidValueError if other programs use this machine."""
     if (share := free_share()) < LEAST_SHARE:
-        raise InvalidValueError("machine", "be idle for a comparison (or give --force)", f"{share:.0%} of a processor")
+        raise InvalidValueError(
+            "machine",
+            "be idle for a comparison (or give --force)",
+            f"{share:.0%} of a processor",
+        )

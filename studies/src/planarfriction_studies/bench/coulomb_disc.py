@@ -36,12 +36,18 @@ def wrench(ratio: float) -> tuple[float, float]:
         ratio = 1.0 + 1e-10
     square = ratio * ratio
     if ratio < 1.0:
-        k, e = ellipkm1(1.0 - square), ellipe(square)
-        force = 4.0 / (3.0 * math.pi) * ((square + 1.0) * e + (square - 1.0) * k) / ratio
-        return force, 4.0 / (9.0 * math.pi) * ((4.0 - 2.0 * square) * e + (square - 1.0) * k)
+        k = ellipkm1(1.0 - square)
+        e = ellipe(square)
+        force = (
+            4.0 / (3.0 * math.pi) * ((square + 1.0) * e + (square - 1.0) * k) / ratio
+        )
+        return force, 4.0 / (9.0 * math.pi) * (
+            (4.0 - 2.0 * square) * e + (square - 1.0) * k
+        )
     if ratio > 1e3:
         return 1.0 - 1.0 / (8.0 * square), 0.25 / ratio
-    k, e = ellipkm1(1.0 - 1.0 / square), ellipe(1.0 / square)
+    k = ellipkm1(1.0 - 1.0 / square)
+    e = ellipe(1.0 / square)
     force = 4.0 / (3.0 * math.pi) * ((square + 1.0) * e - (square - 1.0) * k)
     torque = (4.0 - 2.0 * square) * e + (2.0 * square - 5.0 + 3.0 / square) * k
     return force, 4.0 / (9.0 * math.pi) * ratio * torque
@@ -52,15 +58,29 @@ def stop(speed: float, spin: float, *, radius: float = 0.1, mu: float = 0.3) -> 
     from scipy.integrate import solve_ivp
 
     def rates(_, y):
-        v, w = max(y[0], 0.0), max(y[1], 0.0)
+        v = max(y[0], 0.0)
+        w = max(y[1], 0.0)
         scale = math.hypot(v, radius * w)
         force, torque = wrench(v / (radius * w) if w > 0.0 else math.inf)
         slowing = scale * mu * GRAVITY
-        return [-slowing * force, -2.0 * slowing / radius * torque, scale * v, scale * w, scale]
+        return [
+            -slowing * force,
+            -2.0 * slowing / radius * torque,
+            scale * v,
+            scale * w,
+            scale,
+        ]
 
     def stopped(_, y):
         return math.hypot(y[0], radius * y[1]) - _STOPPED
 
     stopped.terminal = True  # pyright: ignore[reportFunctionMemberAccess]
-    end = solve_ivp(rates, [0.0, 200.0], [speed, spin, 0.0, 0.0, 0.0], rtol=1e-10, atol=1e-13, events=stopped).y[:, -1]
+    end = solve_ivp(
+        rates,
+        [0.0, 200.0],
+        [speed, spin, 0.0, 0.0, 0.0],
+        rtol=1e-10,
+        atol=1e-13,
+        events=stopped,
+    ).y[:, -1]
     return Stop(float(end[4]), float(end[2]), float(end[3]))

@@ -15,7 +15,14 @@ import numpy as np
 from planarfriction.derivatives import rollout
 from planarfriction.export import export_c
 from planarfriction.models import ReducedModel, ReducedModelPublished
-from planarfriction_studies.bench.measurement import Measurement, disc, law, line, median, mixed_twists
+from planarfriction_studies.bench.measurement import (
+    Measurement,
+    disc,
+    law,
+    line,
+    median,
+    mixed_twists,
+)
 
 LOOP = """#define _POSIX_C_SOURCE 200809L
 #include "friction.h"
@@ -100,7 +107,17 @@ def library(model: Any, folder: Path, *options: str) -> ctypes.CDLL:
     """Compile the C library of a model with loops around its step, and load it."""
     export_c(model, folder)
     (folder / "loop.c").write_text(LOOP)
-    compiled = "gcc", "-std=c99", "-O3", "-march=native", *options, "-fPIC", "-c", "friction.c", "loop.c"
+    compiled = (
+        "gcc",
+        "-std=c99",
+        "-O3",
+        "-march=native",
+        *options,
+        "-fPIC",
+        "-c",
+        "friction.c",
+        "loop.c",
+    )
     linked = "gcc", "-shared", "-o", "friction.so", "friction.o", "loop.o", "-lm"
     for command in (compiled, linked):
         subprocess.run(command, cwd=folder, check=True)
@@ -124,19 +141,42 @@ def percentile(full: bool, kind: str) -> Measurement:
 
 def instructions(full: bool, kind: str) -> Measurement:
     """Count the most instructions of a step in C against the median step, under valgrind."""
-    if shutil.which("gcc") is None or not Path("/usr/include/valgrind/callgrind.h").exists():
+    if (
+        shutil.which("gcc") is None
+        or not Path("/usr/include/valgrind/callgrind.h").exists()
+    ):
         return NO_VALGRIND
     with tempfile.TemporaryDirectory() as folder:
         export_c(MODELS[kind](), folder)
         (Path(folder) / "counted.c").write_text(COUNTED)
-        made = "gcc", "-std=c99", "-O2", "friction.c", "counted.c", "-o", "counted", "-lm"
+        made = (
+            "gcc",
+            "-std=c99",
+            "-O2",
+            "friction.c",
+            "counted.c",
+            "-o",
+            "counted",
+            "-lm",
+        )
         subprocess.run(made, cwd=folder, check=True)
         run = "valgrind", "--tool=callgrind", "--callgrind-out-file=counts", "./counted"
-        subprocess.run(run, cwd=folder, check=True, input=mixed_twists(STEPS).tobytes(), capture_output=True)
+        subprocess.run(
+            run,
+            cwd=folder,
+            check=True,
+            input=mixed_twists(STEPS).tobytes(),
+            capture_output=True,
+        )
         dumps = [each.read_text() for each in Path(folder).glob("counts.*")]
     totals = [re.search(r"^totals: (\d+)", each, re.MULTILINE) for each in dumps]
     counts = [int(each[1]) for each in totals if each]
-    return line(float(max(counts)), "instructions", "the median of the same steps", float(np.median(counts)))
+    return line(
+        float(max(counts)),
+        "instructions",
+        "the median of the same steps",
+        float(np.median(counts)),
+    )
 
 
 def _measured(kind: str, measure: Any, *options: str) -> Measurement:
@@ -144,32 +184,55 @@ def _measured(kind: str, measure: Any, *options: str) -> Measurement:
         return NO_COMPILER
     model = MODELS[kind]()
     with tempfile.TemporaryDirectory() as folder:
-        return measure(model, library(model, Path(folder), *options), model.rest().ravel(), np.empty(3))
+        return measure(
+            model,
+            library(model, Path(folder), *options),
+            model.rest().ravel(),
+            np.empty(3),
+        )
 
 
 def _pointers(*arrays: np.ndarray) -> list[ctypes.c_void_p]:
     return [each.ctypes.data_as(ctypes.c_void_p) for each in arrays]
 
 
-def _loop(model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray) -> Measurement:
+def _loop(
+    model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray
+) -> Measurement:
     twists = mixed_twists(20_000)
-    ours = median(lambda: made.loop(len(twists), *_pointers(state, twists, wrench)), 9) / len(twists)
+    ours = median(
+        lambda: made.loop(len(twists), *_pointers(state, twists, wrench)), 9
+    ) / len(twists)
     theirs = median(lambda: rollout(model, None, twists, 1.0, 1e-4), 9) / len(twists)
     return line(ours * 1e6, "us", "the same step in a rollout", theirs * 1e6)
 
 
-def _body(model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray) -> Measurement:
+def _body(
+    model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray
+) -> Measurement:
     twists = mixed_twists(20_000)
     pushes = np.outer(np.sin(np.linspace(0.0, 60.0, 20_000)), [1.2, 0.0, 1e-3])
     ours, theirs = (
-        median(lambda run=run, given=given: run(len(given), *_pointers(state, given, wrench)), 9) / len(given)
+        median(
+            lambda run=run, given=given: run(
+                len(given), *_pointers(state, given, wrench)
+            ),
+            9,
+        )
+        / len(given)
         for run, given in ((made.body_loop, pushes), (made.loop, twists))
     )
     return line(ours * 1e6, "us", "one step in C", theirs * 1e6)
 
 
-def _percentile(model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray) -> Measurement:
-    twists, seconds = mixed_twists(SAMPLES), np.empty(SAMPLES)
+def _percentile(
+    model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray
+) -> Measurement:
+    twists = mixed_twists(SAMPLES)
+    seconds = np.empty(SAMPLES)
     made.each(SAMPLES, *_pointers(state, twists, wrench, seconds))
-    high, middle = np.quantile(seconds, 0.999), np.median(seconds)
-    return line(float(high) * 1e6, "us", "the median of the same steps", float(middle) * 1e6)
+    high = np.quantile(seconds, 0.999)
+    middle = np.median(seconds)
+    return line(
+        float(high) * 1e6, "us", "the median of the same steps", float(middle) * 1e6
+    )

@@ -42,7 +42,9 @@ def reduced(full: bool) -> Measurement:
     return line(ours, "s", AGAINST_PUBLISHED, theirs)
 
 
-def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
+def _value_and_gradient(
+    model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int
+) -> float:
     """Measure half the squared wrenches of rollouts with their gradient to all inputs [s]; steps are the last axis."""
     inputs = model.rest(), *_inputs(shape)
 
@@ -53,7 +55,9 @@ def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tupl
     return median(value_and_gradient, repeats)
 
 
-def _alone(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
+def _alone(
+    model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int
+) -> float:
     """Measure the time of the rollouts alone [s]."""
     inputs = model.rest(), *_inputs(shape)
     return median(lambda: derivatives.rollout(model, *inputs), repeats)
@@ -69,9 +73,12 @@ def published(full: bool) -> Measurement:
     model = ReducedModelPublished(disc(), law())
     value = _value_and_gradient(model, (STEPS,), 15)
     try:
-        return line(value, "s", "PyTorch, eager, the same rollout", _eager_gradient(model, full))
+        return line(
+            value, "s", "PyTorch, eager, the same rollout", _eager_gradient(model, full)
+        )
     except ImportError:
-        inputs, once = len(derivatives.PARAMETERS) + 3 + 4 * STEPS, _alone(model, (STEPS,), 15)
+        inputs = len(derivatives.PARAMETERS) + 3 + 4 * STEPS
+        once = _alone(model, (STEPS,), 15)
         words = f"central differences, 2 x {inputs} rollouts of {once * 1e3:.2g} ms (PyTorch is not installed)"
         return line(value, "s", words, 2 * inputs * once)
 
@@ -83,11 +90,15 @@ def _eager_gradient(model: ReducedModelPublished, full: bool) -> float:
     front = importlib.import_module("planarfriction.torch")
     module = front.ReducedModelPublished(model.patch, model.law, dtype=torch.float64)
     twists, loads, dt = _inputs((STEPS,))
-    profile, loads = (torch.tensor(each, requires_grad=True) for each in (twists, loads))
+    profile, loads = (
+        torch.tensor(each, requires_grad=True) for each in (twists, loads)
+    )
 
     def value_and_gradient() -> None:
         start = torch.zeros(3, dtype=torch.float64, requires_grad=True)
-        wrenches = front.rollout(module, start, profile, loads, dt, method="eager").wrenches
+        wrenches = front.rollout(
+            module, start, profile, loads, dt, method="eager"
+        ).wrenches
         (0.5 * wrenches * wrenches).sum().backward()
 
     return median(value_and_gradient, 3 if full else 1)
@@ -112,11 +123,17 @@ def reduced_batch_alone(full: bool) -> Measurement:
     """Measure 1000 rollouts."""
     shape = 1000, 250
     models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
-    ours, theirs = (1e-6 * math.prod(shape) / _alone(model, shape, 5) for model in models)
-    return line(ours, "million contact-steps/s", AGAINST_PUBLISHED, theirs, ours / theirs)
+    ours, theirs = (
+        1e-6 * math.prod(shape) / _alone(model, shape, 5) for model in models
+    )
+    return line(
+        ours, "million contact-steps/s", AGAINST_PUBLISHED, theirs, ours / theirs
+    )
 
 
-def _batch(model: ReducedModel | ReducedModelPublished, count: int = 1000) -> tuple[float, float]:
+def _batch(
+    model: ReducedModel | ReducedModelPublished, count: int = 1000
+) -> tuple[float, float]:
     """Return millions of contact-steps per second of a thousand rollouts with their gradient, and of these alone."""
     shape = 1000, count
     steps = 1e-6 * math.prod(shape)
@@ -134,14 +151,19 @@ def scene_to_friction(full: bool) -> Measurement:
 def scene_to_knots(full: bool) -> Measurement:
     """Measure derivatives of the motion of a scene to twenty knots of the grip."""
     return _beside_simulation(
-        _gripped(), lambda scene: derivatives.scene_sensitivities(scene, (), signals=SIGNALS, options=OPTIONS)
+        _gripped(),
+        lambda scene: derivatives.scene_sensitivities(
+            scene, (), signals=SIGNALS, options=OPTIONS
+        ),
     )
 
 
 def cost_to_knots(full: bool) -> Measurement:
     """Measure derivatives of one cost to twenty knots of the grip."""
-    everything = lambda _, motion: np.ones_like(motion)  # noqa: E731
-    gradient = lambda scene: derivatives.scene_gradient(scene, everything, signals=SIGNALS, options=OPTIONS)  # noqa: E731
+    everything = lambda _, motion: np.ones_like(motion)
+    gradient = lambda scene: derivatives.scene_gradient(
+        scene, everything, signals=SIGNALS, options=OPTIONS
+    )
     return _beside_simulation(_gripped(), gradient)
 
 
@@ -151,6 +173,10 @@ def _gripped() -> Scene:
     return in_hand(ReducedModel(disc(), law()), normal_force=grip, t_end=0.5)
 
 
-def _beside_simulation(scene: Scene, derivatives: Callable[[Scene], Any]) -> Measurement:
+def _beside_simulation(
+    scene: Scene, derivatives: Callable[[Scene], Any]
+) -> Measurement:
     alone = median(lambda: simulate(scene, **TIGHT), 3)
-    return line(median(lambda: derivatives(scene), 3), "s", "the same simulation alone", alone)
+    return line(
+        median(lambda: derivatives(scene), 3), "s", "the same simulation alone", alone
+    )

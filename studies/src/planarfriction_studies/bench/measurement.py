@@ -33,9 +33,22 @@ class Measurement:
     """Ratios of all rounds, if there was more than one; the others are those of the round in the middle."""
 
 
-def line(value: float, unit: str, baseline: str, baseline_value: float, ratio: float | None = None) -> Measurement:
+def line(
+    value: float,
+    unit: str,
+    baseline: str,
+    baseline_value: float,
+    ratio: float | None = None,
+) -> Measurement:
     """Make a measurement that has no name yet; `ratio` is that of the two values unless it is given."""
-    return Measurement("", value, unit, baseline, baseline_value, baseline_value / value if ratio is None else ratio)
+    return Measurement(
+        "",
+        value,
+        unit,
+        baseline,
+        baseline_value,
+        baseline_value / value if ratio is None else ratio,
+    )
 
 
 def median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:

@@ -70,7 +70,9 @@ class MujocoScene:
         return f"""<mujoco><option timestep="{dt}" integrator="{integrator}" {options}/>
         <default><geom {contact}/></default>{self.body}</mujoco>"""
 
-    def native(self, settings: Native, dt: float = 2e-3, integrator: str = "Euler") -> tuple[Any, Any]:
+    def native(
+        self, settings: Native, dt: float = 2e-3, integrator: str = "Euler"
+    ) -> tuple[Any, Any]:
         """Return the model and data with MuJoCo's own friction."""
         import mujoco
 
@@ -90,18 +92,27 @@ class MujocoScene:
         settings = Native(condim=1, impratio=1.0, solref=solref)
         return self.with_patches(adapter, self.text(settings, dt, integrator), model)
 
-    def with_patches(self, adapter: Any, text: str, model: FrictionModel | None = None) -> tuple[Any, Any, Any]:
+    def with_patches(
+        self, adapter: Any, text: str, model: FrictionModel | None = None
+    ) -> tuple[Any, Any, Any]:
         """Return the model of an MJCF text, data, and the friction of the scene's patches by an adapter."""
         import mujoco
 
-        patches = [adapter.PatchContact(model or self.model, site=site, geoms=geoms) for site, geoms in self.patches]
+        patches = [
+            adapter.PatchContact(model or self.model, site=site, geoms=geoms)
+            for site, geoms in self.patches
+        ]
         spec = mujoco.MjSpec.from_string(text)
         adapter.prepare(spec, patches)
         m = spec.compile()
         return m, mujoco.MjData(m), adapter.Friction(m, patches)
 
     def begin(
-        self, way: Native | None, dt: float = 2e-3, integrator: str = "Euler", model: FrictionModel | None = None
+        self,
+        way: Native | None,
+        dt: float = 2e-3,
+        integrator: str = "Euler",
+        model: FrictionModel | None = None,
     ) -> tuple[Any, Any, Callable[[], None]]:
         """Return model, data and a function that makes a step: with MuJoCo's own friction, for None with patches."""
         import mujoco
@@ -114,7 +125,8 @@ class MujocoScene:
 
     def run(self, m: Any, d: Any, step: Callable[[], None]) -> np.ndarray:
         """Run the scene and return positions `[steps + 1, nq]` after it has settled; `step` makes a step."""
-        gravity, dt = m.opt.gravity.copy(), float(m.opt.timestep)
+        gravity = m.opt.gravity.copy()
+        dt = float(m.opt.timestep)
         if self.weightless:
             m.opt.gravity[:] = 0.0
         if m.nu:
@@ -134,7 +146,14 @@ class MujocoScene:
 
 
 def _law(mu: float, sigma_0: float, sigma_1: float = 0.0) -> LuGre:
-    return LuGre(mu_c=mu, mu_s=mu, sigma_0=sigma_0, sigma_1=sigma_1, sigma_2=0.0, elasto_plastic=0.9)
+    return LuGre(
+        mu_c=mu,
+        mu_s=mu,
+        sigma_0=sigma_0,
+        sigma_1=sigma_1,
+        sigma_2=0.0,
+        elasto_plastic=0.9,
+    )
 
 
 def _pad(radius: float, mu: float, sigma_0: float) -> ReducedModel:
@@ -174,7 +193,9 @@ def grip(pad: str = "box") -> MujocoScene:
     body = f"""<option><flag multiccd="disable"/></option>
     <worldbody><body name="block" pos="0 0 0.5"><freejoint/>{_BLOCK.format(0.004)}</body>{pads}</worldbody>
     <actuator>{_MOTORS}</actuator>"""
-    return MujocoScene(body, 1.0, 2e-2 / 3.0, _HELD, _pad(0.01, 1.0, 1e6), lambda t: (3.0, 3.0))
+    return MujocoScene(
+        body, 1.0, 2e-2 / 3.0, _HELD, _pad(0.01, 1.0, 1e6), lambda t: (3.0, 3.0)
+    )
 
 
 SHAKEN = 3.0
@@ -193,7 +214,8 @@ def shaken() -> MujocoScene:
 
     def control(t: float) -> tuple[float, ...]:
         fades = 1.0 if t < SHAKEN else math.exp(-5.0 * (t - SHAKEN))
-        lift, turn = 0.02 * math.sin(4.0 * math.pi * t), 0.1 * math.sin(2.6 * math.pi * t)
+        lift = 0.02 * math.sin(4.0 * math.pi * t)
+        turn = 0.1 * math.sin(2.6 * math.pi * t)
         return 6.0, 6.0, fades * lift, fades * turn
 
     return MujocoScene(body, 1.0, 2e-2 / 3.0, _HELD, _pad(0.01, 1.0, 1e6), control)
@@ -246,11 +268,16 @@ def plate(load: Literal[1, 2] = 1) -> MujocoScene:
     <geom name="upper" type="sphere" size="0.01" mass="0.01" contype="1" conaffinity="0"/>
     <site name="upper" pos="0 0 -0.01"/></body></worldbody>
     <actuator><motor joint="press"/></actuator>"""
-    force, pads = in_hand_load(load), (("lower", ("lower", "plate")), ("upper", ("upper", "plate")))
-    own = ReducedModel(ContactPatch.disc(radius=0.01, cells=21), LuGre(mu_s=1.2, elasto_plastic=0.9))
-    control = lambda t: (float(force(t)),)  # noqa: E731
+    force = in_hand_load(load)
+    pads = (("lower", ("lower", "plate")), ("upper", ("upper", "plate")))
+    own = ReducedModel(
+        ContactPatch.disc(radius=0.01, cells=21), LuGre(mu_s=1.2, elasto_plastic=0.9)
+    )
+    control = lambda t: (float(force(t)),)
     # solref: the pads press with what the motor gives
-    return MujocoScene(body, 1.0, 2e-2 / 3.0, pads, own, control, time=2.0, solref=0.004)
+    return MujocoScene(
+        body, 1.0, 2e-2 / 3.0, pads, own, control, time=2.0, solref=0.004
+    )
 
 
 def tray(blocks: int = 2) -> MujocoScene:
@@ -268,9 +295,22 @@ def tray(blocks: int = 2) -> MujocoScene:
     {carried}</worldbody>
     <actuator><position joint="x" kp="5000" dampratio="1"/><position joint="y" kp="5000" dampratio="1"/></actuator>"""
     patches = tuple((f"block {i}", ("tray", f"block {i}")) for i in range(blocks))
-    control = lambda t: (0.02 * math.sin(6.0 * math.pi * t), 0.02 * math.sin(4.6 * math.pi * t))  # noqa: E731
+    control = lambda t: (
+        0.02 * math.sin(6.0 * math.pi * t),
+        0.02 * math.sin(4.6 * math.pi * t),
+    )
     model = _pad(0.02, 0.4, 1e5)
-    return MujocoScene(body, 0.4, 0.006, patches, model, control, time=2.0, settle=0.4, weightless=False)
+    return MujocoScene(
+        body,
+        0.4,
+        0.006,
+        patches,
+        model,
+        control,
+        time=2.0,
+        settle=0.4,
+        weightless=False,
+    )
 
 
 def capsule() -> MujocoScene:
@@ -278,13 +318,19 @@ def capsule() -> MujocoScene:
 
     Source: MuJoCo issue 3328.
     """
-    pads = _pads("{}0.014 0 0.2", 'type="box" size="0.01 0.02 0.02" mass="0.1"', 'damping="20"')
+    pads = _pads(
+        "{}0.014 0 0.2", 'type="box" size="0.01 0.02 0.02" mass="0.1"', 'damping="20"'
+    )
     body = f"""<worldbody>{pads}<body name="capsule" pos="0 0 0.2" euler="90 0 0"><freejoint/>
     <geom name="capsule" type="capsule" size="0.004 0.02" mass="0.045" contype="0" conaffinity="1"/>
     <site name="left" pos="-0.004 0 0" zaxis="1 0 0"/><site name="right" pos="0.004 0 0" zaxis="-1 0 0"/></body>
     </worldbody>
     <actuator><position joint="left" kp="2000"/><position joint="right" kp="2000"/></actuator>"""
     # the sites' x axes lie along the capsule
-    line = ReducedModel(ContactPatch.rectangle(0.04, 5e-4, cells=21), _law(0.7, 1e6, 800.0))
+    line = ReducedModel(
+        ContactPatch.rectangle(0.04, 5e-4, cells=21), _law(0.7, 1e6, 800.0)
+    )
     patches = (("left", ("pad left", "capsule")), ("right", ("pad right", "capsule")))
-    return MujocoScene(body, 0.7, 0.005, patches, line, lambda t: (6e-3, 6e-3), settle=1.0)
+    return MujocoScene(
+        body, 0.7, 0.005, patches, line, lambda t: (6e-3, 6e-3), settle=1.0
+    )

@@ -48,10 +48,19 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "warp.step.reduced": partial(steps.warp_step, kind=ReducedModel),
     "warp.step.published": partial(steps.warp_step, kind=ReducedModelPublished),
     "warp.coupled": steps.warp_coupled,
-    **{f"export.step.{kind}": partial(exported.step, kind=kind) for kind in exported.MODELS},
+    **{
+        f"export.step.{kind}": partial(exported.step, kind=kind)
+        for kind in exported.MODELS
+    },
     "export.step.reduced.vector": partial(exported.step, kind="reduced", vector=True),
-    **{f"export.step.{kind}.instructions": partial(exported.instructions, kind=kind) for kind in exported.MODELS},
-    **{f"export.step.{kind}.999": partial(exported.percentile, kind=kind) for kind in exported.MODELS},
+    **{
+        f"export.step.{kind}.instructions": partial(exported.instructions, kind=kind)
+        for kind in exported.MODELS
+    },
+    **{
+        f"export.step.{kind}.999": partial(exported.percentile, kind=kind)
+        for kind in exported.MODELS
+    },
     "body.call": steps.body,
     "export.body": exported.body,
     "coupled.four_feet.call": steps.coupled,
@@ -62,8 +71,12 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "mujoco.grip": simulator_costs.mujoco_grip,
     "mujoco.rollout": simulator_costs.mujoco_rollout,
     "mjx.discs": simulator_costs.mjx_discs,
-    "mujoco_warp.disc": partial(simulator_costs.mujoco_warp, scene=mujoco_scenes.disc(1.0, 10.0)),
-    "mujoco_warp.grip": partial(simulator_costs.mujoco_warp, scene=mujoco_scenes.grip()),
+    "mujoco_warp.disc": partial(
+        simulator_costs.mujoco_warp, scene=mujoco_scenes.disc(1.0, 10.0)
+    ),
+    "mujoco_warp.grip": partial(
+        simulator_costs.mujoco_warp, scene=mujoco_scenes.grip()
+    ),
     "batch.reduced": gradients.reduced_batch_alone,
     "gradient.published": gradients.published,
     "gradient.published.batch": gradients.published_batch,
@@ -96,15 +109,30 @@ def run(
     Raises `InvalidValueError` for an unknown name.
     """
     rounds = validation.count("rounds", rounds)
-    chosen = list(BENCHMARKS) if names is None else [validation.choice("name", name, BENCHMARKS) for name in names]
+    chosen = (
+        list(BENCHMARKS)
+        if names is None
+        else [validation.choice("name", name, BENCHMARKS) for name in names]
+    )
     results = []
     for name in chosen:
         if progress is not None:
             progress(name)
         try:
-            found = sorted((BENCHMARKS[name](full) for _ in range(rounds)), key=lambda each: each.ratio or 0.0)
-            ratios = tuple(each.ratio for each in found if each.ratio is not None) if rounds > 1 else ()
-            results.append(dataclasses.replace(found[len(found) // 2], name=name, ratios=ratios))
+            found = sorted(
+                (BENCHMARKS[name](full) for _ in range(rounds)),
+                key=lambda each: each.ratio or 0.0,
+            )
+            ratios = (
+                tuple(each.ratio for each in found if each.ratio is not None)
+                if rounds > 1
+                else ()
+            )
+            results.append(
+                dataclasses.replace(found[len(found) // 2], name=name, ratios=ratios)
+            )
         except MissingExtraError as missing:
-            results.append(Measurement(name, None, "", f"left out: {missing}", None, None))
+            results.append(
+                Measurement(name, None, "", f"left out: {missing}", None, None)
+            )
     return results

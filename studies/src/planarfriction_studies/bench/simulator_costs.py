@@ -40,7 +40,9 @@ def mujoco_rollout(full: bool) -> Measurement:
     return _beside_own(mujoco_scenes.tray, 2, rolled=True)
 
 
-def _beside_own(make: Callable[..., MujocoScene], *arguments: int, rolled: bool = False) -> Measurement:
+def _beside_own(
+    make: Callable[..., MujocoScene], *arguments: int, rolled: bool = False
+) -> Measurement:
     """Measure a scene with patches and with MuJoCo's own friction. Raises `MissingExtraError` without MuJoCo."""
     scene = dataclasses.replace(make(*arguments), weightless=False, time=0.0)
     m, d, friction = scene.ours()  # says how to install MuJoCo
@@ -62,11 +64,15 @@ def _in_turns(*actions: Callable[[], float]) -> tuple[float, float]:
     """Return the median of each action's results, over rounds in which they take turns."""
     for action in actions:
         action()
-    one, other = np.median([[action() for action in actions] for _ in range(ROUNDS)], axis=0)
+    one, other = np.median(
+        [[action() for action in actions] for _ in range(ROUNDS)], axis=0
+    )
     return float(one), float(other)
 
 
-def _steps(scene: MujocoScene, m: Any, d: Any, step: Callable[[Any], None]) -> Callable[[], float]:
+def _steps(
+    scene: MujocoScene, m: Any, d: Any, step: Callable[[Any], None]
+) -> Callable[[], float]:
     """Return seconds per step, always of the same steps."""
     import mujoco
 
@@ -93,7 +99,8 @@ def _rollouts(scene: MujocoScene, m: Any, d: Any, _: Any) -> Callable[[], float]
     full = mujoco.mjtState.mjSTATE_FULLPHYSICS
     start = np.zeros(mujoco.mj_stateSize(m, full))
     mujoco.mj_getState(m, d, start, full)
-    starts, data = np.tile(start, (ENVIRONMENTS, 1)), [mujoco.MjData(m) for _ in range(THREADS)]
+    starts = np.tile(start, (ENVIRONMENTS, 1))
+    data = [mujoco.MjData(m) for _ in range(THREADS)]
     controls = np.array([scene.control(i * m.opt.timestep) for i in range(STEPS)])
     controls = np.tile(controls, (ENVIRONMENTS, 1, 1))
 
@@ -114,7 +121,9 @@ def mjx_discs(full: bool) -> Measurement:
 
     In turns, both in double precision. Raises `MissingExtraError` without MJX.
     """
-    from planarfriction.adapters import mjx as adapter  # before anything else: its error names the missing extra
+    from planarfriction.adapters import (
+        mjx as adapter,
+    )  # before anything else: its error names the missing extra
 
     # isort: split
     import jax
@@ -124,16 +133,22 @@ def mjx_discs(full: bool) -> Measurement:
     jax.config.update("jax_enable_x64", True)
     try:
         scene = mujoco_scenes.disc(1.0, 10.0)
-        text = scene.text(Native(cone="pyramidal", impratio=1.0, condim=1), 2e-3, "Euler")
+        text = scene.text(
+            Native(cone="pyramidal", impratio=1.0, condim=1), 2e-3, "Euler"
+        )
         m, prepared, friction = scene.with_patches(adapter, text)
-        runs = _rolled(friction.step, m, prepared), _rolled(mjx.step, *scene.native(Native()))
-        times = np.array([[once(run) for run in runs] for _ in range(MJX_ROUNDS)]) / (MJX_STEPS * ENVIRONMENTS)
+        runs = (
+            _rolled(friction.step, m, prepared),
+            _rolled(mjx.step, *scene.native(Native())),
+        )
+        times = np.array([[once(run) for run in runs] for _ in range(MJX_ROUNDS)]) / (
+            MJX_STEPS * ENVIRONMENTS
+        )
     finally:
         jax.config.update("jax_enable_x64", before)
     value, theirs = (statistics.median(column) * 1e6 for column in times.T)
-    words = (
-        f"MJX's own friction, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2g} times as much)"
-    )
+    times = f"patch friction costs {value / theirs:.2g} times as much"
+    words = f"MJX's own friction, condim 4, elliptic, impratio 10 ({times})"
     return line(value, "us per step", words, theirs)
 
 
@@ -146,7 +161,9 @@ def mujoco_warp(full: bool, scene: MujocoScene) -> Measurement:
 
     In turns, after steps in which contacts settle. Raises `MissingExtraError` without MuJoCo Warp.
     """
-    from planarfriction.adapters import mujoco_warp as adapter  # before anything else: its error names the extra
+    from planarfriction.adapters import (
+        mujoco_warp as adapter,
+    )  # before anything else: its error names the extra
 
     # isort: split
     import mujoco
@@ -156,15 +173,21 @@ def mujoco_warp(full: bool, scene: MujocoScene) -> Measurement:
     wp.config.log_level = logging.ERROR  # it reports what it compiles
     text = scene.text(Native(cone="pyramidal", impratio=1.0, condim=1), 2e-3, "Euler")
     spec = mujoco.MjSpec.from_string(text)
-    patches = [adapter.PatchContact(scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
+    patches = [
+        adapter.PatchContact(scene.model, site=site, geoms=geoms)
+        for site, geoms in scene.patches
+    ]
     adapter.prepare(spec, patches)
     m = spec.compile()
     friction = adapter.Friction(m, patches, worlds=WORLDS, njmax=NJMAX)
     own, d = scene.native(Native(cone="pyramidal", impratio=1.0))
-    model, data = mjw.put_model(own), mjw.put_data(own, d, nworld=WORLDS, njmax=NJMAX)
+    model = mjw.put_model(own)
+    data = mjw.put_data(own, d, nworld=WORLDS, njmax=NJMAX)
     for each in (friction.data, data):
         if m.nu:
-            each.ctrl.assign(np.tile(scene.control(0.0), (WORLDS, 1)).astype(np.float32))
+            each.ctrl.assign(
+                np.tile(scene.control(0.0), (WORLDS, 1)).astype(np.float32)
+            )
         if scene.start is not None:
             each.qvel.assign(np.tile(scene.start, (WORLDS, 1)).astype(np.float32))
     runs = friction.step, lambda: mjw.step(model, data)
@@ -186,8 +209,10 @@ def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
 
     for _ in range(300):
         mujoco.mj_step(m, d)
-    mx, data = mjx.put_model(m), mjx.put_data(m, d)
-    speeds, spins = jnp.linspace(0.8, 1.2, ENVIRONMENTS), jnp.linspace(20.0, 5.0, ENVIRONMENTS)
+    mx = mjx.put_model(m)
+    data = mjx.put_data(m, d)
+    speeds = jnp.linspace(0.8, 1.2, ENVIRONMENTS)
+    spins = jnp.linspace(20.0, 5.0, ENVIRONMENTS)
 
     @jax.jit
     def roll(mx, speeds, spins):
@@ -196,7 +221,9 @@ def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
 
             def next_step(d, _):
                 # in double precision MJX makes long integers of some that came in short
-                return jax.tree.map(lambda after, given: after.astype(given.dtype), step(mx, d), d), None
+                return jax.tree.map(
+                    lambda after, given: after.astype(given.dtype), step(mx, d), d
+                ), None
 
             return jax.lax.scan(next_step, start, None, length=MJX_STEPS)[0].qpos
 

@@ -38,59 +38,87 @@ def published_loop(full: bool) -> Measurement:
     """Measure a step of the published reduced model, in a compiled loop."""
     twists = mixed_twists(20_000)
     model = ReducedModelPublished(disc(), law())
-    loop, call = _compiled_loop(model, twists), _python_step(model, 1000)
-    return line(loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
+    loop = _compiled_loop(model, twists)
+    call = _python_step(model, 1000)
+    return line(
+        loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6
+    )
 
 
 def distributed_loop(full: bool) -> Measurement:
     """Measure a step of the distributed model, in a compiled loop."""
-    model, twists = DistributedModel(disc(), law()), mixed_twists(1000)
-    loop, call = _compiled_loop(model, twists), _python_step(model, 100)
-    return line(loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
+    model = DistributedModel(disc(), law())
+    twists = mixed_twists(1000)
+    loop = _compiled_loop(model, twists)
+    call = _python_step(model, 100)
+    return line(
+        loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6
+    )
 
 
 def _python_step(model: Any, inner: int) -> float:
-    state, twist = model.rest(), (0.01, 0.0, 1.0)
+    state = model.rest()
+    twist = (0.01, 0.0, 1.0)
     return median(lambda: model.step(state, twist, 1.0, 1e-3), 9, inner)
 
 
 def published_call(full: bool) -> Measurement:
     """Measure a step of the published reduced model, from Python."""
     model = ReducedModelPublished(disc(), law())
-    state, twist = model.rest(), np.array([0.01, 0.0, 1.0])
+    state = model.rest()
+    twist = np.array([0.01, 0.0, 1.0])
     rate = median(lambda: model.rate(state, twist, 1.0), 9, 100)
-    return line(_python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6)
+    return line(
+        _python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6
+    )
 
 
 def reduced_loop(full: bool, cells: int = ReducedModel.cells) -> Measurement:
     """Measure a step of `ReducedModel` in a compiled loop."""
     twists = mixed_twists(20_000)
-    models = ReducedModel(disc(), law(), cells=cells), ReducedModelPublished(disc(), law())
+    models = (
+        ReducedModel(disc(), law(), cells=cells),
+        ReducedModelPublished(disc(), law()),
+    )
     ours, theirs = (_compiled_loop(model, twists) for model in models)
-    return line(ours / len(twists) * 1e6, "us", AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
+    return line(
+        ours / len(twists) * 1e6, "us", AGAINST_PUBLISHED, theirs / len(twists) * 1e6
+    )
 
 
 def reduced_call(full: bool) -> Measurement:
     """Measure a step of `ReducedModel`, from Python."""
-    ours, theirs = (_python_step(model(disc(), law()), 2000) for model in (ReducedModel, ReducedModelPublished))
+    ours, theirs = (
+        _python_step(model(disc(), law()), 2000)
+        for model in (ReducedModel, ReducedModelPublished)
+    )
     return line(ours * 1e6, "us", AGAINST_PUBLISHED, theirs * 1e6)
 
 
 def reduced_slopes(full: bool) -> Measurement:
     """Measure the derivatives of a step of `ReducedModel`, in one Python call."""
     model = ReducedModel(disc(), law())
-    return _beside_a_step(model, lambda: model.step_jacobians(model.rest(), (0.01, 0.0, 1.0), 1.0, 1e-3))
+    return _beside_a_step(
+        model, lambda: model.step_jacobians(model.rest(), (0.01, 0.0, 1.0), 1.0, 1e-3)
+    )
 
 
 def reduced_four(full: bool) -> Measurement:
     """Measure the steps of four contacts, in one Python call."""
     model = ReducedModel(disc(), law())
-    states, twists, loads = np.stack([model.rest()] * 4), np.tile((0.01, 0.0, 1.0), (4, 1)), np.ones(4)
+    states = np.stack([model.rest()] * 4)
+    twists = np.tile((0.01, 0.0, 1.0), (4, 1))
+    loads = np.ones(4)
     return _beside_a_step(model, lambda: model.step(states, twists, loads, 1e-3))
 
 
 def _beside_a_step(model: ReducedModel, action: Callable[[], Any]) -> Measurement:
-    return line(median(action, 9, 2000) * 1e6, "us", "one Python call of step", _python_step(model, 2000) * 1e6)
+    return line(
+        median(action, 9, 2000) * 1e6,
+        "us",
+        "one Python call of step",
+        _python_step(model, 2000) * 1e6,
+    )
 
 
 def body(full: bool) -> Measurement:
@@ -98,29 +126,46 @@ def body(full: bool) -> Measurement:
     model = ReducedModel(disc(), law())
     block = SlidingBody(0.2, 1e-5, model)
     end = block.step(block.rest(), np.zeros(3), 2.0, 1e-3, (1.5, 0.0, 0.0))
-    return _beside_a_step(model, lambda: block.step(end.state, end.twist, 2.0, 1e-3, (1.5, 0.0, 0.0)))
+    return _beside_a_step(
+        model, lambda: block.step(end.state, end.twist, 2.0, 1e-3, (1.5, 0.0, 0.0))
+    )
 
 
 def coupled(full: bool, environments: int = 1) -> Measurement:
     """Measure an implicit step of a box that slides and turns on four feet, in one Python call for all environments."""
     model = ReducedModel(disc(), law())
     step = _four_feet(model, environments)
-    value, rounds = median(step, 9, 1 + 500 // environments) / environments, float(step().iterations.mean())
+    value = median(step, 9, 1 + 500 // environments) / environments
+    rounds = float(step().iterations.mean())
     words = f"one Python call of a model's step (four patches, {rounds:.1f} rounds)"
     return line(value * 1e6, "us per step", words, _python_step(model, 2000) * 1e6)
 
 
 def _boxes(environments: int, dt: float) -> HostStep:
     """Return a step of boxes of 0.2 kg on four feet with random velocities, one per environment."""
-    rows = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in FEET])
+    rows = np.concatenate(
+        [[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in FEET]
+    )
     response = dt * rows @ np.diag([5.0, 5.0, 5e3]) @ rows.T
-    velocity = np.random.default_rng(7).normal(size=(environments, 3)) * [0.05, 0.05, 0.5]
-    return HostStep((velocity @ rows.T).reshape(-1, 4, 3), np.full(4, 0.5), np.zeros((4, 3)), response)
+    velocity = np.random.default_rng(7).normal(size=(environments, 3)) * [
+        0.05,
+        0.05,
+        0.5,
+    ]
+    return HostStep(
+        (velocity @ rows.T).reshape(-1, 4, 3),
+        np.full(4, 0.5),
+        np.zeros((4, 3)),
+        response,
+    )
 
 
-def _four_feet(model: ReducedModel, environments: int, dt: float = 1e-3) -> Callable[[], CoupledStep]:
+def _four_feet(
+    model: ReducedModel, environments: int, dt: float = 1e-3
+) -> Callable[[], CoupledStep]:
     """Return an implicit step of `_boxes` from bristles at rest."""
-    patches, host = CoupledPatches([model] * 4), _boxes(environments, dt)
+    patches = CoupledPatches([model] * 4)
+    host = _boxes(environments, dt)
     return lambda: patches.step(patches.rest(), host, dt)
 
 
@@ -128,16 +173,32 @@ def table_build(full: bool) -> Measurement:
     """Measure the construction of the published table of 20 segments."""
     patch = disc()
     value = median(lambda: LimitSurfaceTablePublished(patch).numbers, 31)
-    return line(value, "s", "the same nodes by NumPy, node by node", median(lambda: numpy_table(patch), 3))
+    return line(
+        value,
+        "s",
+        "the same nodes by NumPy, node by node",
+        median(lambda: numpy_table(patch), 3),
+    )
 
 
-def twist(full: bool, kind: type[LimitSurface], count: int | None = None) -> Measurement:
+def twist(
+    full: bool, kind: type[LimitSurface], count: int | None = None
+) -> Measurement:
     """Measure the twist of a wrench, of an L that is a polygon: one a call, or `count` in a call."""
-    corners = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.005), (0.005, 0.005), (0.005, 0.02), (0.0, 0.02)]
+    corners = [
+        (0.0, 0.0),
+        (0.03, 0.0),
+        (0.03, 0.005),
+        (0.005, 0.005),
+        (0.005, 0.02),
+        (0.0, 0.02),
+    ]
     surface = kind(ContactPatch.polygon(corners, 21))
     wrenches = np.random.default_rng(7).normal(size=(count or 1, 3)) * [1.0, 1.0, 0.01]
     asked = wrenches[0] if count is None else wrenches
-    value = median(lambda: surface.twist(asked), 15, 1 if count else 500) / len(wrenches)
+    value = median(lambda: surface.twist(asked), 15, 1 if count else 500) / len(
+        wrenches
+    )
     theirs = median(lambda: scipy_twist(surface, wrenches[0]), 5)
     words = "SciPy (trust-exact) on the dissipation over the plane of unit power, one wrench"
     return line(value * 1e6, "us per wrench", words, theirs * 1e6)
@@ -165,26 +226,39 @@ def scipy_twist(surface: LimitSurface, wrench: np.ndarray) -> np.ndarray:
 
 def numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
     """Return the smoothed nodes of the published table as one would write them: four sums over the cells at each."""
-    grid, radius, weights = patch.grid, patch.contact_radius(), patch.weights()
+    grid = patch.grid
+    radius = patch.contact_radius()
+    weights = patch.weights()
     assert grid is not None
     x, y = (patch.positions - patch.centre_of_pressure()).T
     nodes = np.zeros((segments + 1, 4 * segments, 3))
     for i in range(segments):
         for j in range(4 * segments):
-            azimuth, distance = 0.5 * np.pi * j / segments, radius * np.tan(0.5 * np.pi * i / segments)
+            azimuth = 0.5 * np.pi * j / segments
+            distance = radius * np.tan(0.5 * np.pi * i / segments)
             centre = np.array([-distance * np.sin(azimuth), distance * np.cos(azimuth)])
-            a, b = (centre - (grid.x_min, grid.y_min)) / (grid.cell_width, grid.cell_height)
+            a, b = (centre - (grid.x_min, grid.y_min)) / (
+                grid.cell_width,
+                grid.cell_height,
+            )
             for corner in range(4):
-                p, q = int(a) + corner % 2, int(b) + corner // 2
+                p = int(a) + corner % 2
+                q = int(b) + corner // 2
                 share = (1.0 - abs(a - p)) * (1.0 - abs(b - q))
                 dx = x - (grid.x_min + p * grid.cell_width)
                 dy = y - (grid.y_min + q * grid.cell_height)
                 scale = share * weights / np.hypot(dx, dy)
-                nodes[i, j] += -(scale @ dy), scale @ dx, scale @ (x * dx + y * dy) / radius
+                nodes[i, j] += (
+                    -(scale @ dy),
+                    scale @ dx,
+                    scale @ (x * dx + y * dy) / radius,
+                )
     return nodes
 
 
-def warp_step(full: bool, kind: type[ReducedModel] | type[ReducedModelPublished]) -> Measurement:
+def warp_step(
+    full: bool, kind: type[ReducedModel] | type[ReducedModelPublished]
+) -> Measurement:
     """Measure a step of 1000 contacts in a kernel of Warp, single precision, on Warp's CPU device.
 
     Raises MissingExtraError without Warp.
@@ -193,10 +267,17 @@ def warp_step(full: bool, kind: type[ReducedModel] | type[ReducedModelPublished]
     import warp as wp
 
     wp.config.log_level = logging.ERROR  # it reports what it compiles
-    count, model = 1000, kind(disc(), law())
-    friction, twists = front.Model(model, contacts=count, device="cpu"), mixed_twists(count)
-    states, new, wrench = friction.rest(), friction.rest(), wp.zeros((count, 3), device="cpu")
-    given = wp.array(twists, dtype=wp.float32, device="cpu"), wp.full(count, 1.0, dtype=wp.float32, device="cpu")
+    count = 1000
+    model = kind(disc(), law())
+    friction = front.Model(model, contacts=count, device="cpu")
+    twists = mixed_twists(count)
+    states = friction.rest()
+    new = friction.rest()
+    wrench = wp.zeros((count, 3), device="cpu")
+    given = (
+        wp.array(twists, dtype=wp.float32, device="cpu"),
+        wp.full(count, 1.0, dtype=wp.float32, device="cpu"),
+    )
     ours = median(lambda: friction.step(states, *given, 1e-3, new, wrench), 9, 10)
     rest = np.zeros((count, *model.state_shape))
     theirs = median(lambda: model.step(rest, twists, 1.0, 1e-3), 9, 10)
@@ -213,12 +294,24 @@ def warp_coupled(full: bool) -> Measurement:
     import warp as wp
 
     wp.config.log_level = logging.ERROR  # it reports what it compiles
-    count, dt, model = 1000, 1e-3, ReducedModel(disc(), law())
+    count = 1000
+    dt = 1e-3
+    model = ReducedModel(disc(), law())
     friction = front.CoupledPatches([model] * 4, worlds=count, device="cpu")
     shapes = (count, 4, 3), (count, 4), (count, 4, 3), (count, 12, 12)
     given = zip(_boxes(count, dt)[:4], shapes, strict=True)
-    arrays = [wp.array(np.broadcast_to(each, shape), dtype=wp.float32, device="cpu") for each, shape in given]
-    state, results, host = friction.rest(), friction.results(), HostStep(*arrays)
+    arrays = [
+        wp.array(np.broadcast_to(each, shape), dtype=wp.float32, device="cpu")
+        for each, shape in given
+    ]
+    state = friction.rest()
+    results = friction.results()
+    host = HostStep(*arrays)
     ours = median(lambda: friction.step(state, host, dt, results), 9) / count
     theirs = median(_four_feet(model, count), 9) / count
-    return line(ours * 1e6, "us", "the same in one call of the compiled step, on all processors", theirs * 1e6)
+    return line(
+        ours * 1e6,
+        "us",
+        "the same in one call of the compiled step, on all processors",
+        theirs * 1e6,
+    )

@@ -12,7 +12,13 @@ from planarfriction.patch import ContactPatch, SoftFinger
 from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
 from planarfriction.scenes.ready import IN_HAND_LOADS
 from planarfriction_studies.bench.baselines import lsoda_time
-from planarfriction_studies.bench.measurement import Measurement, disc, law, line, median
+from planarfriction_studies.bench.measurement import (
+    Measurement,
+    disc,
+    law,
+    line,
+    median,
+)
 
 WINDOW = 0.1
 """Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
@@ -30,7 +36,9 @@ def distributed(full: bool) -> Measurement:
     scene = in_hand(DistributedModel(disc(), law()))
     value, _ = _solver_time(scene, 5)
     if full:
-        return line(value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
+        return line(
+            value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end)
+        )
     ours, _ = _solver_time(scene, 5, t_end=WINDOW)
     theirs = lsoda_time(scene, WINDOW)
     words = f"SciPy LSODA over the first {WINDOW} s (the ratio is to the {ours * 1e3:.2g} ms of that window here)"
@@ -42,17 +50,28 @@ def distributed_101(full: bool) -> Measurement:
     costs = {}
     for cells in (101, 21):
         patch = disc(cells)
-        value, solution = _solver_time(in_hand(DistributedModel(patch, law())), 3, t_end=WINDOW)
+        value, solution = _solver_time(
+            in_hand(DistributedModel(patch, law())), 3, t_end=WINDOW
+        )
         trials = solution.statistics.steps + solution.statistics.rejections
         costs[cells] = value / trials / patch.cells * 1e9
-    return line(costs[101], "ns per loaded cell and step", "the same on 21 x 21 cells", costs[21])
+    return line(
+        costs[101],
+        "ns per loaded cell and step",
+        "the same on 21 x 21 cells",
+        costs[21],
+    )
 
 
 def published(full: bool, load: Literal[1, 2] = 1) -> Measurement:
     """Measure the published reduced model."""
-    scene = in_hand(ReducedModelPublished(disc(), law()), normal_force=in_hand_load(load))
+    scene = in_hand(
+        ReducedModelPublished(disc(), law()), normal_force=in_hand_load(load)
+    )
     value, _ = _solver_time(scene, 9)
-    return line(value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
+    return line(
+        value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end)
+    )
 
 
 def reduced(full: bool) -> Measurement:
@@ -64,15 +83,22 @@ def reduced(full: bool) -> Measurement:
 
 def _soft() -> ContactPatch:
     """Return the published soft finger whose profile follows the load."""
-    finger = SoftFinger(c=6.0 * 0.02 / 21, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.01)
+    finger = SoftFinger(
+        c=6.0 * 0.02 / 21, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.01
+    )
     return ContactPatch.rectangle(0.02, cells=21, pressure=finger)
 
 
 def reduced_load_dependent(full: bool) -> Measurement:
     """Measure `ReducedModel` with shares that follow the load beside fixed ones."""
     soft = _soft()
-    fixed = ContactPatch(soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid)
-    value, theirs = (_solver_time(in_hand(ReducedModel(patch, law())), 9)[0] for patch in (soft, fixed))
+    fixed = ContactPatch(
+        soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid
+    )
+    value, theirs = (
+        _solver_time(in_hand(ReducedModel(patch, law())), 9)[0]
+        for patch in (soft, fixed)
+    )
     return line(value, "s", "the same with a fixed shape", theirs)
 
 
@@ -81,7 +107,9 @@ def load_dependent(full: bool) -> Measurement:
     soft = _soft()
     rebuilt = median(lambda: simulate(in_hand(ReducedModelPublished(soft, law()))), 3)
     fixed = median(lambda: simulate(in_hand(ReducedModelPublished(disc(), law()))), 3)
-    return line(rebuilt, "s", "the same with a fixed shape (both: all of simulate)", fixed)
+    return line(
+        rebuilt, "s", "the same with a fixed shape (both: all of simulate)", fixed
+    )
 
 
 def importing(full: bool) -> Measurement:
@@ -90,7 +118,12 @@ def importing(full: bool) -> Measurement:
     def seconds(module: str) -> float:
         code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
         command = [sys.executable, "-c", code]
-        return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+        return float(
+            subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        )
 
-    ours, theirs = (statistics.median(seconds(module) for _ in range(7)) for module in ("planarfriction", "numpy"))
+    ours, theirs = (
+        statistics.median(seconds(module) for _ in range(7))
+        for module in ("planarfriction", "numpy")
+    )
     return line(ours, "s", "import numpy", theirs)

@@ -32,13 +32,39 @@ def use_one_thread() -> None:
 
 
 @click.command(short_help="Measure the speed of this installation.")
-@click.option("--only", metavar="NAME", multiple=True, help="Only this benchmark; may be repeated.")
+@click.option(
+    "--only",
+    metavar="NAME",
+    multiple=True,
+    help="Only this benchmark; may be repeated.",
+)
 @click.option("--full", is_flag=True, help="Include the baselines that take minutes.")
-@click.option("--rounds", type=int, help="Rounds of each benchmark. Default: 1, with --compare 3.")
-@click.option("--compare", "old", type=FILE, help="Earlier run to compare with, as --json prints it.")
-@click.option("--force", is_flag=True, help="Compare although other programs use the machine.")
-@click.option("--json", "as_json", is_flag=True, help="Print a JSON list and nothing else on stdout.")
-def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | None, force: bool, as_json: bool) -> None:
+@click.option(
+    "--rounds", type=int, help="Rounds of each benchmark. Default: 1, with --compare 3."
+)
+@click.option(
+    "--compare",
+    "old",
+    type=FILE,
+    help="Earlier run to compare with, as --json prints it.",
+)
+@click.option(
+    "--force", is_flag=True, help="Compare although other programs use the machine."
+)
+@click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print a JSON list and nothing else on stdout.",
+)
+def bench(
+    only: tuple[str, ...],
+    full: bool,
+    rounds: int | None,
+    old: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
     """Measure the speed of this installation, each benchmark next to its baseline from the same run.
 
     \b
@@ -65,36 +91,91 @@ def bench(only: tuple[str, ...], full: bool, rounds: int | None, old: Path | Non
     if then is not None and not force:
         comparison.check_idle()
     with work_progress("measuring") as progress:
-        rounds = rounds if rounds is not None else 1 if then is None else comparison.ROUNDS
-        names = list(only) or (None if then is None else [name for name in benchmarks.BENCHMARKS if name in then])
+        rounds = (
+            rounds if rounds is not None else 1 if then is None else comparison.ROUNDS
+        )
+        names = list(only) or (
+            None
+            if then is None
+            else [name for name in benchmarks.BENCHMARKS if name in then]
+        )
         lines = benchmarks.run(names, full=full, rounds=rounds, progress=progress)
     if as_json:
         print(json.dumps([dataclasses.asdict(line) for line in lines], indent=2))
     elif then is not None:
-        headings = ["name", "then", "now", "ratio then", "ratio now", "change", "spread", ""]
-        print_table("Ratios to the baselines", headings, comparison.rows(comparison.changes(lines, then)), width=WIDEST)
+        headings = [
+            "name",
+            "then",
+            "now",
+            "ratio then",
+            "ratio now",
+            "change",
+            "spread",
+            "",
+        ]
+        print_table(
+            "Ratios to the baselines",
+            headings,
+            comparison.rows(comparison.changes(lines, then)),
+            width=WIDEST,
+        )
     else:
-        shown = lambda value, unit="": "" if value is None else f"{value:.4g} {unit}".strip()  # noqa: E731
+        shown = lambda value, unit="": (
+            "" if value is None else f"{value:.4g} {unit}".strip()
+        )
         rows = [
             [each.name, *(shown(value, each.unit) for value in (each.value, each.baseline_value)), shown(each.ratio),
              each.baseline or ""]
             for each in lines
         ]  # fmt: skip
-        print_table("Benchmarks", ["name", "cost", "of the baseline", "ratio", "baseline"], rows, width=WIDEST)
+        print_table(
+            "Benchmarks",
+            ["name", "cost", "of the baseline", "ratio", "baseline"],
+            rows,
+            width=WIDEST,
+        )
 
 
 # ---------------------------------------------------------------------- measured
 
 
 @click.command(short_help="Compare friction models on measured data.")
-@click.option("--task", "tasks", metavar="NAME", multiple=True, help="Only this task; may be repeated.")
-@click.option("--only", metavar="NAME", multiple=True, help="Only this model of the library; may be repeated.")
-@click.option("--own", metavar="FILE.py:NAME", multiple=True, help="A model of your own; may be repeated.")
+@click.option(
+    "--task",
+    "tasks",
+    metavar="NAME",
+    multiple=True,
+    help="Only this task; may be repeated.",
+)
+@click.option(
+    "--only",
+    metavar="NAME",
+    multiple=True,
+    help="Only this model of the library; may be repeated.",
+)
+@click.option(
+    "--own",
+    metavar="FILE.py:NAME",
+    multiple=True,
+    help="A model of your own; may be repeated.",
+)
 @click.option("--list", "list_only", is_flag=True, help="List models and tasks.")
-@click.option("--tables", type=FILE, help="Folder with the measured tables. Default: those of the package.")
+@click.option(
+    "--tables",
+    type=FILE,
+    help="Folder with the measured tables. Default: those of the package.",
+)
 @click.option("--out", "folder", type=FILE, help="Folder for JSON and pictures.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the bootstrap.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on stdout.")
+@click.option(
+    "--seed",
+    type=int,
+    default=0,
+    show_default=True,
+    help="Random seed of the bootstrap.",
+)
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print JSON and nothing else on stdout."
+)
 def measured(
     tasks: tuple[str, ...],
     only: tuple[str, ...],
@@ -129,11 +210,16 @@ def measured(
     from planarfriction_studies.measured.library import LIBRARY
 
     if list_only:
-        rows = [[name, each.words, "" if each.installed else f"[{each.extra}]"] for name, each in LIBRARY.items()]
+        rows = [
+            [name, each.words, "" if each.installed else f"[{each.extra}]"]
+            for name, each in LIBRARY.items()
+        ]
         print_table("Models", ["name", "description", "needs"], rows)
         rows = [[task.name, task.title] for task in TASKS.values()]
         print_table(
-            "Tasks", ["name", "description"], [*rows, ["joints", "Friction of a servo from its goal and position"]]
+            "Tasks",
+            ["name", "description"],
+            [*rows, ["joints", "Friction of a servo from its goal and position"]],
         )
         return 0
     for task in tasks:
@@ -141,20 +227,25 @@ def measured(
     if tasks == ("joints",):
         return _joints(tables, folder, as_json)
     if "joints" in tasks:
-        raise InvalidValueError("--task", "be joints alone, or other tasks", ", ".join(tasks))
+        raise InvalidValueError(
+            "--task", "be joints alone, or other tasks", ", ".join(tasks)
+        )
     validation.count("--seed", seed, 0)
     models, left_out = _models(only, own)
     if folder is not None:
         make_folder(folder)
     benchmark = Benchmark(models, tasks or tuple(TASKS), tables, seed)
     benchmark.left_out += left_out
-    code, wrong = 0, None
+    code = 0
+    wrong = None
     try:
         with work_progress("measured") as progress:
             benchmark.run(progress)
     except KeyboardInterrupt:
         done = sum(map(len, benchmark.results.values()))
-        note(f"interrupted: {done} of {len(models) * len(benchmark.tasks)} results are finished")
+        note(
+            f"interrupted: {done} of {len(models) * len(benchmark.tasks)} results are finished"
+        )
         code = INTERRUPTED
     except FrictionError as error:  # of a model: the others are done
         wrong = error
@@ -183,7 +274,9 @@ def _joints(tables: Path | None, folder: Path | None, as_json: bool) -> int:
     return 0
 
 
-def _models(only: Sequence[str], own: Sequence[str]) -> tuple[dict[str, Any], list[str]]:
+def _models(
+    only: Sequence[str], own: Sequence[str]
+) -> tuple[dict[str, Any], list[str]]:
     """Return the models that are asked for, and what is left out."""
     from planarfriction import validation
     from planarfriction.cli.options import load_function
@@ -193,13 +286,19 @@ def _models(only: Sequence[str], own: Sequence[str]) -> tuple[dict[str, Any], li
     left_out: list[str] = []
     models = {}
     if only or not own:
-        chosen = [validation.choice("--only", name, LIBRARY) for name in only] or list(LIBRARY)
+        chosen = [validation.choice("--only", name, LIBRARY) for name in only] or list(
+            LIBRARY
+        )
         there = library(left_out)
         models = {name: there[name] for name in chosen if name in there}
     for entry in own:
         name, model = load_function("--own", entry)
         if name in models or name in LIBRARY:
-            raise InvalidValueError("--own", "have a name that differs from those of the library's models", name)
+            raise InvalidValueError(
+                "--own",
+                "have a name that differs from those of the library's models",
+                name,
+            )
         models[name] = model
     return models, left_out
 
@@ -226,8 +325,12 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
         for model, result in results.items():
             if result.fitted:
                 for key, value in result.checked.items():
-                    note(f"{model}: {key} {' '.join(f'{each:.3g}' for each in np.atleast_1d(value))}")
-                note(f"{model}, fitted: {', '.join(f'{key} {value:.4g}' for key, value in result.fitted.items())}")
+                    note(
+                        f"{model}: {key} {' '.join(f'{each:.3g}' for each in np.atleast_1d(value))}"
+                    )
+                note(
+                    f"{model}, fitted: {', '.join(f'{key} {value:.4g}' for key, value in result.fitted.items())}"
+                )
     for text in () if as_json else benchmark.left_out:
         note(f"left out: {text}")
     if folder is not None:
@@ -235,7 +338,9 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
         write_text(path, json.dumps(to_dict(benchmark), indent=1) + "\n")
         note(f"wrote {path}")
         for name in benchmark.results:
-            picture = output.write_picture(draw(benchmark, name), folder / f"measured-{name}.png")
+            picture = output.write_picture(
+                draw(benchmark, name), folder / f"measured-{name}.png"
+            )
             note(f"wrote {picture}")
 
 
@@ -243,13 +348,35 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
 
 
 @click.command(short_help="Reproduce the published experiments in one report.")
-@click.option("--only", metavar="NAME", multiple=True, help="Only this experiment; may be repeated.")
+@click.option(
+    "--only",
+    metavar="NAME",
+    multiple=True,
+    help="Only this experiment; may be repeated.",
+)
 @click.option("--list", "list_only", is_flag=True, help="List the experiments.")
-@click.option("--out", type=FILE, default=Path("reproduction"), show_default=True, help="Folder for the report.")
+@click.option(
+    "--out",
+    type=FILE,
+    default=Path("reproduction"),
+    show_default=True,
+    help="Folder for the report.",
+)
 @click.option("--quick", is_flag=True, help="A small part of everything, in seconds.")
-@click.option("--full", is_flag=True, help="Include what takes many minutes: published solvers, long baselines.")
+@click.option(
+    "--full",
+    is_flag=True,
+    help="Include what takes many minutes: published solvers, long baselines.",
+)
 @click.option("--again", is_flag=True, help="Repeat finished experiments.")
-def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, full: bool, again: bool) -> int:
+def reproduce(
+    only: tuple[str, ...],
+    list_only: bool,
+    out: Path,
+    quick: bool,
+    full: bool,
+    again: bool,
+) -> int:
     """Reproduce the experiments of the source paper in one HTML report that compares the results with the paper's.
 
     Writes report.html (with figures), numbers.json, and the figures (PNG, SVG) and curves (NetCDF) of each experiment
@@ -287,14 +414,27 @@ def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, fu
         rows = []
         for record in records:
             missed = sum(not row["holds"] for row in record["comparisons"])
-            rows.append([record["name"], f"{len(record['comparisons'])}", f"{missed}", number(record["seconds"])])
-        print_table("Reproduced", ["experiment", "compared", "out of tolerance", "time [s]"], rows)
+            rows.append(
+                [
+                    record["name"],
+                    f"{len(record['comparisons'])}",
+                    f"{missed}",
+                    number(record["seconds"]),
+                ]
+            )
+        print_table(
+            "Reproduced",
+            ["experiment", "compared", "out of tolerance", "time [s]"],
+            rows,
+        )
         note(f"wrote {write_report(reproduction)}")
         note(f"wrote {reproduction.write_numbers()}")
     return code
 
 
-def _carry_out(reproduction: Reproduction, chosen: Sequence[str], *, again: bool) -> int:
+def _carry_out(
+    reproduction: Reproduction, chosen: Sequence[str], *, again: bool
+) -> int:
     """Carry out the experiments `chosen`, with progress and a line for each; returns the exit code."""
     from planarfriction.cli import INTERRUPTED, OUT_OF_TOLERANCE
     from planarfriction.cli.console import note, work_progress
@@ -305,10 +445,16 @@ def _carry_out(reproduction: Reproduction, chosen: Sequence[str], *, again: bool
             earlier = reproduction.kept(name) is not None and not again
             with work_progress(f"{index} of {len(chosen)}, {name}") as progress:
                 (record,) = reproduction.run([name], again=again, progress=progress)
-            missed = [row["quantity"] for row in record["comparisons"] if not row["holds"]]
+            missed = [
+                row["quantity"] for row in record["comparisons"] if not row["holds"]
+            ]
             code = OUT_OF_TOLERANCE if missed else code
-            when = "kept from an earlier run" if earlier else f"{record['seconds']:.1f} s"
-            note(f"{name}: {len(record['comparisons'])} compared, {len(missed)} out of tolerance ({when})")
+            when = (
+                "kept from an earlier run" if earlier else f"{record['seconds']:.1f} s"
+            )
+            note(
+                f"{name}: {len(record['comparisons'])} compared, {len(missed)} out of tolerance ({when})"
+            )
             for quantity in missed:
                 note(f"  out of tolerance: {quantity}")
     except KeyboardInterrupt:

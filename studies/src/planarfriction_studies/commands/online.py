@@ -42,15 +42,27 @@ WORDS = {
 """Rows of the table."""
 
 
-@click.group(short_help="Try the observer and the controllers of a gripper on random parts.")
+@click.group(
+    short_help="Try the observer and the controllers of a gripper on random parts."
+)
 def online() -> None:
     """Try the observer and the controllers of a gripper."""
 
 
 @online.command(short_help="Hold, slide, turn and hinge random parts.")
-@click.option("--parts", type=int, default=1000, show_default=True, help="Number of random parts.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of parts and noise.")
-@click.option("--json", "file", type=FILE, help="File for the numbers of the table (JSON).")
+@click.option(
+    "--parts", type=int, default=1000, show_default=True, help="Number of random parts."
+)
+@click.option(
+    "--seed",
+    type=int,
+    default=0,
+    show_default=True,
+    help="Random seed of parts and noise.",
+)
+@click.option(
+    "--json", "file", type=FILE, help="File for the numbers of the table (JSON)."
+)
 def trials(parts: int, seed: int, file: Path | None) -> None:
     """Hold, slide, turn and hinge random parts with unknown friction, and print the results.
 
@@ -65,12 +77,17 @@ def trials(parts: int, seed: int, file: Path | None) -> None:
     from planarfriction.writing import check_writable, write_text
     from planarfriction_studies.rig.trials import KINDS, run_trials
 
-    parts, seed = validation.count("--parts", parts, len(KINDS)), validation.count("--seed", seed, 0)
+    parts = validation.count("--parts", parts, len(KINDS))
+    seed = validation.count("--seed", seed, 0)
     if file is not None:
         check_writable(file)
     with work_progress("trials") as progress:
         found = run_trials(parts, seed, progress=progress)
-    print_table(f"{found['parts']} parts, seed {found['seed']}", ["result", "value"], rows(found))
+    print_table(
+        f"{found['parts']} parts, seed {found['seed']}",
+        ["result", "value"],
+        rows(found),
+    )
     if file is not None:
         write_text(file, json.dumps(found, indent=2) + "\n")
         note(f"wrote {file}")
@@ -82,8 +99,16 @@ def rows(found: dict[str, float]) -> list[list[str]]:
 
 
 @online.command(short_help="Film a part that is held while its friction is found.")
-@click.option("--out", type=FILE, default="hold.gif", show_default=True, help="Film to write (.gif, .mp4, .html).")
-@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the noise.")
+@click.option(
+    "--out",
+    type=FILE,
+    default="hold.gif",
+    show_default=True,
+    help="Film to write (.gif, .mp4, .html).",
+)
+@click.option(
+    "--seed", type=int, default=0, show_default=True, help="Random seed of the noise."
+)
 def demo(out: Path, seed: int) -> None:
     """Hold a part of unknown friction, through a tap and a tilt, and film it.
 

@@ -17,9 +17,18 @@ ENGINE = click.option(
     help="Only this engine, or all with this prefix; may be repeated.",
 )
 CASE = click.option(
-    "--case", "cases", metavar="NAME", multiple=True, help="Only this case, or a TOML file; may be repeated."
+    "--case",
+    "cases",
+    metavar="NAME",
+    multiple=True,
+    help="Only this case, or a TOML file; may be repeated.",
 )
-JSON = click.option("--json", "file", type=FILE, help="File for a JSON list of results; a later run continues from it.")
+JSON = click.option(
+    "--json",
+    "file",
+    type=FILE,
+    help="File for a JSON list of results; a later run continues from it.",
+)
 
 
 @click.group(
@@ -32,7 +41,12 @@ JSON = click.option("--json", "file", type=FILE, help="File for a JSON list of r
 @click.option("--quick", is_flag=True, help="The first two engines.")
 @click.option("--list", "list_only", is_flag=True, help="List cases and engines.")
 @JSON
-@click.option("--out", "folder", type=FILE, help="Folder for referee.json and referee.html, with a picture per case.")
+@click.option(
+    "--out",
+    "folder",
+    type=FILE,
+    help="Folder for referee.json and referee.html, with a picture per case.",
+)
 @click.pass_context
 def referee(
     context: click.Context,
@@ -69,18 +83,28 @@ def referee(
     left_out: list[str] = []
     found = _engines(engines, left_out)[: 2 if quick else None]
     if list_only:
-        print_table("Cases", ["name", "description"], [[each.name, each.title] for each in chosen.values()])
+        print_table(
+            "Cases",
+            ["name", "description"],
+            [[each.name, each.title] for each in chosen.values()],
+        )
         print_table(
             "Engines",
             ["name", "settings"],
-            [[each.name, each.settings.replace("as it comes", "default")] for each in found],
+            [
+                [each.name, each.settings.replace("as it comes", "default")]
+                for each in found
+            ],
         )
         return 0
     steps = None if step is None else (validation.positive("--step", step),)
     if folder is not None:
         make_folder(folder)
     verdicts, code = _judged(chosen, found, file, steps)
-    print_table("Friction against the truth: error over what is allowed", *report.table(verdicts))
+    print_table(
+        "Friction against the truth: error over what is allowed",
+        *report.table(verdicts),
+    )
     for text in left_out:
         note(f"left out: {text}")
     for path in report.write(verdicts, chosen, found, folder):
@@ -89,7 +113,10 @@ def referee(
 
 
 def _judged(
-    cases: dict[str, Any], engines: list[Any], file: Path | None, steps: tuple[float, ...] | None = None
+    cases: dict[str, Any],
+    engines: list[Any],
+    file: Path | None,
+    steps: tuple[float, ...] | None = None,
 ) -> tuple[list[Any], int]:
     """Judge with progress; return verdicts, those of the file among them, and the exit code."""
     from planarfriction.cli import INTERRUPTED
@@ -99,20 +126,27 @@ def _judged(
     from planarfriction_studies.referee.run import Apart, Kept, run
 
     if not engines:
-        raise FrictionError("no simulator is installed: run pip install 'planarfriction[mujoco]' or [drake], [mjx]")
+        raise FrictionError(
+            "no simulator is installed: run pip install 'planarfriction[mujoco]' or [drake], [mjx]"
+        )
     if file is not None:
         check_writable(file)
-    kept, code = Kept(file), 0
+    kept = Kept(file)
+    code = 0
     try:
         with Apart() as apart, work_progress("referee") as report:
-            progress = lambda done, of, words: report(words, done, of)  # noqa: E731
-            run(cases, engines, kept, steps=steps, judged=apart.judge, progress=progress)
+            progress = lambda done, of, words: report(words, done, of)
+            run(
+                cases, engines, kept, steps=steps, judged=apart.judge, progress=progress
+            )
     except KeyboardInterrupt:
         code = INTERRUPTED
     verdicts = kept.of(cases, engines)
     if code:
         goes_on = "" if file is None else ": the same command continues from there"
-        note(f"interrupted: {len(verdicts)} of {len(cases) * len(engines)} results are finished{goes_on}")
+        note(
+            f"interrupted: {len(verdicts)} of {len(cases) * len(engines)} results are finished{goes_on}"
+        )
     return verdicts, code
 
 
@@ -120,7 +154,9 @@ def _judged(
 @ENGINE
 @CASE
 @JSON
-def simulators(engines: tuple[str, ...], cases: tuple[str, ...], file: Path | None) -> int:
+def simulators(
+    engines: tuple[str, ...], cases: tuple[str, ...], file: Path | None
+) -> int:
     """Compare patch friction in simulators with their own friction, with default and with the best settings.
 
     This is a view of `planarfriction referee`, in units instead of marks. Results in the --json
@@ -174,7 +210,9 @@ def _cases(names: tuple[str, ...]) -> dict[str, Any]:
     if not names:
         return own
     found = [
-        read_case(Path(name)) if name.endswith(".toml") else own[validation.choice("--case", name, own)]
+        read_case(Path(name))
+        if name.endswith(".toml")
+        else own[validation.choice("--case", name, own)]
         for name in names
     ]
     return {case.name: case for case in found}
@@ -188,14 +226,15 @@ def _engines(names: tuple[str, ...], left_out: list[str]) -> list[Any]:
     found = list(installed(left_out))
     for name in names:
         if not any(engine.name.lower().startswith(name.lower()) for engine in found):
-            rule = (
-                f"begin the name of an engine that is installed: {'; '.join(engine.name for engine in found) or 'none'}"
-            )
+            installed = "; ".join(engine.name for engine in found) or "none"
+            rule = f"begin the name of an engine that is installed: {installed}"
             raise InvalidValueError("--engine", rule, name)
     exact = {name.lower() for name in names} & {each.name.lower() for each in found}
 
     def asked(engine: Any) -> bool:
         name = engine.name.lower()
-        return name in exact or any(name.startswith(each.lower()) for each in names if each.lower() not in exact)
+        return name in exact or any(
+            name.startswith(each.lower()) for each in names if each.lower() not in exact
+        )
 
     return [each for each in found if not names or asked(each)]

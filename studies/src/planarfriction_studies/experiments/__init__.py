@@ -30,15 +30,23 @@ class Experiment:
     @property
     def run(self) -> Callable[[Work], Result]:
         """The function that carries it out."""
-        return importlib.import_module(f"{__name__}.{self.name.replace('-', '_')}.run").run
+        return importlib.import_module(
+            f"{__name__}.{self.name.replace('-', '_')}.run"
+        ).run
 
 
 EXPERIMENTS = {
     name: Experiment(name, title)
     for name, title in (
         ("limit-surfaces", "Limit surfaces, and where the ellipsoid goes wrong"),
-        ("staircase", "The staircase of a grid's steady state, and what smoothing does to it"),
-        ("velocity-driven", "Moved with a given velocity: distributed, reduced and ellipsoid"),
+        (
+            "staircase",
+            "The staircase of a grid's steady state, and what smoothing does to it",
+        ),
+        (
+            "velocity-driven",
+            "Moved with a given velocity: distributed, reduced and ellipsoid",
+        ),
         ("drift", "Drift under a load that friction holds"),
         ("in-hand", "A plate that slips and sticks between two fingers"),
         ("load-dependent", "A contact pressure that follows the load"),

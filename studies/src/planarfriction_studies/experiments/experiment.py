@@ -68,7 +68,11 @@ class Comparison:
     @property
     def share(self) -> float | None:
         """The difference as a share of the span [-]; None where the reference is zero, up to the tolerance."""
-        return self.difference / self.span if self.span and self.span > self.tolerance else None
+        return (
+            self.difference / self.span
+            if self.span and self.span > self.tolerance
+            else None
+        )
 
     @property
     def holds(self) -> bool:
@@ -77,7 +81,12 @@ class Comparison:
 
 
 def compare_curve(
-    quantity: str, time: np.ndarray, values: np.ndarray, name: str, allowance: float, cause: str
+    quantity: str,
+    time: np.ndarray,
+    values: np.ndarray,
+    name: str,
+    allowance: float,
+    cause: str,
 ) -> Comparison:
     """Compare our curve (`values` at `time`) with the published curve `name`, at the times of its vertices only.
 
@@ -85,19 +94,36 @@ def compare_curve(
     error (or, where the figure's solver error is unknown, an estimate that `cause` explains).
     """
     curve = facts.published_curve(name)
-    tolerance, theirs = (curve.deviation or 0.0) + curve.reading + allowance, (curve.time, curve.values)
-    return _compare_at("published", quantity, (time, values), theirs, tolerance, curve.unit, cause, curve.deviation)
+    tolerance = (curve.deviation or 0.0) + curve.reading + allowance
+    theirs = (curve.time, curve.values)
+    return _compare_at(
+        "published",
+        quantity,
+        (time, values),
+        theirs,
+        tolerance,
+        curve.unit,
+        cause,
+        curve.deviation,
+    )
 
 
 def compare_converged(
-    quantity: str, time: np.ndarray, values: np.ndarray, name: str, allowance: float, cause: str
+    quantity: str,
+    time: np.ndarray,
+    values: np.ndarray,
+    name: str,
+    allowance: float,
+    cause: str,
 ) -> Comparison:
     """Compare our curve with the column `name` of a converged solution, `in_hand/Circle/d1/x`, at all its times."""
     solution, _, column = name.rpartition("/")
     reference = facts.converged(solution)
     theirs = reference["time"], reference[column]
     tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(theirs[1]))
-    return _compare_at("converged", quantity, (time, values), theirs, tolerance, UNITS[column], cause)
+    return _compare_at(
+        "converged", quantity, (time, values), theirs, tolerance, UNITS[column], cause
+    )
 
 
 Curve = tuple[np.ndarray, np.ndarray]
@@ -109,13 +135,27 @@ def _compare_at(
     paper: float | None = None,
 ) -> Comparison:  # fmt: skip
     """Compare our curve with another at the times of that; each must be recorded, for between samples lie jumps."""
-    (time, values), (wanted, expected) = ours, theirs
+    (time, values) = ours
+    (wanted, expected) = theirs
     inside = wanted <= time[-1] + 1e-9  # a run may be shorter than the figure
     index = np.clip(np.searchsorted(time, wanted[inside] - 1e-7), 0, len(time) - 1)
-    assert np.abs(time[index] - wanted[inside]).max() < 1e-6, "the reference has times that were not recorded"
+    assert np.abs(time[index] - wanted[inside]).max() < 1e-6, (
+        "the reference has times that were not recorded"
+    )
     difference = float(np.abs(values[index] - expected[inside]).max())
-    span, samples = float(np.ptp(expected)), int(inside.sum())
-    return Comparison(quantity, reference, difference, tolerance, unit, samples, cause, span=span, paper=paper)
+    span = float(np.ptp(expected))
+    samples = int(inside.sum())
+    return Comparison(
+        quantity,
+        reference,
+        difference,
+        tolerance,
+        unit,
+        samples,
+        cause,
+        span=span,
+        paper=paper,
+    )
 
 
 def compare_columns(
@@ -132,9 +172,20 @@ def compare_columns(
     `before` stands before the names of the columns. Columns whose unit has no `allowance` are left out.
     """
     compare = compare_curve if reference == "published" else compare_converged
-    allowances = allowance if isinstance(allowance, Mapping) else dict.fromkeys(UNITS.values(), allowance)
+    allowances = (
+        allowance
+        if isinstance(allowance, Mapping)
+        else dict.fromkeys(UNITS.values(), allowance)
+    )
     return [
-        compare(f"{before}{name}", run["time"], run[name], f"{solution}/{name}", allowances[UNITS[name]], cause)
+        compare(
+            f"{before}{name}",
+            run["time"],
+            run[name],
+            f"{solution}/{name}",
+            allowances[UNITS[name]],
+            cause,
+        )
         for name in columns
         if UNITS[name] in allowances
     ]
@@ -151,15 +202,32 @@ def compare_profile(
 
 
 def compare(
-    quantity: str, ours: Any, theirs: Any, reference: Reference, tolerance: float, unit: str, cause: str
+    quantity: str,
+    ours: Any,
+    theirs: Any,
+    reference: Reference,
+    tolerance: float,
+    unit: str,
+    cause: str,
 ) -> Comparison:
     """Compare one number with its reference, or an array of them, of which the farthest counts."""
     difference = np.abs(np.asarray(ours) - theirs)
     values = (None, None) if difference.ndim else (float(ours), float(theirs))
-    return Comparison(quantity, reference, float(difference.max()), tolerance, unit, difference.size, cause, *values)
+    return Comparison(
+        quantity,
+        reference,
+        float(difference.max()),
+        tolerance,
+        unit,
+        difference.size,
+        cause,
+        *values,
+    )
 
 
-def compare_all(reference: Reference, rows: Iterable[tuple[str, Any, Any, float, str, str]]) -> list[Comparison]:
+def compare_all(
+    reference: Reference, rows: Iterable[tuple[str, Any, Any, float, str, str]]
+) -> list[Comparison]:
     """Compare rows of quantity, ours, theirs, tolerance, unit and cause."""
     return [compare(*row[:3], reference, *row[3:]) for row in rows]
 
@@ -193,11 +261,16 @@ def table(
     note: str = "",
 ) -> Table:
     """Return a row for each item, which its name begins; columns by heading; `first` is the heading of the names."""
-    rows = [[name, *(cell(item) for cell in columns.values())] for name, item in items.items()]
+    rows = [
+        [name, *(cell(item) for cell in columns.values())]
+        for name, item in items.items()
+    ]
     return Table(title, [first, *columns], rows, note)
 
 
-def entry(*keys: Any, scale: float = 1.0, digits: int | None = None) -> Callable[[Any], float]:
+def entry(
+    *keys: Any, scale: float = 1.0, digits: int | None = None
+) -> Callable[[Any], float]:
     """Return a column of a table: the number below `keys` of an item, times `scale`, rounded to `digits`."""
 
     def cell(item: Any) -> float:
@@ -217,9 +290,14 @@ def columns_of(time: np.ndarray, values: np.ndarray, names: Iterable[str]) -> Ar
     return {"time": time} | dict(zip(names, values.T, strict=True))
 
 
-def with_units(values: np.ndarray, units: Mapping[str, str]) -> dict[str, tuple[np.ndarray, str]]:
+def with_units(
+    values: np.ndarray, units: Mapping[str, str]
+) -> dict[str, tuple[np.ndarray, str]]:
     """Return the columns of `values` `[T, N]` by name, each with its unit."""
-    return {name: (column, unit) for (name, unit), column in zip(units.items(), values.T, strict=True)}
+    return {
+        name: (column, unit)
+        for (name, unit), column in zip(units.items(), values.T, strict=True)
+    }
 
 
 def dataset(
@@ -239,13 +317,20 @@ def dataset(
     labels = [list(dict.fromkeys(each)) for each in zip(*runs, strict=True)]
     shape = [*map(len, labels), -1]
     name, values, unit = along
-    units = columns if isinstance(columns, Mapping) else {column: UNITS[column] for column in columns}
+    units = (
+        columns
+        if isinstance(columns, Mapping)
+        else {column: UNITS[column] for column in columns}
+    )
     variables: dict[str, Any] = {
         column: ((*dims, name), np.array([runs[key][column] for key in itertools.product(*labels)]).reshape(shape),
                  {"units": unit})
         for column, unit in units.items()
     }  # fmt: skip
-    variables |= {each: (name, values, {"units": unit}) for each, (values, unit) in (alone or {}).items()}
+    variables |= {
+        each: (name, values, {"units": unit})
+        for each, (values, unit) in (alone or {}).items()
+    }
     coordinates = dict(zip(dims, labels, strict=True))
     return xr.Dataset(variables, coordinates | {name: (name, values, {"units": unit})})
 
@@ -288,7 +373,9 @@ class Work:
     """Fingerprint of the code and the options: pieces with another one are computed again."""
     progress: Callable[[str], None] | None = None
 
-    def piece(self, label: str, compute: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+    def piece(
+        self, label: str, compute: Callable[[], Mapping[str, Any]]
+    ) -> dict[str, Any]:
         """Return what `compute` does, nested dictionaries of numbers and arrays, from the kept file if there is one."""
         if self.progress is not None:
             self.progress(label)
@@ -301,12 +388,17 @@ class Work:
         return _nested(kept)
 
     def pieces(
-        self, computes: Mapping[Key, Callable[[], Mapping[str, Any]]], label: Callable[[Key], str] = str
+        self,
+        computes: Mapping[Key, Callable[[], Mapping[str, Any]]],
+        label: Callable[[Key], str] = str,
     ) -> dict[Key, dict[str, Any]]:
         """Compute independent pieces by key, two at a time: compiled code runs beside other compiled code."""
         pool = ThreadPoolExecutor(THREADS)
         try:
-            futures = {key: pool.submit(self.piece, label(key), compute) for key, compute in computes.items()}
+            futures = {
+                key: pool.submit(self.piece, label(key), compute)
+                for key, compute in computes.items()
+            }
             return {key: future.result() for key, future in futures.items()}
         finally:
             pool.shutdown(cancel_futures=True)
@@ -316,7 +408,9 @@ _INNER = "|"
 """Separator between the names of nested dictionaries in the kept files."""
 
 
-def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, np.ndarray]]:
+def _flat(
+    values: Mapping[str, Any], before: str = ""
+) -> Iterator[tuple[str, np.ndarray]]:
     for name, value in values.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{before}{name}{_INNER}")
@@ -328,21 +422,32 @@ def _nested(arrays: Arrays) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for key, values in arrays.items():
         *outer, name = key.split(_INNER)
-        home = functools.reduce(lambda place, each: place.setdefault(each, {}), outer, result)
+        home = functools.reduce(
+            lambda place, each: place.setdefault(each, {}), outer, result
+        )
         home[name] = values if values.ndim else values.item()
     return result
 
 
 def _slug(label: str) -> str:
     """Return the label as a file name; its digest tells labels apart that differ in what a file name cannot hold."""
-    return re.sub(r"[^\w.]+", "-", label).strip("-") + "-" + hashlib.sha256(label.encode()).hexdigest()[:8]
+    return (
+        re.sub(r"[^\w.]+", "-", label).strip("-")
+        + "-"
+        + hashlib.sha256(label.encode()).hexdigest()[:8]
+    )
 
 
 def _read_piece(path: Path, fingerprint: str) -> Arrays | None:
     try:
         with path.open("rb") as file, np.load(file) as stored:
             arrays = dict(stored)
-    except (OSError, ValueError, EOFError, BadZipFile):  # none, or cut off while it was written
+    except (
+        OSError,
+        ValueError,
+        EOFError,
+        BadZipFile,
+    ):  # none, or cut off while it was written
         return None
     return arrays if str(arrays.pop("fingerprint", "")) == fingerprint else None
 

@@ -45,22 +45,38 @@ def published_curve(name: str) -> PublishedCurve:
     curves = _published()["curves"]
     entry = curves[validation.choice("curve", name, curves)]
     time = np.array(entry["at"]) + entry["late"]
-    deviation, reading = entry["deviation"], entry["reading"]
-    return PublishedCurve(entry["figure"], entry["unit"], time, np.array(entry["values"]), deviation, reading)
+    deviation = entry["deviation"]
+    reading = entry["reading"]
+    return PublishedCurve(
+        entry["figure"],
+        entry["unit"],
+        time,
+        np.array(entry["values"]),
+        deviation,
+        reading,
+    )
 
 
 def published_table(name: str) -> dict[str, dict[str, float]]:
     """Return a published table (`patches`, `box` or `timing`): row -> column -> number."""
     tables = _published()
-    columns, *rows = tables[validation.choice("table", name, ("patches", "box", "timing"))].items()
+    columns, *rows = tables[
+        validation.choice("table", name, ("patches", "box", "timing"))
+    ].items()
     return {row: dict(zip(columns[1], values, strict=True)) for row, values in rows}
 
 
 def converged(name: str) -> dict[str, np.ndarray]:
     """Return a converged solution, `in_hand/Circle/d1`: `time` [s], and its columns of x, y, theta, fx, fy, tau."""
-    columns = {key.rpartition("/")[2]: values for key, values in _converged().items() if key.startswith(f"{name}/")}
+    columns = {
+        key.rpartition("/")[2]: values
+        for key, values in _converged().items()
+        if key.startswith(f"{name}/")
+    }
     if not columns:
-        validation.choice("solution", name, sorted({key.rpartition("/")[0] for key in _converged()}))
+        validation.choice(
+            "solution", name, sorted({key.rpartition("/")[0] for key in _converged()})
+        )
     return columns
 
 

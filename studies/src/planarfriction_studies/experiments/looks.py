@@ -22,16 +22,30 @@ OF_MODEL = {"d": DISTRIBUTED, "r": REDUCED, "e": ELLIPSOID}
 
 
 def vertices(
-    axes: Any, name: str, factor: float, colour: str, shown: Any = slice(None), marker: str = "o", **look: Any
+    axes: Any,
+    name: str,
+    factor: float,
+    colour: str,
+    shown: Any = slice(None),
+    marker: str = "o",
+    **look: Any,
 ) -> None:
     """Draw the vertices of a published curve, in shown units per SI unit; `shown`: which, or from when to when [s]."""
     curve = facts.published_curve(name)
-    part = shown if isinstance(shown, slice) else (curve.time >= shown[0]) & (curve.time <= shown[1])
+    part = (
+        shown
+        if isinstance(shown, slice)
+        else (curve.time >= shown[0]) & (curve.time <= shown[1])
+    )
     look = {"ms": 3.0, "mfc": "white", "mec": colour, "mew": 0.7, "zorder": 3} | look
-    axes.plot(curve.time[part], factor * curve.values[part], ls="", marker=marker, **look)
+    axes.plot(
+        curve.time[part], factor * curve.values[part], ls="", marker=marker, **look
+    )
 
 
-def panels(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[PlotFigure, Any]:
+def panels(
+    width: float, height: float, rows: int = 1, columns: int = 1, **options: Any
+) -> tuple[PlotFigure, Any]:
     """Return a figure of `width` x `height` inches and its tidy panels, as `Figure.subplots` makes them."""
     figure = style.new_figure(width, height)
     made: Any = figure.subplots(rows, columns, **options)
@@ -50,7 +64,9 @@ def box_panels(names: list[str], height: float) -> tuple[PlotFigure, Any]:
     return figure, made
 
 
-def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: bool = True) -> None:
+def box(
+    axes: Any, at: float, numbers: Any, colour: str, width: float, filled: bool = True
+) -> None:
     """Draw a box of low whisker, first quartile, median, third quartile, high whisker; a sixth number is a cross."""
     low, first, median, third, high, *most = numbers
     line = {"color": colour, "linewidth": 1.1}
@@ -64,14 +80,30 @@ def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: b
         axes.plot(at, *most, marker="x", ms=5, mew=1.4, color=colour)
 
 
-def box_legend(figure: PlotFigure, colours: dict[str, str], columns: int, also: dict[str, str] | None = None) -> None:
+def box_legend(
+    figure: PlotFigure,
+    colours: dict[str, str],
+    columns: int,
+    also: dict[str, str] | None = None,
+) -> None:
     """Draw the legend of boxes by their words, filled, then `also` open ones, and of the crosses of maxima."""
     from matplotlib.patches import Patch
 
-    filled = [Patch(facecolor=colour, edgecolor=colour, label=words) for words, colour in colours.items()]
-    empty = [Patch(facecolor="white", edgecolor=colour, label=words) for words, colour in (also or {}).items()]
+    filled = [
+        Patch(facecolor=colour, edgecolor=colour, label=words)
+        for words, colour in colours.items()
+    ]
+    empty = [
+        Patch(facecolor="white", edgecolor=colour, label=words)
+        for words, colour in (also or {}).items()
+    ]
     cross = line_key("maximum", ls="", marker="x", ms=5, mew=1.4, color="0.3")
-    legend(figure, [*filled, *empty, cross], columns, fontsize="medium" if also else "small")
+    legend(
+        figure,
+        [*filled, *empty, cross],
+        columns,
+        fontsize="medium" if also else "small",
+    )
 
 
 def line_key(label: str, **look: Any) -> Any:
@@ -93,7 +125,9 @@ AXES = {
 """Column of a run -> its label on an axis, shown units per SI unit."""
 
 
-def legend(figure: PlotFigure, handles: Any, columns: int, place: str = "upper", **options: Any) -> None:
+def legend(
+    figure: PlotFigure, handles: Any, columns: int, place: str = "upper", **options: Any
+) -> None:
     """Draw the legend of a whole figure, above or below it; `handles`: entries, or axes that have them."""
     if not isinstance(handles, list):
         handles, options["labels"] = handles.get_legend_handles_labels()

@@ -14,7 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 from planarfriction import __version__
 from planarfriction.writing import write_text
-from planarfriction_studies.experiments.reproduction import Record, Reproduction, machine
+from planarfriction_studies.experiments.reproduction import (
+    Record,
+    Reproduction,
+    machine,
+)
 from planarfriction_studies.experiments.wording import environment
 
 if TYPE_CHECKING:
@@ -39,7 +43,8 @@ def write_report(reproduction: Reproduction) -> Path:
     }
     counter = itertools.count(1)
     sections: list[Record] = [
-        _section(record, reproduction.folder / record["name"], counter) | {"number": number}
+        _section(record, reproduction.folder / record["name"], counter)
+        | {"number": number}
         for number, record in enumerate(reproduction.records(), 1)
     ]
     rows = [row for section in sections for row in section["comparisons"]]
@@ -49,7 +54,11 @@ def write_report(reproduction: Reproduction) -> Path:
         version=__version__,
         date=datetime.date.today().isoformat(),
         machine=machine(),
-        mode="quick" if reproduction.quick else "full" if reproduction.full else "normal",
+        mode="quick"
+        if reproduction.quick
+        else "full"
+        if reproduction.full
+        else "normal",
         seconds=sum(section["seconds"] for section in sections),
     )
     path = reproduction.folder / "report.html"
@@ -88,11 +97,17 @@ def _summary(rows: Rows) -> dict[str, Any]:
     return {
         "rows": rows,
         "missed": [row for row in rows if not row["holds"]],
-        "groups": [(cause, [row for row in rows if row["cause"] == cause]) for cause in causes],
+        "groups": [
+            (cause, [row for row in rows if row["cause"] == cause]) for cause in causes
+        ],
         "share": max(shares, default=None),
         "paper_share": max(paper, default=None),
         "nearest": max(
-            [(row["difference"] / row["tolerance"], row["quantity"]) for row in rows if row["tolerance"]],
+            [
+                (row["difference"] / row["tolerance"], row["quantity"])
+                for row in rows
+                if row["tolerance"]
+            ],
             default=(0, ""),
         ),
     }
@@ -103,7 +118,10 @@ def _image(path: Path) -> dict[str, Any]:
     try:
         data = path.read_bytes()
     except OSError:
-        return {"source": "", "width": 100}  # someone removed it: its caption still says what it was
+        return {
+            "source": "",
+            "width": 100,
+        }  # someone removed it: its caption still says what it was
     width = int.from_bytes(data[16:20], "big")  # of the header of a PNG
     source = "data:image/png;base64," + base64.b64encode(data).decode()
     return {"source": source, "width": min(100, round(100 * width / WIDEST))}
@@ -119,8 +137,15 @@ _GREEK = {"tau": "τ", "tau/r": "τ/r", "theta": "θ", "omega": "ω", "mu": "μ"
 
 SYMBOLS = {
     **{letter: f"<i>{letter}</i>" for letter in ("k", "p", "r", "R", "x", "y", "θ")},
-    **{tex + name: f"<i>{letter}</i>" for name, letter in _GREEK.items() for tex in ("", "\\")},
-    **{name.replace("_", ""): f"<i>{name[0]}<sub>{name[2]}</sub></i>" for name in ("f_x", "f_y", "v_x", "v_y")},
+    **{
+        tex + name: f"<i>{letter}</i>"
+        for name, letter in _GREEK.items()
+        for tex in ("", "\\")
+    },
+    **{
+        name.replace("_", ""): f"<i>{name[0]}<sub>{name[2]}</sub></i>"
+        for name in ("f_x", "f_y", "v_x", "v_y")
+    },
     "f_N": "<i>f<sub>N</sub></i>",
     "dtheta": "d<i>θ</i>",
     "int": "∫",
@@ -132,7 +157,9 @@ SYMBOLS = {
 """Symbols as the names of quantities, columns and units have them -> HTML."""
 
 _SYMBOL = re.compile(
-    r"(?<![\w<^/.$])(" + "|".join(sorted(map(re.escape, SYMBOLS), key=len, reverse=True)) + r")(?![\w^>])"
+    r"(?<![\w<^/.$])("
+    + "|".join(sorted(map(re.escape, SYMBOLS), key=len, reverse=True))
+    + r")(?![\w^>])"
 )
 
 
@@ -144,7 +171,9 @@ def to_html(text: str) -> str:
 def name_to_html(text: str) -> str:
     """Return the name of a quantity or a column, whose symbols are plain words, as HTML with typeset symbols."""
     parts = _SYMBOL.split(re.sub(r"(?<=\d) x (?=\d)", " × ", text))
-    return "".join(SYMBOLS[part] if i % 2 else html.escape(part) for i, part in enumerate(parts))
+    return "".join(
+        SYMBOLS[part] if i % 2 else html.escape(part) for i, part in enumerate(parts)
+    )
 
 
 @functools.cache
@@ -159,10 +188,13 @@ def formula(source: str) -> str:
     drawn = buffer.getvalue().decode()
     height = float(drawn.split('height="')[1].split("pt")[0])
     ground = r'<g id="patch_1">.*?</g>'
-    drawn = re.sub(rf"<metadata>.*?</metadata>|<!--.*?-->|{ground}|\n *", " ", drawn, flags=re.S)
+    drawn = re.sub(
+        rf"<metadata>.*?</metadata>|<!--.*?-->|{ground}|\n *", " ", drawn, flags=re.S
+    )
     picture = base64.b64encode(re.sub(" +", " ", drawn).encode()).decode()
     style = "; ".join(
-        f"{name}: {ENLARGED * value / POINTS:.3f}em" for name, value in (("height", height), ("vertical-align", -depth))
+        f"{name}: {ENLARGED * value / POINTS:.3f}em"
+        for name, value in (("height", height), ("vertical-align", -depth))
     )
     source = html.escape(source)
     return f'<img class="formula" alt="{source}" style="{style}" src="data:image/svg+xml;base64,{picture}">'
@@ -174,7 +206,9 @@ def _parser() -> MarkdownIt:
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.inline.ruler.before("escape", "formula", _find_formula)
-    parser.add_render_rule("formula", lambda _, tokens, i, *__: formula(tokens[i].content))
+    parser.add_render_rule(
+        "formula", lambda _, tokens, i, *__: formula(tokens[i].content)
+    )
     return parser
 
 

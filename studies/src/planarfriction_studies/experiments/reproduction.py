@@ -45,22 +45,37 @@ class Reproduction:
     @property
     def fingerprint(self) -> str:
         """Fingerprint of the code, the packages beneath it and the options: results with another one are not reused."""
-        return hashlib.sha256(f"{_code()} {self.quick} {self.full}".encode()).hexdigest()
+        return hashlib.sha256(
+            f"{_code()} {self.quick} {self.full}".encode()
+        ).hexdigest()
 
     def kept(self, name: str) -> Record | None:
         """Return the result of an experiment that an earlier run with the same code and options has finished."""
         try:
-            record = json.loads((self.folder / name / "result.json").read_text(encoding="utf-8"))
+            record = json.loads(
+                (self.folder / name / "result.json").read_text(encoding="utf-8")
+            )
         except (OSError, ValueError):
             return None
-        return record if isinstance(record, dict) and record.get("fingerprint") == self.fingerprint else None
+        return (
+            record
+            if isinstance(record, dict)
+            and record.get("fingerprint") == self.fingerprint
+            else None
+        )
 
     def records(self) -> list[Record]:
         """Return all results kept in the folder, in the order of the experiments."""
-        return [record for name in EXPERIMENTS if (record := self.kept(name)) is not None]
+        return [
+            record for name in EXPERIMENTS if (record := self.kept(name)) is not None
+        ]
 
     def run(
-        self, names: Sequence[str] | None = None, *, again: bool = False, progress: Callable[[str], None] | None = None
+        self,
+        names: Sequence[str] | None = None,
+        *,
+        again: bool = False,
+        progress: Callable[[str], None] | None = None,
     ) -> Iterator[Record]:
         """Carry out the experiments `names` (all by default) and yield each result as it is stored.
 
@@ -70,12 +85,17 @@ class Reproduction:
         Raises `InvalidValueError` for an unknown name, `FileError` where nothing can be written.
         """
         wanted = EXPERIMENTS if names is None else names
-        chosen = [EXPERIMENTS[validation.choice("experiment", name, EXPERIMENTS)] for name in wanted]
+        chosen = [
+            EXPERIMENTS[validation.choice("experiment", name, EXPERIMENTS)]
+            for name in wanted
+        ]
         for each in chosen:
             record = None if again else self.kept(each.name)
             yield self._carry_out(each, again, progress) if record is None else record
 
-    def _carry_out(self, each: Experiment, again: bool, progress: Callable[[str], None] | None) -> Record:
+    def _carry_out(
+        self, each: Experiment, again: bool, progress: Callable[[str], None] | None
+    ) -> Record:
         home = self.folder / each.name
         pieces = home / "pieces"
         if again:
@@ -109,14 +129,25 @@ class Reproduction:
     def numbers(self) -> Record:
         """Return every number of the kept results, with what they were measured on."""
         keys = ("title", "seconds", "numbers", "comparisons")
-        every = {record["name"]: {key: record[key] for key in keys} for record in self.records()}
+        every = {
+            record["name"]: {key: record[key] for key in keys}
+            for record in self.records()
+        }
         options = {"quick": self.quick, "full": self.full}
-        return {"version": __version__, "options": options, "machine": machine(), "experiments": every}
+        return {
+            "version": __version__,
+            "options": options,
+            "machine": machine(),
+            "experiments": every,
+        }
 
 
 def machine() -> dict[str, Any]:
     """Return the machine and the versions that the numbers were computed with."""
-    packages = {name: metadata.version(name) for name in ("numpy", "scipy", "numba", "matplotlib")}
+    packages = {
+        name: metadata.version(name)
+        for name in ("numpy", "scipy", "numba", "matplotlib")
+    }
     return {
         "processors": os.cpu_count(),
         "platform": platform.platform(),
@@ -131,10 +162,14 @@ def _record(each: Experiment, result: Result) -> Record:
         "title": each.title,
         **{name: getattr(result, name) for name in ("verdict", "asked", "left_out")},
         "findings": list(result.findings),
-        "pictures": [{"name": picture.name, "caption": picture.caption} for picture in result.pictures],
+        "pictures": [
+            {"name": picture.name, "caption": picture.caption}
+            for picture in result.pictures
+        ],
         "tables": [_plain(dataclasses.asdict(table)) for table in result.tables],
         "comparisons": [
-            _plain(dataclasses.asdict(row)) | {"share": row.share, "holds": row.holds} for row in result.comparisons
+            _plain(dataclasses.asdict(row)) | {"share": row.share, "holds": row.holds}
+            for row in result.comparisons
         ],
         "numbers": _plain(result.numbers),
         "data": [f"{name}.nc" for name in result.data],
@@ -155,6 +190,10 @@ def _code() -> str:
     homes = Path(planarfriction.__file__).parent, Path(__file__).parents[1]
     digest = hashlib.sha256(f"{sys.version} {machine()}".encode())
     for home in homes:
-        for path in sorted(path for path in home.rglob("*") if path.suffix in (".py", ".j2", ".json", ".npz")):
+        for path in sorted(
+            path
+            for path in home.rglob("*")
+            if path.suffix in (".py", ".j2", ".json", ".npz")
+        ):
             digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -9,7 +9,10 @@ import numpy as np
 
 from planarfriction.geometry import wrench_at
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceTablePublished
+from planarfriction.limit_surface import (
+    LimitSurfaceEllipsoid,
+    LimitSurfaceTablePublished,
+)
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes import Scene, simulate
@@ -52,7 +55,9 @@ class PublishedEllipsoid(LimitSurfaceEllipsoid):
         return LimitSurfaceTablePublished(self.patch).contact_radius
 
 
-def published_model(kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, width: float = 0.02) -> Any:
+def published_model(
+    kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, width: float = 0.02
+) -> Any:
     """Return the distributed model ("d"), the published reduced one ("r"), or that on the ellipsoid ("e")."""
     patch = PUBLISHED_PATCHES[shape](width=width) if isinstance(shape, str) else shape
     if kind == "d":
@@ -64,11 +69,16 @@ def published_model(kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, 
 
 def simulated(scene: Scene, **options: Any) -> Arrays:
     """Simulate a scene; returns time, motion and the wrench of the first contact about its frame's origin [SI]."""
-    values = {name: history.values for name, history in simulate(scene, **options).histories.items()}
+    values = {
+        name: history.values
+        for name, history in simulate(scene, **options).histories.items()
+    }
     body = {name: values[name] for name in ("time", *POSE, *TWIST)}
     return body | {name: values[name][:, 0] for name in (*WRENCH, "normal_force")}
 
 
 def at_centre_of_pressure(run: Arrays, patch: ContactPatch) -> np.ndarray:
     """Return the friction wrench `[T, 3]` of a run about the centre of pressure of the patch."""
-    return wrench_at(np.stack([run[name] for name in WRENCH], axis=-1), patch.centre_of_pressure())
+    return wrench_at(
+        np.stack([run[name] for name in WRENCH], axis=-1), patch.centre_of_pressure()
+    )

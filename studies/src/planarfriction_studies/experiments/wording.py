@@ -31,17 +31,28 @@ def report(
     `rest` are other fields of the result.
     """
     text = (
-        environment().get_template(f"{home}/findings.md.j2").render({**numbers, "numbers": numbers, **(values or {})})
+        environment()
+        .get_template(f"{home}/findings.md.j2")
+        .render({**numbers, "numbers": numbers, **(values or {})})
     )
     _, *pieces = re.split(r"^## (.+)\n", text, flags=re.M)
     parts = {
         heading.strip(): re.sub(r"\n{3,}", "\n\n", body.strip())
         for heading, body in zip(pieces[::2], pieces[1::2], strict=True)
     }
-    captions = dict(line.removeprefix("- ").split(": ", 1) for line in parts["figures"].splitlines() if line)
-    pictures = [Picture(name, captions[name], figure) for name, figure in figures.items()]
+    captions = dict(
+        line.removeprefix("- ").split(": ", 1)
+        for line in parts["figures"].splitlines()
+        if line
+    )
+    pictures = [
+        Picture(name, captions[name], figure) for name, figure in figures.items()
+    ]
     found = parts["found"].split("\n\n")
-    words = {name: parts.get(name.replace("_", " "), "") for name in ("asked", "verdict", "left_out")}
+    words = {
+        name: parts.get(name.replace("_", " "), "")
+        for name in ("asked", "verdict", "left_out")
+    }
     return Result(found, pictures, numbers=numbers, **words, **rest)
 
 
@@ -57,7 +68,13 @@ def environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= {"fmt": fmt, "short": short, "power": power, "span": span, "number": number}
+    made.filters |= {
+        "fmt": fmt,
+        "short": short,
+        "power": power,
+        "span": span,
+        "number": number,
+    }
     return made
 
 

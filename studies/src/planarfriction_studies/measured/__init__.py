@@ -4,7 +4,13 @@ The published tables that it uses come with the package; `data/NOTICE` names the
 """
 
 from planarfriction_studies.measured.benchmark import Benchmark, Result, Score
-from planarfriction_studies.measured.questions import Case, OnsetQuestion, PushQuestion, SeriesQuestion, SlideQuestion
+from planarfriction_studies.measured.questions import (
+    Case,
+    OnsetQuestion,
+    PushQuestion,
+    SeriesQuestion,
+    SlideQuestion,
+)
 from planarfriction_studies.measured.tasks import TASKS
 
 __all__ = [

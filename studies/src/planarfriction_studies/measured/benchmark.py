@@ -82,23 +82,31 @@ class Benchmark:
             self.models = library(self.left_out)
         for name, model in self.models.items():
             if not callable(model):
-                raise InvalidValueError(f"model {name}", "be a function of a question", model)
+                raise InvalidValueError(
+                    f"model {name}", "be a function of a question", model
+                )
         self.cases = {}
         for name in self.tasks:
             cases = TASKS[name].read(self.folder)
             refused = TASKS[name].refused(cases)
             self.left_out += [f"{cases[i].name}: {why}" for i, why in refused.items()]
-            self.cases[name] = cases = [case for i, case in enumerate(cases) if i not in refused]
+            self.cases[name] = cases = [
+                case for i, case in enumerate(cases) if i not in refused
+            ]
             if len({case.is_training for case in cases}) != 2:
                 raise InvalidValueError(
-                    f"table of {name}", "contain cases to fit and cases to test", f"{len(cases)} cases"
+                    f"table of {name}",
+                    "contain cases to fit and cases to test",
+                    f"{len(cases)} cases",
                 )
 
     def test(self, task: str) -> list[Case]:
         """Return the cases that are scored."""
         return [case for case in self.cases[task] if not case.is_training]
 
-    def run(self, progress: Callable[[str], None] | None = None) -> dict[str, dict[str, Result]]:
+    def run(
+        self, progress: Callable[[str], None] | None = None
+    ) -> dict[str, dict[str, Result]]:
         """Fit and score every model on every task; returns `results`.
 
         Raises `InvalidValueError` if a model raised an error, or gave an answer of the wrong shape or with numbers that
@@ -107,25 +115,42 @@ class Benchmark:
         say = (lambda text: None) if progress is None else progress
         wrong: list[Exception] = []
         for name in self.tasks:
-            task, test = TASKS[name], self.test(name)
+            task = TASKS[name]
+            test = self.test(name)
             training = [case for case in self.cases[name] if case.is_training]
             for called, model in (self.models or {}).items():
                 say(f"{name}: {called}, fit")
                 begun = time.perf_counter()
                 try:
                     fitted = model.fit(training) if hasattr(model, "fit") else model  # pyright: ignore
-                    answers = _answers(fitted, called, test, lambda part, n=name, c=called: say(f"{n}: {c}, {part}"))
+                    answers = _answers(
+                        fitted,
+                        called,
+                        test,
+                        lambda part, n=name, c=called: say(f"{n}: {c}, {part}"),
+                    )
                 except NotImplementedError:
                     continue  # a model need not answer every task
                 except Exception as error:
                     wrong.append(_failure(called, error))
                     continue
-                errors = tuple(task.errors(case, answer) for case, answer in zip(test, answers, strict=True))
+                errors = tuple(
+                    task.errors(case, answer)
+                    for case, answer in zip(test, answers, strict=True)
+                )
                 # friction coefficients cancel in the other tasks
                 told = name == "slides" or (name == "onsets" and fitted is not model)
-                values = fitted.fitted_values() if told and hasattr(fitted, "fitted_values") else {}
+                values = (
+                    fitted.fitted_values()
+                    if told and hasattr(fitted, "fitted_values")
+                    else {}
+                )
                 checked = fitted.check(test) if hasattr(fitted, "check") else {}
-                regions = fitted.regions([case.question for case in test]) if hasattr(fitted, "regions") else None
+                regions = (
+                    fitted.regions([case.question for case in test])
+                    if hasattr(fitted, "regions")
+                    else None
+                )
                 seconds = time.perf_counter() - begun
                 scores = score(task, test, errors, self.seed)
                 self.results.setdefault(name, {})[called] = Result(
@@ -145,20 +170,28 @@ def _failure(name: str, error: Exception) -> Exception:
     return told
 
 
-def _answers(model: Any, name: str, cases: Sequence[Case], say: Callable[[str], None]) -> list[np.ndarray]:
+def _answers(
+    model: Any, name: str, cases: Sequence[Case], say: Callable[[str], None]
+) -> list[np.ndarray]:
     answers: list[np.ndarray] = []
     questions = [case.question for case in cases]
     for first in range(0, len(cases), AT_ONCE):
         say(f"{first} of {len(cases)}")
         part = questions[first : first + AT_ONCE]
-        answers += model.answer_all(part) if hasattr(model, "answer_all") else [model(each) for each in part]
+        answers += (
+            model.answer_all(part)
+            if hasattr(model, "answer_all")
+            else [model(each) for each in part]
+        )
     return [
         validation.array(f"answer of {name} to {case.name}", answer, case.answer.shape)
         for case, answer in zip(cases, answers, strict=True)
     ]
 
 
-def score(task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed: int) -> dict[str, Score]:
+def score(
+    task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed: int
+) -> dict[str, Score]:
     """Compute each measure of a task over its cases, with the interval of a bootstrap over independent ones."""
     found = {}
     for measure in task.measures:
@@ -166,18 +199,29 @@ def score(task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed:
         if not len(values):
             continue
         low, high = interval(measure.total(values, drawings(groups, seed)))
-        found[measure.key] = Score(float(measure.total(values)), low, high, len(set(groups)))
+        found[measure.key] = Score(
+            float(measure.total(values)), low, high, len(set(groups))
+        )
     return found
 
 
-def rows_of(task: Task, measure: Measure, cases: Sequence[Case], errors: Sequence[np.ndarray]):
+def rows_of(
+    task: Task, measure: Measure, cases: Sequence[Case], errors: Sequence[np.ndarray]
+):
     """Return errors `[N]` that a measure counts, and the groups that they belong to."""
-    values, groups = [], []
+    values = []
+    groups = []
     for case, rows in zip(cases, errors, strict=True):
         if measure.board in ("", case.board):
             values.append(rows[:, measure.column])
-            one_each = task.name == "pushes"  # there each row is a push, in the others a case is one
-            groups += [f"{case.name} {i}" for i in range(len(rows))] if one_each else [case.group] * len(rows)
+            one_each = (
+                task.name == "pushes"
+            )  # there each row is a push, in the others a case is one
+            groups += (
+                [f"{case.name} {i}" for i in range(len(rows))]
+                if one_each
+                else [case.group] * len(rows)
+            )
     return (np.concatenate(values) if values else np.zeros(0)), groups
 
 
@@ -187,12 +231,15 @@ REFERENCE = "exact surface"
 
 def table(benchmark: Benchmark, task: str) -> tuple[list[str], list[list[str]]]:
     """Return headings and rows: one model a row, each measure with its 95 % interval."""
-    measures, results = TASKS[task].measures, benchmark.results[task]
+    measures = TASKS[task].measures
+    results = benchmark.results[task]
     headings = ["model", *(measure.heading for measure in measures)]
     rows = []
     for name, result in results.items():
         scores = [result.scores.get(measure.key) for measure in measures]
-        rows.append([name, *("" if score is None else _cell(score) for score in scores)])
+        rows.append(
+            [name, *("" if score is None else _cell(score) for score in scores)]
+        )
     return headings, rows
 
 
@@ -200,24 +247,32 @@ def _cell(score: Score) -> str:
     return f"{score.value:.2f}\n({score.low:.2f} to {score.high:.2f})"
 
 
-def differences(benchmark: Benchmark, task: str, reference: str) -> dict[str, dict[str, tuple[float, float, float]]]:
+def differences(
+    benchmark: Benchmark, task: str, reference: str
+) -> dict[str, dict[str, tuple[float, float, float]]]:
     """Return by model and measure its value minus that of `reference`, with the ends of the 95 % interval of that.
 
     The same drawings for both: what all models find hard does not blur their difference.
     """
-    known, test, results = TASKS[task], benchmark.test(task), benchmark.results[task]
+    known = TASKS[task]
+    test = benchmark.test(task)
+    results = benchmark.results[task]
     found: dict[str, dict[str, tuple[float, float, float]]] = {}
     for measure in known.measures:
         base, groups = rows_of(known, measure, test, results[reference].errors)
         if not len(base):
             continue
         drawn = drawings(groups, benchmark.seed)
-        of_base, base_drawn = measure.total(base), measure.total(base, drawn)
+        of_base = measure.total(base)
+        base_drawn = measure.total(base, drawn)
         for name, result in results.items():
             if name != reference:
                 values, _ = rows_of(known, measure, test, result.errors)
                 ends = interval(measure.total(values, drawn) - base_drawn)
-                found.setdefault(name, {})[measure.key] = (float(measure.total(values) - of_base), *ends)
+                found.setdefault(name, {})[measure.key] = (
+                    float(measure.total(values) - of_base),
+                    *ends,
+                )
     return found
 
 
@@ -229,10 +284,17 @@ def to_dict(benchmark: Benchmark) -> dict[str, Any]:
         models = {}
         for called, result in results.items():
             scores = {
-                key: {"value": score.value, "interval_95": [score.low, score.high], "cases": score.cases}
+                key: {
+                    "value": score.value,
+                    "interval_95": [score.low, score.high],
+                    "cases": score.cases,
+                }
                 for key, score in result.scores.items()
             }
-            errors = {case.name: np.round(rows, 4).tolist() for case, rows in zip(cases, result.errors, strict=True)}
+            errors = {
+                case.name: np.round(rows, 4).tolist()
+                for case, rows in zip(cases, result.errors, strict=True)
+            }
             models[called] = {
                 "scores": scores,
                 "fitted": dict(result.fitted),
@@ -240,10 +302,18 @@ def to_dict(benchmark: Benchmark) -> dict[str, Any]:
                 "seconds": round(result.seconds, 2),
                 "errors": errors,
             }
-        tasks[name] = {"title": TASKS[name].title, "cases": len(cases), "models": models}
+        tasks[name] = {
+            "title": TASKS[name].title,
+            "cases": len(cases),
+            "models": models,
+        }
         if name == "pushes":
             tasks[name]["published"] = published(benchmark.folder)
         if REFERENCE in results:
             apart = differences(benchmark, name, REFERENCE)
             tasks[name]["minus"] = {"reference": REFERENCE, "models": apart}
-    return {"tasks": tasks, "left_out": list(benchmark.left_out), "seed": benchmark.seed}
+    return {
+        "tasks": tasks,
+        "left_out": list(benchmark.left_out),
+        "seed": benchmark.seed,
+    }

@@ -39,9 +39,13 @@ class EndRegions:
         The widths s maximise the likelihood of Laplace's distribution, whose scale drops out:
         `log mean(far/s) + mean(log s)`.
         """
-        tried = np.array(list(itertools.product(GROWTHS, repeat=2))) / np.median(moved, axis=0)
+        tried = np.array(list(itertools.product(GROWTHS, repeat=2))) / np.median(
+            moved, axis=0
+        )
         widths = np.stack([_widths(moved, growth) for growth in tried])[..., None]
-        misfits = np.log(np.mean(far / widths, axis=1)) + np.mean(np.log(widths), axis=1)
+        misfits = np.log(np.mean(far / widths, axis=1)) + np.mean(
+            np.log(widths), axis=1
+        )
         growth = tried[np.argmin(misfits, axis=0)].T
         unsized = cls(growth)
         return cls(growth, np.sort(far / unsized.widths(moved), axis=0))
@@ -77,4 +81,7 @@ def shares(inside: np.ndarray, moved: np.ndarray) -> list[float]:
     """Return the share [%] of `inside` `[K]` among all, and among the thirds of least to most turn, then length."""
     third = np.argsort(np.argsort(moved, axis=0), axis=0) * 3 // len(moved)
     groups = [third[:, 0] >= 0, *(third[:, i] == k for i in (0, 1) for k in range(3))]
-    return [100.0 * float(inside[group].mean()) if group.any() else float("nan") for group in groups]
+    return [
+        100.0 * float(inside[group].mean()) if group.any() else float("nan")
+        for group in groups
+    ]

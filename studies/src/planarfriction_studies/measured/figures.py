@@ -16,7 +16,11 @@ from planarfriction_studies.measured.tasks import TASKS
 DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
 """Models of an example, where they took part, besides those of the user."""
 
-COLOURS: dict[str, str] = dict(zip(DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PUBLISHED), strict=True))
+COLOURS: dict[str, str] = dict(
+    zip(
+        DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PUBLISHED), strict=True
+    )
+)
 """Model -> its colour; the others take what is left, one after the other."""
 
 
@@ -27,9 +31,13 @@ PEAKS = (0.8, 1.6)
 def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
     """Draw the picture of a task."""
     rows = len(benchmark.results[task])
-    figure = style.new_figure(10.0, max(3.2, 0.42 * rows + (3.4 if task == "slides" else 1.6)))
+    figure = style.new_figure(
+        10.0, max(3.2, 0.42 * rows + (3.4 if task == "slides" else 1.6))
+    )
     figure.set_layout_engine("constrained", w_pad=0.06)
-    parts: Any = figure.subfigures  # an array of them, which its annotation does not say
+    parts: Any = (
+        figure.subfigures
+    )  # an array of them, which its annotation does not say
     if task == "slides":
         above, below = parts(2, 1, height_ratios=(0.42 * rows + 1.0, 2.6))
         _dots(above, benchmark, task)
@@ -37,25 +45,44 @@ def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
     else:
         left, right = parts(1, 2, width_ratios=(1.5, 1.0))
         _dots(left, benchmark, task)
-        {"pushes": _draw_centres, "series": _draw_series, "onsets": _draw_onsets}[task](right, benchmark)
+        {"pushes": _draw_centres, "series": _draw_series, "onsets": _draw_onsets}[task](
+            right, benchmark
+        )
     return figure
 
 
 def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
     """Draw each measure of each model, with its interval."""
     results = benchmark.results[task]
-    measures = [m for m in TASKS[task].measures if all(m.key in result.scores for result in results.values())]
+    measures = [
+        m
+        for m in TASKS[task].measures
+        if all(m.key in result.scores for result in results.values())
+    ]
     every = part.subplots(1, len(measures), sharey=True, squeeze=False)[0]
     places = -np.arange(len(results))
     for axes, measure in zip(every, measures, strict=True):
         scores = [result.scores[measure.key] for result in results.values()]
         value = np.array([score.value for score in scores])
-        ends = np.array([[score.value - score.low, score.high - score.value] for score in scores]).T
-        axes.errorbar(value, places, xerr=np.maximum(ends, 0.0), fmt="o", color="0.25", markersize=5, elinewidth=1.2)
+        ends = np.array(
+            [[score.value - score.low, score.high - score.value] for score in scores]
+        ).T
+        axes.errorbar(
+            value,
+            places,
+            xerr=np.maximum(ends, 0.0),
+            fmt="o",
+            color="0.25",
+            markersize=5,
+            elinewidth=1.2,
+        )
         axes.set(xlim=(0.0, None), yticks=places, yticklabels=list(results))
         name, _, unit = measure.heading.partition(" [")
         axes.set_title(name.replace(", ", "\n"), fontsize="small", loc="left")
-        axes.set_xlabel(f"{measure.total.__name__} {measure.quantity}{unit and f' [{unit}'}", fontsize="small")
+        axes.set_xlabel(
+            f"{measure.total.__name__} {measure.quantity}{unit and f' [{unit}'}",
+            fontsize="small",
+        )
         axes.tick_params(labelsize="small")
         style.tidy(axes)
 
@@ -78,9 +105,12 @@ def _colours(chosen: Mapping[str, Any]) -> dict[str, str]:
 
 def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
     """Draw a few slides, measured and predicted: path and angle."""
-    test, chosen = benchmark.test("slides"), _chosen(benchmark, "slides")
+    test = benchmark.test("slides")
+    chosen = _chosen(benchmark, "slides")
     shown = slides.by_spin(test, count)
-    sure = next((name for name, result in chosen.items() if result.regions is not None), None)
+    sure = next(
+        (name for name, result in chosen.items() if result.regions is not None), None
+    )
     colours = _colours(chosen)
     widths = (1.2, 1.0) * count + (1.2,) * (sure is not None)
     every = part.subplots(1, len(widths), width_ratios=widths)
@@ -89,19 +119,40 @@ def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
     for i, case in enumerate(shown):
         way, turn = every[2 * i : 2 * i + 2]
         index = next(j for j, each in enumerate(test) if each is case)
-        first, time = case.answer[0], case.question.time
-        way.plot(*_shift(case.answer, first), color=style.MEASURED, linewidth=3.0, label="measured")
-        turn.plot(time, np.degrees(case.answer[:, 2] - first[2]), color=style.MEASURED, linewidth=3.0)
+        first = case.answer[0]
+        time = case.question.time
+        way.plot(
+            *_shift(case.answer, first),
+            color=style.MEASURED,
+            linewidth=3.0,
+            label="measured",
+        )
+        turn.plot(
+            time,
+            np.degrees(case.answer[:, 2] - first[2]),
+            color=style.MEASURED,
+            linewidth=3.0,
+        )
         for name, result in chosen.items():
-            colour, poses = colours[name], result.answers[index]
+            colour = colours[name]
+            poses = result.answers[index]
             turned = np.degrees(poses[:, 2] - first[2])
             way.plot(*_shift(poses, first), color=colour, linewidth=1.2, label=name)
             turn.plot(time, turned, color=colour, linewidth=1.2)
             if result.regions is not None:
-                edge = 1e3 * (poses[-1, :2] - first[:2] + ellipse(result.regions[index]))
+                edge = 1e3 * (
+                    poses[-1, :2] - first[:2] + ellipse(result.regions[index])
+                )
                 way.plot(*edge.T, color=colour, linewidth=0.9)
                 half = float(np.degrees(np.sqrt(result.regions[index][2, 2])))
-                turn.errorbar(time[-1], turned[-1], yerr=half, color=colour, elinewidth=0.9, capsize=2.5)
+                turn.errorbar(
+                    time[-1],
+                    turned[-1],
+                    yerr=half,
+                    color=colour,
+                    elinewidth=0.9,
+                    capsize=2.5,
+                )
         way.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
         way.set_adjustable("datalim")
         turn.set(xlabel="time [s]", ylabel="turned [deg]")
@@ -116,26 +167,41 @@ def _finish(part: Any, every: Any, columns: int) -> None:
         axes.tick_params(labelsize="small")
         axes.xaxis.label.set_fontsize("small")
         axes.yaxis.label.set_fontsize("small")
-    look = {"loc": "outside lower center", "ncols": columns, "frameon": False, "fontsize": "small"}
+    look = {
+        "loc": "outside lower center",
+        "ncols": columns,
+        "frameon": False,
+        "fontsize": "small",
+    }
     part.legend(*every[0].get_legend_handles_labels(), **look)
 
 
 def ellipse(region: np.ndarray) -> np.ndarray:
     """Return points `[P, 2]` on the edge of the region of a place, `d' S^-1 d = 1`."""
     angle = np.linspace(0.0, 2.0 * np.pi, 61)
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(region[:2, :2]).T
+    return (
+        np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        @ np.linalg.cholesky(region[:2, :2]).T
+    )
 
 
 def _draw_ends(axes: Any, test: Sequence[Case], result: Result, colour: str) -> None:
     """Draw the measured ends of all slides about the predicted ones, each in half axes of its own ellipse."""
     assert result.regions is not None
-    off = np.array([case.answer[-1] - poses[-1] for case, poses in zip(test, result.answers, strict=True)])[:, :2]
+    off = np.array(
+        [
+            case.answer[-1] - poses[-1]
+            for case, poses in zip(test, result.answers, strict=True)
+        ]
+    )[:, :2]
     squares, ways = np.linalg.eigh(result.regions[:, :2, :2])
     off = np.einsum("kij,ki->kj", ways, off) / np.sqrt(squares)
     axes.plot(*off[:, ::-1].T, ".", color="0.2", markersize=3)
     axes.plot(*ellipse(np.eye(3)).T, color=colour, linewidth=1.2)
     axes.set(aspect="equal", xlabel="along", ylabel="across")
-    axes.set_title(f"{len(test)} ends,\nin half axes", fontsize="small", loc="left", color=colour)
+    axes.set_title(
+        f"{len(test)} ends,\nin half axes", fontsize="small", loc="left", color=colour
+    )
 
 
 def _shift(poses: np.ndarray, first: np.ndarray) -> np.ndarray:
@@ -145,22 +211,41 @@ def _shift(poses: np.ndarray, first: np.ndarray) -> np.ndarray:
 
 def _draw_centres(part: Any, benchmark: Benchmark) -> None:
     """Draw the measured and predicted centres of rotation of the pushes of one layout on feet."""
-    test, axes = benchmark.test("pushes"), part.subplots()
+    test = benchmark.test("pushes")
+    axes = part.subplots()
     number = next((i for i, case in enumerate(test) if "hard_10_90_10" in case.name), 0)
     case = test[number]
     corners = case.question.patch.positions
     chosen = _chosen(benchmark, "pushes")
     name = "exact surface" if "exact surface" in chosen else list(chosen)[-1]
-    measured, predicted = 1e3 * centres(case.answer), 1e3 * centres(chosen[name].answers[number])
+    measured = 1e3 * centres(case.answer)
+    predicted = 1e3 * centres(chosen[name].answers[number])
     for start, end in zip(measured, predicted, strict=True):
         axes.plot(*np.stack([start, end], axis=1), color="0.8", linewidth=0.8, zorder=1)
     axes.plot(*measured.T, "o", color=style.MEASURED, markersize=5, label="measured")
     axes.plot(*predicted.T, "x", color=_colours(chosen)[name], markersize=5, label=name)
     if len(corners) < 10:
-        axes.plot(*1e3 * corners.T, "o", color="0.2", markersize=13, fillstyle="none", label="foot")
+        axes.plot(
+            *1e3 * corners.T,
+            "o",
+            color="0.2",
+            markersize=13,
+            fillstyle="none",
+            label="foot",
+        )
     limit = 1.6e3 * np.abs(corners).max()
-    axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
-    axes.set_title(f"centres of rotation, feet as in {case.question.layout}", fontsize="small", loc="left")
+    axes.set(
+        xlim=(-limit, limit),
+        ylim=(-limit, limit),
+        aspect="equal",
+        xlabel="x [mm]",
+        ylabel="y [mm]",
+    )
+    axes.set_title(
+        f"centres of rotation, feet as in {case.question.layout}",
+        fontsize="small",
+        loc="left",
+    )
     _finish(part, [axes], 3)
 
 
@@ -176,36 +261,70 @@ def _draw_series(part: Any, benchmark: Benchmark) -> None:
     from planarfriction_studies.measured.push_series import LENGTH
 
     test = benchmark.test("series")
-    number = max(range(len(test)), key=lambda i: len(test[i].scored) * (test[i].question.wanted == "wrenches"))
-    case, axes = test[number], part.subplots(2, 1, sharex=True)
-    time, rows = case.question.time[case.scored], case.scored
+    number = max(
+        range(len(test)),
+        key=lambda i: len(test[i].scored) * (test[i].question.wanted == "wrenches"),
+    )
+    case = test[number]
+    axes = part.subplots(2, 1, sharex=True)
+    time = case.question.time[case.scored]
+    rows = case.scored
     chosen = _chosen(benchmark, "series")
     colours = {"measured": style.MEASURED} | _colours(chosen)
-    for name, answer in {"measured": case.answer, **{n: r.answers[number] for n, r in chosen.items()}}.items():
+    for name, answer in {
+        "measured": case.answer,
+        **{n: r.answers[number] for n, r in chosen.items()},
+    }.items():
         fx, fy, tau = answer[rows].T
         way = np.unwrap(np.arctan2(fy, fx))
         turns = np.median(way) - np.median(np.arctan2(*case.answer[rows, 1::-1].T))
         way -= 2.0 * np.pi * np.round(turns / (2.0 * np.pi))
-        colour, width = colours[name], 3.0 if name == "measured" else 1.2
+        colour = colours[name]
+        width = 3.0 if name == "measured" else 1.2
         axes[0].plot(time, np.degrees(way), color=colour, linewidth=width, label=name)
-        axes[1].plot(time, np.degrees(np.arctan2(tau / LENGTH, np.hypot(fx, fy))), color=colour, linewidth=width)
+        axes[1].plot(
+            time,
+            np.degrees(np.arctan2(tau / LENGTH, np.hypot(fx, fy))),
+            color=colour,
+            linewidth=width,
+        )
     axes[0].set(ylabel="direction of force [deg]")
     axes[1].set(xlabel="time [s]", ylabel="torque against force [deg]")
-    axes[0].set_title(case.name.removesuffix(", wrenches"), fontsize="small", loc="left")
+    axes[0].set_title(
+        case.name.removesuffix(", wrenches"), fontsize="small", loc="left"
+    )
     _finish(part, axes, 2)
 
 
 def _draw_onsets(part: Any, benchmark: Benchmark) -> None:
     """Draw the peak of the force at breakaway over its level: measured against predicted, feet and flat faces."""
-    test, axes = benchmark.test("onsets"), part.subplots()
+    test = benchmark.test("onsets")
+    axes = part.subplots()
     results = benchmark.results["onsets"]
-    name = next((name for name in ("distributed", "reduced") if name in results), list(results)[-1])
+    name = next(
+        (name for name in ("distributed", "reduced") if name in results),
+        list(results)[-1],
+    )
     for board, colour in (("feet", style.OTHER), ("flat", style.PUBLISHED)):
         rows = [i for i, case in enumerate(test) if case.board == board]
-        pairs = np.array([[results[name].answers[i][3], test[i].answer[3]] for i in rows])
+        pairs = np.array(
+            [[results[name].answers[i][3], test[i].answer[3]] for i in rows]
+        )
         axes.plot(*pairs.T, ".", color=colour, label=board)
-        axes.plot(*np.median(pairs, axis=0), "o", color=colour, markersize=9, markeredgecolor="0.1")
+        axes.plot(
+            *np.median(pairs, axis=0),
+            "o",
+            color=colour,
+            markersize=9,
+            markeredgecolor="0.1",
+        )
     axes.plot(PEAKS, PEAKS, color="0.7", linewidth=0.8, zorder=1)
-    axes.set(xlim=PEAKS, ylim=PEAKS, aspect="equal", xlabel=f"peak over level, {name}", ylabel="measured")
+    axes.set(
+        xlim=PEAKS,
+        ylim=PEAKS,
+        aspect="equal",
+        xlabel=f"peak over level, {name}",
+        ylabel="measured",
+    )
     axes.set_title("breakaway; rings: medians", fontsize="small", loc="left")
     _finish(part, [axes], 2)

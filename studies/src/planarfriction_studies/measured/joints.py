@@ -22,17 +22,32 @@ SUPPLY, SAG = 7.34, 0.25
 
 def read_logs(folder: Path | None = None) -> list[JointLog]:
     """Read the eight logs, each with the servo that it was recorded with."""
-    rows = read_table("joints", ["log", "t", "q", "dq", "goal", "enabled"], folder=folder)
+    rows = read_table(
+        "joints", ["log", "t", "q", "dq", "goal", "enabled"], folder=folder
+    )
     about = read_table("joint logs", ["log", "kp"], ["trajectory"], folder=folder)
     logs = []
-    for log, kp, trajectory in zip(about["log"], about["kp"], about["trajectory"], strict=True):
+    for log, kp, trajectory in zip(
+        about["log"], about["kp"], about["trajectory"], strict=True
+    ):
         columns = rows[rows["log"] == log]
-        given = {name: columns[name].to_numpy() for name in ("q", "dq", "enabled", "goal")}
+        given = {
+            name: columns[name].to_numpy() for name in ("q", "dq", "enabled", "goal")
+        }
         drive = Drive(kp, SUPPLY, GAIN, SAG)
-        logs.append(JointLog(columns["t"].to_numpy(), **given, drive=drive, name=f"{trajectory}, kp {kp:.0f}"))
+        logs.append(
+            JointLog(
+                columns["t"].to_numpy(),
+                **given,
+                drive=drive,
+                name=f"{trajectory}, kp {kp:.0f}",
+            )
+        )
     return logs
 
 
-def fit_joints(folder: Path | None = None, *, progress: Callable[[str], None] | None = None) -> JointFit:
+def fit_joints(
+    folder: Path | None = None, *, progress: Callable[[str], None] | None = None
+) -> JointFit:
     """Fit the friction of the joint to the logs, with the terms that left-out logs ask for."""
     return identify_joint(read_logs(folder), PENDULUM, progress=progress)

@@ -6,10 +6,19 @@ import importlib.util
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceQuartic
+from planarfriction.limit_surface import (
+    LimitSurfaceEllipsoid,
+    LimitSurfaceExact,
+    LimitSurfaceQuartic,
+)
 from planarfriction.models import DistributedModel, ReducedModel
 from planarfriction_studies.measured.contactnets import SpeedModel, TossModel
-from planarfriction_studies.measured.models import BristleModel, PushedQuartic, SurfaceModel, UncoupledModel
+from planarfriction_studies.measured.models import (
+    BristleModel,
+    PushedQuartic,
+    SurfaceModel,
+    UncoupledModel,
+)
 from planarfriction_studies.measured.mujoco_box import MujocoBox
 
 
@@ -30,18 +39,49 @@ class Entry(NamedTuple):
 
 
 LIBRARY = {
-    "uncoupled": Entry(lambda: UncoupledModel(False), "separate limits of force and torque"),
-    "independent torsion": Entry(lambda: UncoupledModel(True), "the same with a fitted lever arm of the torque"),
-    "ellipsoid": Entry(lambda: SurfaceModel(LimitSurfaceEllipsoid), "an ellipsoid as limit surface"),
-    "quartic": Entry(lambda: SurfaceModel(LimitSurfaceQuartic), "a convex quartic of the patch", "cvxpy", "quartic"),
-    "quartic of pushes": Entry(PushedQuartic, "a convex quartic fitted to the training pushes", "cvxpy", "quartic"),
-    "exact surface": Entry(lambda: SurfaceModel(LimitSurfaceExact), "the limit surface of the patch itself"),
-    "reduced": Entry(lambda: BristleModel(ReducedModel), "ReducedModel, stiff bristles"),
-    "distributed": Entry(lambda: BristleModel(DistributedModel), "DistributedModel, stiff bristles"),
-    "mu(v) and radius": Entry(SpeedModel, "exact surface, friction that grows with speed, fitted radius (slides only)"),
-    "toss by toss": Entry(TossModel, "the same with the friction, radius and centre of each toss (slides only)"),
+    "uncoupled": Entry(
+        lambda: UncoupledModel(False), "separate limits of force and torque"
+    ),
+    "independent torsion": Entry(
+        lambda: UncoupledModel(True), "the same with a fitted lever arm of the torque"
+    ),
+    "ellipsoid": Entry(
+        lambda: SurfaceModel(LimitSurfaceEllipsoid), "an ellipsoid as limit surface"
+    ),
+    "quartic": Entry(
+        lambda: SurfaceModel(LimitSurfaceQuartic),
+        "a convex quartic of the patch",
+        "cvxpy",
+        "quartic",
+    ),
+    "quartic of pushes": Entry(
+        PushedQuartic,
+        "a convex quartic fitted to the training pushes",
+        "cvxpy",
+        "quartic",
+    ),
+    "exact surface": Entry(
+        lambda: SurfaceModel(LimitSurfaceExact), "the limit surface of the patch itself"
+    ),
+    "reduced": Entry(
+        lambda: BristleModel(ReducedModel), "ReducedModel, stiff bristles"
+    ),
+    "distributed": Entry(
+        lambda: BristleModel(DistributedModel), "DistributedModel, stiff bristles"
+    ),
+    "mu(v) and radius": Entry(
+        SpeedModel,
+        "exact surface, friction that grows with speed, fitted radius (slides only)",
+    ),
+    "toss by toss": Entry(
+        TossModel,
+        "the same with the friction, radius and centre of each toss (slides only)",
+    ),
     "MuJoCo box": Entry(
-        MujocoBox, "MuJoCo's own contact of a box, elliptic cone, condim 3 (slides only)", "mujoco", "mujoco"
+        MujocoBox,
+        "MuJoCo's own contact of a box, elliptic cone, condim 3 (slides only)",
+        "mujoco",
+        "mujoco",
     ),
 }
 """Models by name, from the simplest on."""
@@ -51,5 +91,7 @@ def library(left_out: list[str] | None = None) -> dict[str, Any]:
     """Return the library's models that are installed, by name; what is missing is added to `left_out`."""
     for name, entry in LIBRARY.items():
         if not entry.installed and left_out is not None:
-            left_out.append(f"{name}: needs {entry.needs}, pip install 'planarfriction[{entry.extra}]'")
+            left_out.append(
+                f"{name}: needs {entry.needs}, pip install 'planarfriction[{entry.extra}]'"
+            )
     return {name: entry.make() for name, entry in LIBRARY.items() if entry.installed}

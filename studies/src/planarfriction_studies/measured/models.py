@@ -17,13 +17,28 @@ import numpy as np
 
 from planarfriction.extend import sliding_batch
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitSurfaceQuartic
+from planarfriction.limit_surface import (
+    LimitSurface,
+    LimitSurfaceExact,
+    LimitSurfaceQuartic,
+)
 from planarfriction.limit_surface.base import scaling
 from planarfriction.limit_surface.comparison import directions
 from planarfriction.patch import ContactPatch
 from planarfriction_studies.measured.onsets import breaking, peaks, pushed_end
-from planarfriction_studies.measured.questions import BatchModel, Case, OnsetQuestion, SlideQuestion
-from planarfriction_studies.measured.slide_integrator import MU, TURNS, fit_slides, parabolas, slides
+from planarfriction_studies.measured.questions import (
+    BatchModel,
+    Case,
+    OnsetQuestion,
+    SlideQuestion,
+)
+from planarfriction_studies.measured.slide_integrator import (
+    MU,
+    TURNS,
+    fit_slides,
+    parabolas,
+    slides,
+)
 
 
 @functools.lru_cache(maxsize=64)
@@ -41,7 +56,9 @@ class SlideFit(BatchModel):
         if cases[0].question.task != "slides":
             return self
         model: Any = self
-        predict = lambda values, asked: dataclasses.replace(model, mu=float(values[0])).answer_all(asked)  # noqa: E731
+        predict = lambda values, asked: dataclasses.replace(
+            model, mu=float(values[0])
+        ).answer_all(asked)
         return dataclasses.replace(model, mu=float(fit_slides(predict, [MU], cases)[0]))
 
     def fitted_values(self) -> dict[str, float]:
@@ -66,17 +83,25 @@ class SurfaceModel(SlideFit):
             wrench = quick(made(self.surface, questions[0].patch))
             return slides(lambda twist, _: self.mu * wrench(twist), questions)
         if questions[0].task == "onsets":
-            return [np.append(pushed_end(made(self.surface, each.patch), each), 1.0) for each in questions]
-        return [_direction(made(self.surface, question.patch), question) for question in questions]
+            return [
+                np.append(pushed_end(made(self.surface, each.patch), each), 1.0)
+                for each in questions
+            ]
+        return [
+            _direction(made(self.surface, question.patch), question)
+            for question in questions
+        ]
 
 
 def quick(surface: LimitSurface) -> Callable[[np.ndarray], np.ndarray]:
     """Return a function that computes `surface.wrench` of twists `[K, 3]` in compiled loops, within 1e-5."""
-    numbers, frame = surface.numbers, scaling(surface.centre_of_pressure, surface.contact_radius)
+    numbers = surface.numbers
+    frame = scaling(surface.centre_of_pressure, surface.contact_radius)
 
     def wrench(twist: np.ndarray) -> np.ndarray:
         scaled = np.ascontiguousarray(twist @ frame.T)
-        sliding, speed = np.empty_like(scaled), np.linalg.norm(scaled, axis=1)
+        sliding = np.empty_like(scaled)
+        speed = np.linalg.norm(scaled, axis=1)
         sliding_batch(numbers.kind, numbers.data, 0, numbers.size, scaled, sliding)
         return -(sliding / np.where(speed > 0.0, speed, 1.0)[:, None]) @ frame
 
@@ -92,8 +117,11 @@ def _direction(surface: LimitSurface, question: Any) -> np.ndarray:
     """Return twists of wrenches of a pusher, or the other way round; zero where nothing is given."""
     given = _given(question)
     backwards = question.task == "pushes" or question.wanted == "twists"
-    moved, answer = np.abs(given).max(axis=1) > 0.0, np.zeros_like(given)
-    answer[moved] = surface.twist(-given[moved]) if backwards else -surface.wrench(given[moved])
+    moved = np.abs(given).max(axis=1) > 0.0
+    answer = np.zeros_like(given)
+    answer[moved] = (
+        surface.twist(-given[moved]) if backwards else -surface.wrench(given[moved])
+    )
     return answer
 
 
@@ -114,7 +142,9 @@ class UncoupledModel(SlideFit):
         if questions[0].task == "slides":
             lever = self._lever(questions[0])
             return slides(lambda twist, _: self.mu * uncoupled(twist, lever), questions)
-        return [self._direction(question, self._lever(question)) for question in questions]
+        return [
+            self._direction(question, self._lever(question)) for question in questions
+        ]
 
     def _fitted(self, cases: Sequence[Case]) -> BatchModel:
         """Fit friction coefficient and lever to the training cases."""
@@ -124,13 +154,21 @@ class UncoupledModel(SlideFit):
             return super()._fitted(cases)
         task = TASKS[cases[0].question.task]
         if task.name == "slides":
-            changed = lambda values: dataclasses.replace(self, mu=float(values[0]), share=float(values[1]))  # noqa: E731
-            predict = lambda values, asked: changed(values).answer_all(asked)  # noqa: E731
+            changed = lambda values: dataclasses.replace(
+                self, mu=float(values[0]), share=float(values[1])
+            )
+            predict = lambda values, asked: changed(values).answer_all(asked)
             return changed(fit_slides(predict, [self.mu, self.share], cases))
 
         def misfit(share: float) -> float:
             tried = dataclasses.replace(self, share=share)
-            return float(np.mean(np.concatenate([task.errors(case, tried(case.question)) for case in cases])))
+            return float(
+                np.mean(
+                    np.concatenate(
+                        [task.errors(case, tried(case.question)) for case in cases]
+                    )
+                )
+            )
 
         return dataclasses.replace(self, share=_least(misfit, 0.2, 5.0))
 
@@ -147,7 +185,9 @@ class UncoupledModel(SlideFit):
         if question.task == "series" and question.wanted == "wrenches":
             return -uncoupled(given, lever)
         turns = np.abs(given[:, 2]) / lever > np.hypot(given[:, 0], given[:, 1])
-        return np.where(turns[:, None], given * [0.0, 0.0, 1.0], given * [1.0, 1.0, 0.0])
+        return np.where(
+            turns[:, None], given * [0.0, 0.0, 1.0], given * [1.0, 1.0, 0.0]
+        )
 
 
 def _least(errors: Callable[[float], float], low: float, high: float) -> float:
@@ -161,7 +201,9 @@ def _least(errors: Callable[[float], float], low: float, high: float) -> float:
 def uncoupled(twist: np.ndarray, lever: float) -> np.ndarray:
     """Return the friction `(-v/|v|, -lever sign(omega))` of twists `[K, 3]`; none of either where it is zero."""
     speed = np.hypot(twist[:, 0], twist[:, 1])[:, None]
-    force = -np.divide(twist[:, :2], speed, out=np.zeros((len(twist), 2)), where=speed > 0.0)
+    force = -np.divide(
+        twist[:, :2], speed, out=np.zeros((len(twist), 2)), where=speed > 0.0
+    )
     return np.column_stack([force, -lever * np.sign(twist[:, 2])])
 
 
@@ -174,7 +216,9 @@ class PushedQuartic(BatchModel):
     made: Mapping[str, LimitSurface] = dataclasses.field(default_factory=dict)
 
     def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        return [_direction(self.made[_layout(question)], question) for question in questions]
+        return [
+            _direction(self.made[_layout(question)], question) for question in questions
+        ]
 
     def _fitted(self, cases: Sequence[Case]) -> PushedQuartic:
         """Fit a quartic to each layout of the training pushes, all of one size: that of the median limit force."""
@@ -182,13 +226,24 @@ class PushedQuartic(BatchModel):
         for case in cases:
             question = case.question
             if question.task == "pushes" or question.wanted == "twists":
-                pair = (question.patch, _given(question)[case.scored], case.answer[case.scored])
+                pair = (
+                    question.patch,
+                    _given(question)[case.scored],
+                    case.answer[case.scored],
+                )
                 pairs.setdefault(_layout(question), []).append(pair)
         quartics = {}
         for layout, parts in pairs.items():
-            patch, wrenches, twists = parts[0][0], *(np.concatenate([part[i] for part in parts]) for i in (1, 2))
-            power = np.einsum("mi,mi->m", wrenches, twists) / LimitSurfaceExact(patch).dissipation(twists)
-            quartics[layout] = LimitSurfaceQuartic.fit(-wrenches / np.median(power), twists, patch=patch)
+            patch, wrenches, twists = (
+                parts[0][0],
+                *(np.concatenate([part[i] for part in parts]) for i in (1, 2)),
+            )
+            power = np.einsum("mi,mi->m", wrenches, twists) / LimitSurfaceExact(
+                patch
+            ).dissipation(twists)
+            quartics[layout] = LimitSurfaceQuartic.fit(
+                -wrenches / np.median(power), twists, patch=patch
+            )
         return PushedQuartic(quartics)
 
 
@@ -201,7 +256,15 @@ def stiff(mu: float) -> LuGre:
 
     They deflect by mu um; ten times stiffer ones move no end of a slide by 0.03 mm or 0.02 deg.
     """
-    return LuGre(mu_c=mu, mu_s=mu, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0, elasto_plastic=ElastoPlastic(0.9))
+    return LuGre(
+        mu_c=mu,
+        mu_s=mu,
+        v_s=1e-3,
+        sigma_0=1e6,
+        sigma_1=20.0,
+        sigma_2=0.0,
+        elasto_plastic=ElastoPlastic(0.9),
+    )
 
 
 @dataclass(frozen=True)
@@ -223,11 +286,17 @@ class BristleModel(SlideFit):
     def _fitted(self, cases: Sequence[Case]) -> BatchModel:
         if cases[0].question.task != "onsets":
             return super()._fitted(cases)
-        tried, fine = np.linspace(1.0, LARGEST, 5), np.linspace(1.0, LARGEST, 81)
+        tried = np.linspace(1.0, LARGEST, 5)
+        fine = np.linspace(1.0, LARGEST, 81)
         ratios = []
         for board in ("feet", "flat"):
             own = [case for case in cases if case.board == board]
-            found = np.stack([self._peaks([case.question for case in own], [ratio] * 2) for ratio in tried])
+            found = np.stack(
+                [
+                    self._peaks([case.question for case in own], [ratio] * 2)
+                    for ratio in tried
+                ]
+            )
             off = _between(tried, found, fine) - [case.answer[3] for case in own]
             ratios.append(float(fine[np.argmin(np.abs(np.median(off, axis=1)))]))
         return dataclasses.replace(self, ratios=tuple(ratios))
@@ -236,29 +305,40 @@ class BristleModel(SlideFit):
         """Return the fitted numbers by name."""
         if self.ratios is None:
             return super().fitted_values()
-        return dict(zip(("mu_s/mu_c, feet", "mu_s/mu_c, flat face"), self.ratios, strict=True))
+        return dict(
+            zip(("mu_s/mu_c, feet", "mu_s/mu_c, flat face"), self.ratios, strict=True)
+        )
 
-    def _peaks(self, questions: Sequence[OnsetQuestion], ratios: Sequence[float]) -> np.ndarray:
+    def _peaks(
+        self, questions: Sequence[OnsetQuestion], ratios: Sequence[float]
+    ) -> np.ndarray:
         """Return simulated peaks `[K]` for static over kinetic friction of feet and of flat faces."""
         found = np.empty(len(questions))
         for patch in {id(each.patch): each.patch for each in questions}.values():
             rows = [i for i, each in enumerate(questions) if each.patch is patch]
             law = breaking(ratios[len(patch.positions) > FEET])
-            found[rows] = peaks(made(self.build, patch, law), [questions[i] for i in rows])
+            found[rows] = peaks(
+                made(self.build, patch, law), [questions[i] for i in rows]
+            )
         return found
 
     def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
         if questions[0].task == "onsets":
             ends = SurfaceModel(LimitSurfaceExact).answer_all(questions)
-            both = zip(ends, self._peaks(questions, self.ratios or (1.0, 1.0)), strict=True)
+            both = zip(
+                ends, self._peaks(questions, self.ratios or (1.0, 1.0)), strict=True
+            )
             return [np.append(end[:3], each) for end, each in both]
-        answers, law = [], stiff(self.mu)
+        answers = []
+        law = stiff(self.mu)
         for question in questions:
             model = made(self.build, question.patch, law)
             if question.task == "slides":
                 answers.append(_slide(model, question))
             elif question.task == "series" and question.wanted == "wrenches":
-                answers.append(-follow(model, question.time, question.given, question.normal_force))
+                answers.append(
+                    -follow(model, question.time, question.given, question.normal_force)
+                )
             else:
                 answers.append(twists_of(model, -_given(question)))
         return answers
@@ -301,15 +381,19 @@ WAY, SEGMENTS = 1e-3, 4
 
 def follow(model: Any, time: np.ndarray, twists: np.ndarray, load: float) -> np.ndarray:
     """Return the friction wrenches `[T, 3]` of a model that is moved from rest with the measured twists `[T, 3]`."""
-    state, wrenches = model.rest(), np.zeros_like(twists)
+    state = model.rest()
+    wrenches = np.zeros_like(twists)
     for i in range(1, len(time)):
-        state, wrenches[i] = model.step(state, 0.5 * (twists[i - 1] + twists[i]), load, float(time[i] - time[i - 1]))
+        state, wrenches[i] = model.step(
+            state, 0.5 * (twists[i - 1] + twists[i]), load, float(time[i] - time[i - 1])
+        )
     return wrenches
 
 
 def steady(model: Any, twists: np.ndarray, length: float) -> np.ndarray:
     """Return directions `(fx, fy, tau/length)` of the friction of steady motions along unit twists `[K, 3]`."""
-    state, wrenches = np.zeros((len(twists), *model.rest().shape)), np.zeros_like(twists)
+    state = np.zeros((len(twists), *model.rest().shape))
+    wrenches = np.zeros_like(twists)
     for _ in range(SEGMENTS):
         state, wrenches = model.step(state, twists, 1.0, WAY / SEGMENTS)
     return unit(wrenches / [1.0, 1.0, length])
@@ -318,16 +402,23 @@ def steady(model: Any, twists: np.ndarray, length: float) -> np.ndarray:
 def twists_of(model: Any, friction: np.ndarray) -> np.ndarray:
     """Return twists `[M, 3]` whose steady friction has the directions of `friction` `[M, 3]`, by search."""
     length = float(model.patch.contact_radius())
-    wanted, back = unit(friction / [1.0, 1.0, length]), np.array([1.0, 1.0, 1.0 / length])
+    wanted = unit(friction / [1.0, 1.0, length])
+    back = np.array([1.0, 1.0, 1.0 / length])
     tried = directions(DIRECTIONS)
     found = tried[np.argmax(wanted @ steady(model, tried * back, length).T, axis=1)]
-    random, size = np.random.default_rng(0), 0.06
+    random = np.random.default_rng(0)
+    size = 0.06
     for _ in range(ROUNDS):
         around = found[:, None] + size * random.normal(size=(len(found), NEAR, 3))
         around[:, 0] = found
         around = unit(around)
-        wrenches = steady(model, (around * back).reshape(-1, 3), length).reshape(around.shape)
-        found = around[np.arange(len(found)), np.einsum("mki,mi->mk", wrenches, wanted).argmax(axis=1)]
+        wrenches = steady(model, (around * back).reshape(-1, 3), length).reshape(
+            around.shape
+        )
+        found = around[
+            np.arange(len(found)),
+            np.einsum("mki,mi->mk", wrenches, wanted).argmax(axis=1),
+        ]
         size /= 4.0
     return found * back
 

@@ -49,26 +49,37 @@ class MujocoBox(SlideFit):
     mu: float = MU
 
     def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        return [self._poses(question, self._start(question), question.time) for question in questions]
+        return [
+            self._poses(question, self._start(question), question.time)
+            for question in questions
+        ]
 
     def _start(self, question: SlideQuestion) -> np.ndarray:
         """Improve the start by one Gauss-Newton step from a parabola through the first poses, as for other models."""
         time = question.time[:FIRST_POSES]
-        poses_of = lambda starts: np.array([self._poses(question, each, time) for each in starts])  # noqa: E731
-        begun, first = parabolas([question]), question.first[None]
+        poses_of = lambda starts: np.array(
+            [self._poses(question, each, time) for each in starts]
+        )
+        begun = parabolas([question])
+        first = question.first[None]
         return improved(poses_of, begun, first, question.inertia / question.mass)[0]
 
-    def _poses(self, question: SlideQuestion, start: np.ndarray, time: np.ndarray) -> np.ndarray:
+    def _poses(
+        self, question: SlideQuestion, start: np.ndarray, time: np.ndarray
+    ) -> np.ndarray:
         mujoco = _mujoco()
         half = 0.5 * float(np.sqrt(question.patch.areas.sum()))
-        model, data, rest = _box(self.mu, half, question.height, question.mass, question.inertia)
+        model, data, rest = _box(
+            self.mu, half, question.height, question.mass, question.inertia
+        )
         mujoco.mj_resetData(model, data)
         data.qpos[:] = rest
         data.qpos[:2] = start[:2]
         data.qpos[3:7] = [np.cos(0.5 * start[2]), 0.0, 0.0, np.sin(0.5 * start[2])]
         data.qvel[:] = [start[3], start[4], 0.0, 0.0, 0.0, start[5]]
         steps = int(np.ceil(time[-1] / STEP)) + 1
-        rows, angle = np.empty((steps + 1, 3)), start[2]
+        rows = np.empty((steps + 1, 3))
+        angle = start[2]
         rows[0] = start[:3]
         for i in range(1, steps + 1):
             mujoco.mj_step(model, data)
@@ -81,10 +92,14 @@ class MujocoBox(SlideFit):
 
 
 @functools.lru_cache(maxsize=8)
-def _box(mu: float, half: float, height: float, mass: float, inertia: float) -> tuple[Any, Any, np.ndarray]:
+def _box(
+    mu: float, half: float, height: float, mass: float, inertia: float
+) -> tuple[Any, Any, np.ndarray]:
     """Return the model, data, and the place of the box when it stands on the table."""
     mujoco = _mujoco()
-    scene = SCENE.format(step=STEP, mu=mu, height=height, half=half, mass=mass, inertia=inertia)
+    scene = SCENE.format(
+        step=STEP, mu=mu, height=height, half=half, mass=mass, inertia=inertia
+    )
     model = mujoco.MjModel.from_xml_string(scene)
     data = mujoco.MjData(model)
     for _ in range(int(SETTLED / STEP)):

@@ -51,21 +51,48 @@ MEASURES = (
 
 def read(folder: Path | None = None) -> list[Case]:
     """Read all pushes; answers are the final pose x, y, theta [m, m, rad] and the peak of the force over its level."""
-    start, end = (["obj_x0_m", "obj_y0_m", "obj_yaw0_rad"], ["obj_x1_m", "obj_y1_m", "obj_yaw1_rad"])
-    numbers = ["push", "edge", "pcx_m", "pcy_m", "ux", "uy", "speed_mps", "t_start_s", "t_contact_s", *start, *end]
-    table = read_table("onsets", [*numbers, "rise_N_per_s", "f_sustained_N"], ["config"], folder=folder)
+    start = ["obj_x0_m", "obj_y0_m", "obj_yaw0_rad"]
+    end = ["obj_x1_m", "obj_y1_m", "obj_yaw1_rad"]
+    numbers = [
+        "push",
+        "edge",
+        "pcx_m",
+        "pcy_m",
+        "ux",
+        "uy",
+        "speed_mps",
+        "t_start_s",
+        "t_contact_s",
+        *start,
+        *end,
+    ]
+    table = read_table(
+        "onsets", [*numbers, "rise_N_per_s", "f_sustained_N"], ["config"], folder=folder
+    )
     rows = ["t_s", "fx_N", "fy_N"]
-    forces = read_table("forces", ["push", *rows], ["config", "row"], folder=folder, optional=rows)
+    forces = read_table(
+        "forces", ["push", *rows], ["config", "row"], folder=folder, optional=rows
+    )
     series = dict(list(forces[forces["row"] == "F"].groupby(["config", "push"])))
-    patches = {case.question.layout: (case.question.patch, case.board) for case in pushes.read(folder)}
+    patches = {
+        case.question.layout: (case.question.patch, case.board)
+        for case in pushes.read(folder)
+    }
     cases = []
     for i, row in enumerate(table.itertuples()):
         name = f"{row.config} {row.push:g}"
         if row.config not in patches or (row.config, row.push) not in series:
-            raise refuse("onsets", folder, f"push {name} has no layout in the table of pushes or no force in time")
+            raise refuse(
+                "onsets",
+                folder,
+                f"push {name} has no layout in the table of pushes or no force in time",
+            )
         patch, board = patches[row.config]
         stiffness = row.rise_N_per_s / row.speed_mps
-        gone = row.speed_mps * (row.t_contact_s - row.t_start_s) + row.f_sustained_N / stiffness
+        gone = (
+            row.speed_mps * (row.t_contact_s - row.t_start_s)
+            + row.f_sustained_N / stiffness
+        )
         question = OnsetQuestion(
             patch,
             TRIANGLE,
@@ -79,12 +106,21 @@ def read(folder: Path | None = None) -> list[Case]:
             INERTIA,
         )
         force = series[row.config, row.push]
-        over = peak(force["t_s"].to_numpy() - row.t_contact_s, np.hypot(force["fx_N"], force["fy_N"]).to_numpy())
+        over = peak(
+            force["t_s"].to_numpy() - row.t_contact_s,
+            np.hypot(force["fx_N"], force["fy_N"]).to_numpy(),
+        )
         if not np.isfinite(over):
-            raise refuse("forces", folder, f"push {name} needs forces from 0 to {LEVEL[0]:g} s after touch and later")
+            raise refuse(
+                "forces",
+                folder,
+                f"push {name} needs forces from 0 to {LEVEL[0]:g} s after touch and later",
+            )
         answer = np.array([*(getattr(row, each) for each in end), over])
         kind = "flat" if board == "flat" else "feet"
-        cases.append(Case(question, answer, name, f"{4 * i + i % 2}", np.arange(1), kind))  # half of them to fit to
+        cases.append(
+            Case(question, answer, name, f"{4 * i + i % 2}", np.arange(1), kind)
+        )  # half of them to fit to
     return cases
 
 
@@ -124,13 +160,23 @@ def pushed_end(surface: LimitSurface, question: OnsetQuestion) -> np.ndarray:
     way = question.travel * question.velocity / np.hypot(*question.velocity)
     path = Signal.sampled([0.0, 1.0], [begin, begin + way], "linear")
     slider = Slider(surface, question.outline)
-    return push(slider, Pusher(MU_FINGER), path, start=question.start, samples=2, rtol=1e-5).end
+    return push(
+        slider, Pusher(MU_FINGER), path, start=question.start, samples=2, rtol=1e-5
+    ).end
 
 
 def breaking(ratio: float) -> LuGre:
     """Return a law whose static friction is `ratio` times the kinetic one."""
     damped = ElastoPlastic(0.9)
-    return LuGre(MU, MU * ratio, V_S, sigma_0=STIFFNESS, sigma_1=VISCOSITY, sigma_2=0.0, elasto_plastic=damped)
+    return LuGre(
+        MU,
+        MU * ratio,
+        V_S,
+        sigma_0=STIFFNESS,
+        sigma_1=VISCOSITY,
+        sigma_2=0.0,
+        elasto_plastic=damped,
+    )
 
 
 def peaks(model: Any, questions: Sequence[OnsetQuestion]) -> np.ndarray:
@@ -141,21 +187,30 @@ def peaks(model: Any, questions: Sequence[OnsetQuestion]) -> np.ndarray:
     object moves by 1 mm meanwhile.
     """
     first = questions[0]
-    mass, radii = first.mass, np.array([first.mass, first.mass, first.inertia])
+    mass = first.mass
+    radii = np.array([first.mass, first.mass, first.inertia])
     stiffness = np.array([each.stiffness for each in questions])[:, None]
     damping = 2.0 * DAMPING * np.sqrt(stiffness * mass)
     drive = np.array([rotate(each.velocity, -each.start[2]) for each in questions])
     x, y = np.array([each.place for each in questions]).T
     normal = np.array([each.normal for each in questions])
     along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-    state, twist = np.zeros((len(questions), *model.rest().shape)), np.zeros((len(questions), 3))
-    stretch, found = np.zeros((len(questions), 2)), np.empty((STEPS, len(questions)))
+    state = np.zeros((len(questions), *model.rest().shape))
+    twist = np.zeros((len(questions), 3))
+    stretch = np.zeros((len(questions), 2))
+    found = np.empty((STEPS, len(questions)))
     for i in range(STEPS):
-        rate = drive - np.stack([twist[:, 0] - twist[:, 2] * y, twist[:, 1] + twist[:, 2] * x], axis=1)
+        rate = drive - np.stack(
+            [twist[:, 0] - twist[:, 2] * y, twist[:, 1] + twist[:, 2] * x], axis=1
+        )
         stretch = stretch + STEP * rate
         force = stiffness * stretch + damping * rate
         across = np.maximum(np.sum(force * normal, axis=1), 0.0)[:, None]
-        slip = np.clip(np.sum(force * along, axis=1)[:, None], -MU_FINGER * across, MU_FINGER * across)
+        slip = np.clip(
+            np.sum(force * along, axis=1)[:, None],
+            -MU_FINGER * across,
+            MU_FINGER * across,
+        )
         held = across * normal + slip * along
         stretch = stretch + (held - force) / stiffness
         state, wrench = model.step(state, twist, mass * GRAVITY, STEP)

@@ -35,10 +35,34 @@ WINDOW, EVERY = 0.25, 6
 """Half width of the Hann window over the force [s]; every sixth sliding row is scored: neighbours are correlated."""
 
 MEASURES = (
-    Measure("twist_named_deg", "twist, named feet [deg]", mean, "twists named", quantity="angle"),
-    Measure("wrench_named_deg", "wrench, named feet [deg]", mean, "wrenches named", quantity="angle"),
-    Measure("twist_other_deg", "twist, other runs [deg]", mean, "twists other", quantity="angle"),
-    Measure("wrench_other_deg", "wrench, other runs [deg]", mean, "wrenches other", quantity="angle"),
+    Measure(
+        "twist_named_deg",
+        "twist, named feet [deg]",
+        mean,
+        "twists named",
+        quantity="angle",
+    ),
+    Measure(
+        "wrench_named_deg",
+        "wrench, named feet [deg]",
+        mean,
+        "wrenches named",
+        quantity="angle",
+    ),
+    Measure(
+        "twist_other_deg",
+        "twist, other runs [deg]",
+        mean,
+        "twists other",
+        quantity="angle",
+    ),
+    Measure(
+        "wrench_other_deg",
+        "wrench, other runs [deg]",
+        mean,
+        "wrenches other",
+        quantity="angle",
+    ),
 )
 """Mean angle over the scored rows of all pushes."""
 
@@ -50,11 +74,15 @@ def feet() -> ContactPatch:
 
 def read(folder: Path | None = None) -> list[Case]:
     """Read two cases for each push: its twists and its wrenches."""
-    motion, force = ["vx_mps", "vy_mps", "wz_radps"], ["fx_N", "fy_N", "tau_Nm"]
+    motion = ["vx_mps", "vy_mps", "wz_radps"]
+    force = ["fx_N", "fy_N", "tau_Nm"]
     columns = ["push_id", "t_s", "yaw_rad", *motion, *force, "sliding"]
     table = read_table("series", columns, ["run"], folder=folder)
-    patch, cases = feet(), []
-    for (run, number), rows in table[~table["run"].isin(OTHER_FEET)].groupby(["run", "push_id"], sort=False):
+    patch = feet()
+    cases = []
+    for (run, number), rows in table[~table["run"].isin(OTHER_FEET)].groupby(
+        ["run", "push_id"], sort=False
+    ):
         time = rows["t_s"].to_numpy() - rows["t_s"].iloc[0]
         scored = np.flatnonzero(rows["sliding"].to_numpy() > 0)[::EVERY]
         if not len(scored):
@@ -67,13 +95,16 @@ def read(folder: Path | None = None) -> list[Case]:
         for wanted, given, answer in pairs:
             question = SeriesQuestion(time, given, wanted, patch, WEIGHT)
             name = f"push {number:g} of {run}, {wanted}"
-            cases.append(Case(question, answer, name, f"{number:g}", scored, f"{wanted} {kind}"))
+            cases.append(
+                Case(question, answer, name, f"{number:g}", scored, f"{wanted} {kind}")
+            )
     return cases
 
 
 def to_object(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Return the world vectors `(x, y, about z)` `[T, 3]` in the axes of the object."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
+    cos = np.cos(yaw)
+    sin = np.sin(yaw)
     x, y, about = vectors.T
     return np.stack([cos * x + sin * y, cos * y - sin * x, about], axis=1)
 

@@ -106,7 +106,9 @@ class OnsetQuestion:
     @property
     def normal(self) -> np.ndarray:
         """Unit normal of the touched edge, into the object `[2]`."""
-        x, y = self.outline[(self.edge + 1) % len(self.outline)] - self.outline[self.edge]
+        x, y = (
+            self.outline[(self.edge + 1) % len(self.outline)] - self.outline[self.edge]
+        )
         return np.array([-y, x]) / np.hypot(x, y)
 
 

@@ -35,7 +35,9 @@ def rms(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
 
 def mean(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
     """Return the mean of values `[N]`, with weights `[..., N]`."""
-    return np.mean(values) if weights is None else weights @ values / weights.sum(axis=-1)
+    return (
+        np.mean(values) if weights is None else weights @ values / weights.sum(axis=-1)
+    )
 
 
 def median(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
@@ -49,14 +51,19 @@ def median(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
 
 def angles(first: np.ndarray, second: np.ndarray, length: float) -> np.ndarray:
     """Return angles [deg] between rows `(x, y, length z)` `[M, 3]`; a row of zeros is 90 deg off everything."""
-    a, b = first * [1.0, 1.0, length], second * [1.0, 1.0, length]
-    return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("mi,mi->m", a, b)))
+    a = first * [1.0, 1.0, length]
+    b = second * [1.0, 1.0, length]
+    return np.degrees(
+        np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("mi,mi->m", a, b))
+    )
 
 
 def drawings(groups: Sequence[str], seed: int) -> np.ndarray:
     """Draw counts of each of N cases, `[SAMPLES, N]`: bootstrap samples of whole groups, with replacement."""
     names, which = np.unique(np.asarray(groups), return_inverse=True)
-    drawn = np.random.default_rng(seed).multinomial(len(names), np.full(len(names), 1 / len(names)), size=SAMPLES)
+    drawn = np.random.default_rng(seed).multinomial(
+        len(names), np.full(len(names), 1 / len(names)), size=SAMPLES
+    )
     return drawn[:, which].astype(float)
 
 

@@ -34,7 +34,9 @@ Friction = Callable[[np.ndarray, np.ndarray], np.ndarray]
 The second argument are numbers of each slide's own, `[K, P]`, the columns of its start behind pose and twist."""
 
 
-def integrate(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_squared: float) -> np.ndarray:
+def integrate(
+    friction: Friction, starts: np.ndarray, time: np.ndarray, radius_squared: float
+) -> np.ndarray:
     """Integrate slides: poses `[K, T, 3]` at `time` `[T]` from 0 from `starts` `[K, 6 + P]`: pose, twist, numbers of
     their own.
 
@@ -43,27 +45,41 @@ def integrate(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_s
     """
     end = float(time[-1])
     steps = max(int(np.ceil(end / STEP)), 1)
-    step, state, own = end / steps, starts[:, :6].copy(), starts[:, 6:]
+    step = end / steps
+    state = starts[:, :6].copy()
+    own = starts[:, 6:]
     per = GRAVITY * np.array([1.0, 1.0, 1.0 / radius_squared])
     energy = np.array([1.0, 1.0, radius_squared])
 
     def rates(state: np.ndarray, own: np.ndarray) -> np.ndarray:
-        cos, sin = np.cos(state[:, 2]), np.sin(state[:, 2])
+        cos = np.cos(state[:, 2])
+        sin = np.sin(state[:, 2])
         vx, vy, omega = state[:, 3:].T
-        fx, fy, tau = friction(np.stack([cos * vx + sin * vy, cos * vy - sin * vx, omega], axis=1), own).T
+        fx, fy, tau = friction(
+            np.stack([cos * vx + sin * vy, cos * vy - sin * vx, omega], axis=1), own
+        ).T
         return np.concatenate(
-            [state[:, 3:], np.stack([cos * fx - sin * fy, sin * fx + cos * fy, tau], 1) * per], axis=1
+            [
+                state[:, 3:],
+                np.stack([cos * fx - sin * fy, sin * fx + cos * fy, tau], 1) * per,
+            ],
+            axis=1,
         )
 
-    states, moving = np.empty((steps + 1, *state.shape)), np.ones(len(state), dtype=bool)
+    states = np.empty((steps + 1, *state.shape))
+    moving = np.ones(len(state), dtype=bool)
     states[0] = state
     for i in range(steps):
-        now, state = state[moving], state.copy()
+        now = state[moving]
+        state = state.copy()
         if len(now):
             mine = own[moving]
             a = rates(now, mine)
-            speed, brake = np.sqrt(now[:, 3:] ** 2 @ energy), np.sqrt(a[:, 3:] ** 2 @ energy)
-            left = np.divide(speed, brake, out=np.full(len(now), np.inf), where=brake > 0.0)
+            speed = np.sqrt(now[:, 3:] ** 2 @ energy)
+            brake = np.sqrt(a[:, 3:] ** 2 @ energy)
+            left = np.divide(
+                speed, brake, out=np.full(len(now), np.inf), where=brake > 0.0
+            )
             stops = left <= step
             b = rates(now + 0.5 * step * a, mine)
             c = rates(now + 0.5 * step * b, mine)
@@ -82,7 +98,10 @@ def _between(states: np.ndarray, step: float, time: np.ndarray) -> np.ndarray:
     left = np.clip((time / step).astype(int), 0, len(states) - 2)
     share = (time / step - left)[:, None, None]
     rest = 1.0 - share
-    p0, p1, v0, v1 = states[left, :, :3], states[left + 1, :, :3], states[left, :, 3:], states[left + 1, :, 3:]
+    p0 = states[left, :, :3]
+    p1 = states[left + 1, :, :3]
+    v0 = states[left, :, 3:]
+    v1 = states[left + 1, :, 3:]
     poses = (1.0 + 2.0 * share) * rest**2 * p0 + share**2 * (3.0 - 2.0 * share) * p1
     return np.moveaxis(poses + step * share * rest * (rest * v0 - share * v1), 0, 1)
 
@@ -91,13 +110,17 @@ def parabolas(questions: Sequence[SlideQuestion]) -> np.ndarray:
     """Return starts `[K, 6]`: pose and velocity at the first sample of a parabola through the first poses."""
     found = []
     for question in questions:
-        fit = np.polynomial.polynomial.polyfit(question.time[:FIRST_POSES], question.first, 2)
+        fit = np.polynomial.polynomial.polyfit(
+            question.time[:FIRST_POSES], question.first, 2
+        )
         found.append(np.concatenate([fit[0], fit[1]]))
     return np.array(found)
 
 
 def linearised(
-    poses_of: Callable[[np.ndarray], np.ndarray], starts: np.ndarray, changes: np.ndarray
+    poses_of: Callable[[np.ndarray], np.ndarray],
+    starts: np.ndarray,
+    changes: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return poses `[K, T, 3]` of `starts` `[K, N]` and their derivatives `[K, T, 3, N]` to the starts.
 
@@ -105,33 +128,57 @@ def linearised(
     all starts.
     """
     size = starts.shape[1]
-    moved = (starts + change * row for change, row in zip(changes, np.eye(size)[3:], strict=True))
+    moved = (
+        starts + change * row
+        for change, row in zip(changes, np.eye(size)[3:], strict=True)
+    )
     found = poses_of(np.concatenate([starts, *moved]))
     poses = found.reshape(size - 2, len(starts), *found.shape[1:])
     slopes = np.zeros((*poses.shape[1:], size))
     slopes[..., [0, 1, 2], [0, 1, 2]] = 1.0
-    slopes[..., 3:] = np.moveaxis((poses[1:] - poses[0]) / changes[:, None, None, None], 0, -1)
+    slopes[..., 3:] = np.moveaxis(
+        (poses[1:] - poses[0]) / changes[:, None, None, None], 0, -1
+    )
     return poses[0], slopes
 
 
-def improved(poses_of: Callable[[np.ndarray], np.ndarray], found: np.ndarray, first: np.ndarray, radius_squared: float):
+def improved(
+    poses_of: Callable[[np.ndarray], np.ndarray],
+    found: np.ndarray,
+    first: np.ndarray,
+    radius_squared: float,
+):
     """Return starts `[K, 6]` one Gauss-Newton step nearer to those that go through the `first` poses `[K, T, 3]` best.
 
     An angle counts as its way at the radius of gyration.
     """
     weights = np.array([1.0, 1.0, np.sqrt(radius_squared)])
     poses, slopes = linearised(poses_of, found, CHANGES)
-    rows, off = slopes * weights[:, None], (first - poses) * weights
+    rows = slopes * weights[:, None]
+    off = (first - poses) * weights
     normal = np.einsum("ktci,ktcj->kij", rows, rows)
-    return found + np.linalg.solve(normal, np.einsum("ktci,ktc->ki", rows, off)[..., None])[..., 0]
+    return (
+        found
+        + np.linalg.solve(normal, np.einsum("ktci,ktc->ki", rows, off)[..., None])[
+            ..., 0
+        ]
+    )
 
 
-def starts(friction: Friction, questions: Sequence[SlideQuestion], radius_squared: float) -> np.ndarray:
+def starts(
+    friction: Friction, questions: Sequence[SlideQuestion], radius_squared: float
+) -> np.ndarray:
     """Return starts `[K, 6]` with which slides go through their first poses best: least squares over pose and twist."""
-    found, first = parabolas(questions), np.array([each.first for each in questions])
+    found = parabolas(questions)
+    first = np.array([each.first for each in questions])
     time = questions[0].time[:FIRST_POSES]
     for _ in range(TURNS):
-        found = improved(lambda each: integrate(friction, each, time, radius_squared), found, first, radius_squared)
+        found = improved(
+            lambda each: integrate(friction, each, time, radius_squared),
+            found,
+            first,
+            radius_squared,
+        )
     return found
 
 
@@ -152,12 +199,16 @@ Slides = Callable[[np.ndarray, Sequence[SlideQuestion]], list[np.ndarray]]
 """Poses `[T, 3]` of slides for given numbers."""
 
 
-def fit_slides(predict: Slides, begin: Sequence[float], cases: Sequence[Case]) -> np.ndarray:
+def fit_slides(
+    predict: Slides, begin: Sequence[float], cases: Sequence[Case]
+) -> np.ndarray:
     """Return numbers with the least errors of the end, by Huber's loss: position, and yaw at the contact radius."""
     from scipy.optimize import least_squares
 
-    questions, ends = [case.question for case in cases], np.array([case.answer[-1] for case in cases])
-    scale, length = np.asarray(begin, dtype=float), questions[0].patch.contact_radius()
+    questions = [case.question for case in cases]
+    ends = np.array([case.answer[-1] for case in cases])
+    scale = np.asarray(begin, dtype=float)
+    length = questions[0].patch.contact_radius()
 
     def off(shares: np.ndarray) -> np.ndarray:
         found = np.array([poses[-1] for poses in predict(shares * scale, questions)])

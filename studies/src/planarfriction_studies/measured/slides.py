@@ -41,14 +41,28 @@ def read(folder: Path | None = None) -> list[Case]:
     table = read_table("slides", ["toss", "unique_id", "t_s", *pose], folder=folder)
     cases = []
     for number, rows in table.groupby("toss"):
-        time, poses = rows["t_s"].to_numpy() - rows["t_s"].iloc[0], rows[pose].to_numpy()
+        time = rows["t_s"].to_numpy() - rows["t_s"].iloc[0]
+        poses = rows[pose].to_numpy()
         if len(time) <= FIRST_POSES or (np.diff(time) <= 0.0).any():
             raise refuse(
-                "slides", folder, f"toss {number:g} needs more than {FIRST_POSES} samples, at increasing times"
+                "slides",
+                folder,
+                f"toss {number:g} needs more than {FIRST_POSES} samples, at increasing times",
             )
-        question = SlideQuestion(time, poses[:FIRST_POSES], face(), MASS, INERTIA, 0.5 * SIDE)
+        question = SlideQuestion(
+            time, poses[:FIRST_POSES], face(), MASS, INERTIA, 0.5 * SIDE
+        )
         group = int(rows["unique_id"].iloc[0])
-        cases.append(Case(question, poses, f"toss {number:g}", f"{group}", np.arange(len(time)), "table"))
+        cases.append(
+            Case(
+                question,
+                poses,
+                f"toss {number:g}",
+                f"{group}",
+                np.arange(len(time)),
+                "table",
+            )
+        )
     return cases
 
 
@@ -57,18 +71,24 @@ def refused(cases: Sequence[Case]) -> dict[int, str]:
 
     Returns reasons by index.
     """
-    measured = [Slide(case.question.time, case.answer, name=case.name) for case in cases]
+    measured = [
+        Slide(case.question.time, case.answer, name=case.name) for case in cases
+    ]
     return contradictions(measured, MassProperties(MASS, INERTIA))
 
 
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:
     """Return one row: RMS position [mm] and yaw [deg] over the samples, then both at the last one, `[1, 4]`."""
     off = answer - case.answer
-    position, yaw = 1e3 * np.hypot(off[:, 0], off[:, 1]), np.degrees(np.abs(off[:, 2]))
+    position = 1e3 * np.hypot(off[:, 0], off[:, 1])
+    yaw = np.degrees(np.abs(off[:, 2]))
     return np.array([[rms(position), rms(yaw), position[-1], yaw[-1]]])
 
 
 def by_spin(cases: Sequence[Case], count: int) -> list[Case]:
     """Return `count` slides from the median turn to the largest, to draw."""
     turned = sorted(cases, key=lambda case: abs(case.answer[-1, 2] - case.answer[0, 2]))
-    return [turned[i] for i in np.linspace(len(turned) // 2, len(turned) - 1, count).astype(int)]
+    return [
+        turned[i]
+        for i in np.linspace(len(turned) // 2, len(turned) - 1, count).astype(int)
+    ]

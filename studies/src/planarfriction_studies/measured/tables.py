@@ -32,7 +32,12 @@ def shipped() -> Any:
 
 
 def read_table(
-    name: str, numbers: Sequence[str], words: Sequence[str] = (), *, folder: Path | None = None, optional=()
+    name: str,
+    numbers: Sequence[str],
+    words: Sequence[str] = (),
+    *,
+    folder: Path | None = None,
+    optional=(),
 ) -> Any:  # a pandas.DataFrame, whose type no checker follows
     """Read columns of the table `name`: `numbers` as finite numbers (but for those of `optional`), `words` as they are.
 
@@ -43,20 +48,33 @@ def read_table(
     file = (shipped() if folder is None else Path(folder)) / TABLES[name]
     try:
         with file.open("rb") as opened:
-            found: Any = pd.read_csv(opened, compression="gzip" if TABLES[name].endswith(".gz") else None)
+            found: Any = pd.read_csv(
+                opened, compression="gzip" if TABLES[name].endswith(".gz") else None
+            )
     except FileNotFoundError:
         raise FileError(f"{file}: no such file") from None
-    except (OSError, EOFError, ValueError, zlib.error) as error:  # a folder, a broken archive, no text, no table
-        raise FileError(f"{file}: cannot be read as a table: {' '.join(str(error).split())}") from None
+    except (
+        OSError,
+        EOFError,
+        ValueError,
+        zlib.error,
+    ) as error:  # a folder, a broken archive, no text, no table
+        raise FileError(
+            f"{file}: cannot be read as a table: {' '.join(str(error).split())}"
+        ) from None
     needed = [*words, *numbers]
     if missing := [column for column in needed if column not in found]:
-        raise FileError(f"{file}: has no column {', '.join(missing)}; needed are {', '.join(needed)}")
+        raise FileError(
+            f"{file}: has no column {', '.join(missing)}; needed are {', '.join(needed)}"
+        )
     found = found[needed].copy()
     found[list(numbers)] = found[list(numbers)].apply(pd.to_numeric, errors="coerce")
     checked = [column for column in numbers if column not in optional]
     bad = np.argwhere(~np.isfinite(found[checked].to_numpy(dtype=float)))
     if len(bad):
-        raise FileError(f"{file}: column {checked[bad[0, 1]]}, row {bad[0, 0] + 1} below the heading: not a number")
+        raise FileError(
+            f"{file}: column {checked[bad[0, 1]]}, row {bad[0, 0] + 1} below the heading: not a number"
+        )
     if not len(found):
         raise FileError(f"{file}: has no rows")
     return found
@@ -64,4 +82,6 @@ def read_table(
 
 def refuse(name: str, folder: Path | None, what: str) -> FileError:
     """Return an error about the table `name`."""
-    return FileError(f"{(shipped() if folder is None else Path(folder)) / TABLES[name]}: {what}")
+    return FileError(
+        f"{(shipped() if folder is None else Path(folder)) / TABLES[name]}: {what}"
+    )

@@ -30,10 +30,23 @@ class Task(NamedTuple):
 TASKS = {
     name: Task(name, title, module.read, module.errors, module.MEASURES, *refused)
     for name, title, module, *refused in (
-        ("slides", "Free slides of a cube: path and end from the first 8 poses", slides, slides.refused),
+        (
+            "slides",
+            "Free slides of a cube: path and end from the first 8 poses",
+            slides,
+            slides.refused,
+        ),
         ("pushes", "Slow pushes on known feet: angle to the measured twist", pushes),
-        ("series", "Pushes over time: angles to the measured twist and wrench", push_series),
-        ("onsets", "Pushes from touch: final pose, and peak of the force at breakaway", onsets),
+        (
+            "series",
+            "Pushes over time: angles to the measured twist and wrench",
+            push_series,
+        ),
+        (
+            "onsets",
+            "Pushes from touch: final pose, and peak of the force at breakaway",
+            onsets,
+        ),
     )
 }
 """Task by name."""

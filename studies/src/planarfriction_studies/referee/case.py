@@ -51,7 +51,10 @@ class Shape:
             return 0.5 * np.array(self.size)
         radius, length = (*self.size, 0.0)[:2]
         along = np.array(self.axis)
-        return radius * (1.0 - along) + (0.5 * length + (radius if self.kind != "cylinder" else 0.0)) * along
+        return (
+            radius * (1.0 - along)
+            + (0.5 * length + (radius if self.kind != "cylinder" else 0.0)) * along
+        )
 
 
 @dataclass(frozen=True)
@@ -121,8 +124,12 @@ class Force:
 
     def value(self, t: float) -> np.ndarray:
         """Return force and torque at a time [s]."""
-        linear = [np.interp(t, self.times, column) for column in np.array(self.values).T]
-        return np.array(linear) + math.sin(2.0 * math.pi * self.frequency * t + self.phase) * np.array(self.amplitude)
+        linear = [
+            np.interp(t, self.times, column) for column in np.array(self.values).T
+        ]
+        return np.array(linear) + math.sin(
+            2.0 * math.pi * self.frequency * t + self.phase
+        ) * np.array(self.amplitude)
 
 
 @dataclass(frozen=True)
@@ -182,9 +189,13 @@ class Case:
     @cached_property
     def shapes(self) -> dict[str, tuple[Body, Shape]]:
         """Shapes by name, with their bodies."""
-        return {shape.name: (body, shape) for body in self.bodies for shape in body.shapes}
+        return {
+            shape.name: (body, shape) for body in self.bodies for shape in body.shapes
+        }
 
-    def wrenches(self, t: float | None, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    def wrenches(
+        self, t: float | None, positions: np.ndarray, rotations: np.ndarray
+    ) -> np.ndarray:
         """Return force and torque at the centres of mass `[bodies, 6]` beside gravity; None: for the settling time."""
         result = np.zeros((len(self.moving), 6))
         for row, body, rotation in zip(result, self.moving, rotations, strict=True):
@@ -192,11 +203,15 @@ class Case:
             if t is None:
                 row[:2] = -body.mass * gravity[:2]
             elif body.tilt:
-                turned = gravity[2] * np.array([-math.sin(body.tilt), 0.0, math.cos(body.tilt)])
+                turned = gravity[2] * np.array(
+                    [-math.sin(body.tilt), 0.0, math.cos(body.tilt)]
+                )
                 row[:3] = body.mass * (turned - gravity)
             for force in self.forces:
                 if force.body == body.name:
-                    value = force.value(t or 0.0) * (1.0 if t is not None else np.array([0, 0, 1, 0, 0, 0]))
+                    value = force.value(t or 0.0) * (
+                        1.0 if t is not None else np.array([0, 0, 1, 0, 0, 0])
+                    )
                     row += value
                     if force.at is not None:
                         lever = rotation @ (np.array(force.at) - body.centre_of_mass)
@@ -211,7 +226,11 @@ class Case:
         lengths = np.hypot(*moved.T)
         half = len(lengths) // 2
         if truth.quantity in ("slips", "turns"):
-            return _first(path.times, lengths if truth.quantity == "slips" else np.abs(turned), truth.threshold)
+            return _first(
+                path.times,
+                lengths if truth.quantity == "slips" else np.abs(turned),
+                truth.threshold,
+            )
         ends = {
             "x": moved[-1, 0], "y": moved[-1, 1], "turn": turned[-1], "moved": lengths.max(),
             "drift": np.hypot(*(moved[-1] - moved[half])) / (path.times[-1] - path.times[half]),
@@ -235,17 +254,38 @@ def read_case(path: Path) -> Case:
         data = tomllib.loads(read_text(path, "a case of the referee"))
         shared = data.pop("allowed", None)
         bodies = [
-            Body(**{**each, "shapes": [Shape(**{"name": each["name"], **shape}) for shape in each["shapes"]]})
+            Body(
+                **{
+                    **each,
+                    "shapes": [
+                        Shape(**{"name": each["name"], **shape})
+                        for shape in each["shapes"]
+                    ],
+                }
+            )
             for each in data.pop("bodies")
         ]
         contacts = [
-            Contact(**{**each, "pair": tuple(each["pair"]), "mu": _both(each["mu"])}) for each in data.pop("contacts")
+            Contact(**{**each, "pair": tuple(each["pair"]), "mu": _both(each["mu"])})
+            for each in data.pop("contacts")
         ]
         forces = [Force(**each) for each in data.pop("forces", [])]
-        truths = [Truth(**({} if shared is None else {"allowed": shared}) | each) for each in data.pop("truths")]
-        case = Case(name=path.stem, bodies=bodies, contacts=contacts, forces=forces, truths=truths, **data)
+        truths = [
+            Truth(**({} if shared is None else {"allowed": shared}) | each)
+            for each in data.pop("truths")
+        ]
+        case = Case(
+            name=path.stem,
+            bodies=bodies,
+            contacts=contacts,
+            forces=forces,
+            truths=truths,
+            **data,
+        )
     except (KeyError, TypeError, ValueError) as error:
-        raise FileError(f"{path}: is not a case of the referee: {' '.join(str(error).split())}") from None
+        raise FileError(
+            f"{path}: is not a case of the referee: {' '.join(str(error).split())}"
+        ) from None
     _check(path, case)
     return case
 
@@ -260,11 +300,17 @@ def _check(path: Path, case: Case) -> None:
     for kind, names, known in (
         ("quantities", [truth.quantity for truth in case.truths], list(QUANTITIES)),
         ("moving bodies", [each.body for each in (*case.truths, *case.forces)], moving),
-        ("shapes", [name for contact in case.contacts for name in contact.pair], list(case.shapes)),
+        (
+            "shapes",
+            [name for contact in case.contacts for name in contact.pair],
+            list(case.shapes),
+        ),
     ):
         for name in names:
             if name not in known:
-                raise FileError(f"{path}: {name!r} is not one of the {kind}: {', '.join(known)}")
+                raise FileError(
+                    f"{path}: {name!r} is not one of the {kind}: {', '.join(known)}"
+                )
 
 
 def all_cases() -> dict[str, Case]:

@@ -12,10 +12,23 @@ from typing import Any
 import numpy as np
 
 from planarfriction.writing import write_text
-from planarfriction_studies.referee.case import FOLDER, QUANTITIES, Body, Case, Contact, Shape
+from planarfriction_studies.referee.case import (
+    FOLDER,
+    QUANTITIES,
+    Body,
+    Case,
+    Contact,
+    Shape,
+)
 
 
-def mjcf(case: Case, dt: float, options: str = "", contact: str = "", integrator: str = "Euler") -> str:
+def mjcf(
+    case: Case,
+    dt: float,
+    options: str = "",
+    contact: str = "",
+    integrator: str = "Euler",
+) -> str:
     """Return MJCF with free bodies, pads on slides, and a pair for each contact.
 
     `options` and `contact` are attributes of its `option` and of all pairs. Sites `patch 0`, ... are where patches are.
@@ -49,9 +62,17 @@ def _body(case: Case, body: Body) -> str:
         if contact.pair[1] in own
     ]
     if body.joint != "fixed":
-        joint = "<freejoint/>" if body.joint == "free" else '<joint type="slide" axis="0 0 1"/>'
+        joint = (
+            "<freejoint/>"
+            if body.joint == "free"
+            else '<joint type="slide" axis="0 0 1"/>'
+        )
         place = f'pos="{_numbers(body.centre_of_mass)}" mass="{body.mass:.12g}"'
-        parts = [joint, f'<inertial {place} diaginertia="{_numbers(body.moments)}"/>', *parts]
+        parts = [
+            joint,
+            f'<inertial {place} diaginertia="{_numbers(body.moments)}"/>',
+            *parts,
+        ]
     inner = "\n".join(f"    {part}" for part in parts)
     return f'  <body name="{escape(body.name)}" pos="{_numbers(body.position)}">\n{inner}\n  </body>'
 
@@ -85,11 +106,21 @@ def sdf(case: Case, dt: float) -> str | None:
 
     Forces, velocities, gravity on inclines, and the pairs of shapes that touch are not in it.
     """
-    mus = {name: {each.mu for each in case.contacts if name in each.pair} for name in case.shapes}
+    mus = {
+        name: {each.mu for each in case.contacts if name in each.pair}
+        for name in case.shapes
+    }
     moving = [name for name, (body, _) in case.shapes.items() if body.joint != "fixed"]
-    if any(len(mus[name]) > 1 for name in moving) or any(each.mu_s is not None for each in case.contacts):
+    if any(len(mus[name]) > 1 for name in moving) or any(
+        each.mu_s is not None for each in case.contacts
+    ):
         return None
-    grips = {name: (GRIPS, GRIPS) if name not in moving else next(iter(mus[name]), (0.0, 0.0)) for name in case.shapes}
+    grips = {
+        name: (GRIPS, GRIPS)
+        if name not in moving
+        else next(iter(mus[name]), (0.0, 0.0))
+        for name in case.shapes
+    }
     models = "\n".join(_model(body, grips) for body in case.bodies)
     return f"""<?xml version="1.0"?>
 <sdf version="1.9"><world name="{escape(case.name)}">
@@ -102,7 +133,8 @@ def sdf(case: Case, dt: float) -> str | None:
 
 def _model(body: Body, grips: Mapping[str, Sequence[float]]) -> str:
     shapes = "\n".join(_collision(shape, *grips[shape.name]) for shape in body.shapes)
-    fixed, slides = body.joint == "fixed", body.joint == "slide"
+    fixed = body.joint == "fixed"
+    slides = body.joint == "slide"
     inertial = "" if fixed else _inertial(body)
     joint = """  <joint name="slide" type="prismatic"><parent>world</parent><child>link</child>
   <axis><xyz>0 0 1</xyz></axis></joint>\n"""
@@ -115,7 +147,10 @@ def _model(body: Body, grips: Mapping[str, Sequence[float]]) -> str:
 
 
 def _inertial(body: Body) -> str:
-    moments = "".join(f"<i{a}{a}>{moment:.12g}</i{a}{a}>" for a, moment in zip("xyz", body.moments, strict=True))
+    moments = "".join(
+        f"<i{a}{a}>{moment:.12g}</i{a}{a}>"
+        for a, moment in zip("xyz", body.moments, strict=True)
+    )
     return f"""  <inertial><pose>{_numbers(body.centre_of_mass)} 0 0 0</pose><mass>{body.mass:.12g}</mass>
   <inertia>{moments}<ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial>
 """
@@ -127,7 +162,9 @@ def _collision(shape: Shape, along: float, across: float) -> str:
         "plane": "<normal>0 0 1</normal><size>18 18</size>",
         "box": f"<size>{_numbers(shape.size)}</size>",
         "sphere": f"<radius>{_numbers(shape.size)}</radius>",
-    }.get(shape.kind) or f"<radius>{shape.size[0]:.12g}</radius><length>{shape.size[1]:.12g}</length>"
+    }.get(
+        shape.kind
+    ) or f"<radius>{shape.size[0]:.12g}</radius><length>{shape.size[1]:.12g}</length>"
     turn = "0 1.5707963267948966 0" if shape.axis[0] else "0 0 0"
     return f"""  <collision name="{escape(shape.name)}"><pose>{_numbers(shape.position)} {turn}</pose>
   <geometry><{shape.kind}>{inner}</{shape.kind}></geometry><surface><friction><ode><mu>{along:.12g}</mu>
@@ -145,7 +182,10 @@ def export_case(case: Case, folder: Path) -> None:
     for its friction, `NAME-forces.csv` the forces on its bodies
     as if they never turned, with the part of gravity of inclines, and `NAME-truth.csv` the truths.
     """
-    write_text(folder / f"{case.name}.toml", (FOLDER / f"{case.name}.toml").read_text(encoding="utf-8"))
+    write_text(
+        folder / f"{case.name}.toml",
+        (FOLDER / f"{case.name}.toml").read_text(encoding="utf-8"),
+    )
     write_text(folder / f"{case.name}.xml", mjcf(case, case.steps[0]))
     if (text := sdf(case, case.steps[0])) is not None:
         write_text(folder / f"{case.name}.sdf", text)
@@ -154,10 +194,21 @@ def export_case(case: Case, folder: Path) -> None:
     rows = [
         [f"{t:.9g}", body.name, *(f"{number:.9g}" for number in wrench)]
         for t in np.arange(round(case.time / SAMPLES) + 1) * SAMPLES
-        for body, wrench in zip(case.moving, case.wrenches(float(t), positions, rotations), strict=True)
+        for body, wrench in zip(
+            case.moving, case.wrenches(float(t), positions, rotations), strict=True
+        )
         if wrench.any()
     ]
-    headings = ["time [s]", "body", "fx [N]", "fy [N]", "fz [N]", "tx [N m]", "ty [N m]", "tz [N m]"]
+    headings = [
+        "time [s]",
+        "body",
+        "fx [N]",
+        "fy [N]",
+        "fz [N]",
+        "tx [N m]",
+        "ty [N m]",
+        "tz [N m]",
+    ]
     write_text(folder / f"{case.name}-forces.csv", _csv(headings, rows))
     truths = [
         [
@@ -171,7 +222,15 @@ def export_case(case: Case, folder: Path) -> None:
         ]
         for each in case.truths
     ]
-    headings = ["body", "quantity", "value", "error of the value", "allowed", "unit", "threshold"]
+    headings = [
+        "body",
+        "quantity",
+        "value",
+        "error of the value",
+        "allowed",
+        "unit",
+        "threshold",
+    ]
     write_text(folder / f"{case.name}-truth.csv", _csv(headings, truths))
 
 

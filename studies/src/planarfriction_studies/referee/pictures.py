@@ -24,10 +24,20 @@ def scene(case: Case) -> PlotFigure:
     from matplotlib.patches import Polygon
 
     up = side(case)
-    drawn = [(outline(body, shape, up), body) for body in case.bodies for shape in body.shapes if shape.kind != "plane"]
-    ends = [(outline(body, shape, up, *end(case, body)), body) for body in case.moving for shape in body.shapes]
+    drawn = [
+        (outline(body, shape, up), body)
+        for body in case.bodies
+        for shape in body.shapes
+        if shape.kind != "plane"
+    ]
+    ends = [
+        (outline(body, shape, up, *end(case, body)), body)
+        for body in case.moving
+        for shape in body.shapes
+    ]
     corners = np.concatenate([corners for corners, _ in (*drawn, *ends)])
-    low, high = corners.min(0), corners.max(0)
+    low = corners.min(0)
+    high = corners.max(0)
     size = float((high - low).max())
     margin = np.full(2, 0.22 * size)
     width, height = high - low + 2.0 * margin
@@ -36,10 +46,14 @@ def scene(case: Case) -> PlotFigure:
     for corners, body in sorted(drawn, key=lambda each: _height(each[1], up)):
         fixed = body.joint == "fixed"
         fill = "0.8" if fixed else PALETTE[5] if body.joint == "free" else PALETTE[4]
-        axes.add_patch(Polygon(1e3 * corners, facecolor=fill, edgecolor="0.2", alpha=0.6))
+        axes.add_patch(
+            Polygon(1e3 * corners, facecolor=fill, edgecolor="0.2", alpha=0.6)
+        )
     for corners, body in ends:
         if any(end(case, body)):
-            axes.add_patch(Polygon(1e3 * corners, fill=False, edgecolor=PALETTE[1], linestyle="--"))
+            axes.add_patch(
+                Polygon(1e3 * corners, fill=False, edgecolor=PALETTE[1], linestyle="--")
+            )
     _arrows(axes, case, up, size)
     names = "x", "z" if up == 2 else "y"
     axes.set(xlabel=f"{names[0]} [mm]", ylabel=f"{names[1]} [mm]", aspect="equal")
@@ -61,26 +75,38 @@ def _height(body: Body, up: int) -> float:
 
 def end(case: Case, body: Body) -> tuple[float, float, float]:
     """Return the true displacement and turn of a body; 0 where nothing is known."""
-    known = {truth.quantity: truth.value for truth in case.truths if truth.body == body.name}
+    known = {
+        truth.quantity: truth.value for truth in case.truths if truth.body == body.name
+    }
     return known.get("x", 0.0), known.get("y", 0.0), known.get("turn", 0.0)
 
 
-def outline(body: Body, shape: Shape, up: int, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> np.ndarray:
+def outline(
+    body: Body, shape: Shape, up: int, x: float = 0.0, y: float = 0.0, turn: float = 0.0
+) -> np.ndarray:
     """Return the corners `[n, 2]` of a shape from above (up 1) or from the side (up 2) [m]."""
     half = shape.half[[0, up]]
-    if shape.kind == "box" or (up == 2 and shape.kind == "cylinder") or shape.kind == "capsule":
+    if (
+        shape.kind == "box"
+        or (up == 2 and shape.kind == "cylinder")
+        or shape.kind == "capsule"
+    ):
         around = half * [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     else:
         angles = np.linspace(0.0, 2.0 * math.pi, 40)
         around = half * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    c, s = math.cos(turn), math.sin(turn)
+    c = math.cos(turn)
+    s = math.sin(turn)
     turned = (around + np.array(shape.position)[[0, up]]) @ np.array([[c, s], [-s, c]])
     return turned + np.array(body.position)[[0, up]] + [x, y if up == 1 else 0.0]
 
 
 def _arrows(axes, case: Case, up: int, size: float) -> None:
     """Draw velocities, and the largest force of each row of forces; and gravity where it lies in the picture."""
-    throws = [(np.array(body.position), np.array(body.velocity[:3]), PALETTE[2]) for body in case.moving]
+    throws = [
+        (np.array(body.position), np.array(body.velocity[:3]), PALETTE[2])
+        for body in case.moving
+    ]
     of = {body.name: body for body in case.moving}
     pushes = []
     for force in case.forces:
@@ -95,7 +121,12 @@ def _arrows(axes, case: Case, up: int, size: float) -> None:
             if length > 0.0:
                 start = 1e3 * place[[0, up]]
                 end = start + 1e3 * ARROW * size * vector[[0, up]] / max(lengths)
-                axes.annotate("", end, start, arrowprops={"arrowstyle": "->", "color": colour, "linewidth": 2.0})
+                axes.annotate(
+                    "",
+                    end,
+                    start,
+                    arrowprops={"arrowstyle": "->", "color": colour, "linewidth": 2.0},
+                )
     if up == 1 and case.gravity[1]:
         axes.annotate(
             "g", (0.97, 0.04), (0.97, 0.22), xycoords="axes fraction", ha="center",
@@ -115,7 +146,8 @@ def film(case: Case, verdicts: Sequence[Verdict]) -> str:
     shown = [each for each in verdicts if each.case == case.name and each.path]
     rows = math.ceil(len(shown) / COLUMNS)
     panels = "".join(
-        _panel(case, each, WIDTH * (i % COLUMNS), (HEIGHT + TITLE) * (i // COLUMNS)) for i, each in enumerate(shown)
+        _panel(case, each, WIDTH * (i % COLUMNS), (HEIGHT + TITLE) * (i // COLUMNS))
+        for i, each in enumerate(shown)
     )
     size = f'width="{COLUMNS * WIDTH:g}" height="{rows * (HEIGHT + TITLE):g}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif">{panels}</svg>\n'
@@ -123,18 +155,37 @@ def film(case: Case, verdicts: Sequence[Verdict]) -> str:
 
 def _panel(case: Case, verdict: Verdict, left: float, top: float) -> str:
     """Return the film of one engine, seen as the picture of the case."""
-    body = next(each for each in case.moving if each.name == verdict.quantity.partition(" of ")[2])
-    up, path, place = side(case), np.array(verdict.path), np.array(body.position)
+    body = next(
+        each
+        for each in case.moving
+        if each.name == verdict.quantity.partition(" of ")[2]
+    )
+    up = side(case)
+    path = np.array(verdict.path)
+    place = np.array(body.position)
     place = place[[0, up]]
     true = [outline(body, shape, up, *end(case, body)) for shape in body.shapes]
     own = [outline(body, shape, up) - place for shape in body.shapes]
     corners = np.concatenate([*true, *(each + place for each in own)])
-    low, high = corners.min(0), corners.max(0)
-    middle, span = 0.5 * (low + high), 1.6 * float(((high - low) / (WIDTH, HEIGHT)).max()) * np.array([WIDTH, HEIGHT])
-    grey = "".join(_polygon(each, 'fill="#ddd" stroke="#999"') for each in _others(case, body, up))
-    dashed = "".join(_polygon(each, 'fill="none" stroke="#c33" stroke-dasharray="4 3"') for each in true)
-    moving = "".join(_polygon(each, 'fill="#48a" fill-opacity="0.6" stroke="#124"') for each in own)
-    moving += _polygon(np.array([own[0].mean(0), own[0][0]]), 'stroke="#124"')  # a spoke, that shows how it turns
+    low = corners.min(0)
+    high = corners.max(0)
+    middle = 0.5 * (low + high)
+    span = (
+        1.6 * float(((high - low) / (WIDTH, HEIGHT)).max()) * np.array([WIDTH, HEIGHT])
+    )
+    grey = "".join(
+        _polygon(each, 'fill="#ddd" stroke="#999"') for each in _others(case, body, up)
+    )
+    dashed = "".join(
+        _polygon(each, 'fill="none" stroke="#c33" stroke-dasharray="4 3"')
+        for each in true
+    )
+    moving = "".join(
+        _polygon(each, 'fill="#48a" fill-opacity="0.6" stroke="#124"') for each in own
+    )
+    moving += _polygon(
+        np.array([own[0].mean(0), own[0][0]]), 'stroke="#124"'
+    )  # a spoke, that shows how it turns
     name = html.escape(f"{verdict.engine}: {verdict.mark}")
     return f"""<text x="{left + 4:g}" y="{top + 13:g}" font-size="12">{name}</text>
 <svg x="{left:g}" y="{top + TITLE:g}" width="{WIDTH - 6:g}" height="{HEIGHT - 4:g}" viewBox="{_view(span)}">
@@ -154,10 +205,18 @@ def _others(case: Case, body: Body, up: int) -> list[np.ndarray]:
 
 def _moved(body: Body, path: np.ndarray, up: int, inner: str) -> str:
     """Return a group that goes along displacements and turns `[frames, 3]` [m, m, rad]."""
-    place = np.array(body.position)[[0, up]] + path[:, :2] * (1.0, 1.0 if up == 1 else 0.0)
+    place = np.array(body.position)[[0, up]] + path[:, :2] * (
+        1.0,
+        1.0 if up == 1 else 0.0,
+    )
     turns = np.degrees(path[:, 2]) * (up == 1)
-    times = ";".join(f"{0.75 * i / (len(path) - 1):.4g}" for i in range(len(path))) + ";1"
-    goes, spins = (";".join([*values, values[-1]]) for values in (list(map(_pair, place)), [f"{t:.5g}" for t in turns]))
+    times = (
+        ";".join(f"{0.75 * i / (len(path) - 1):.4g}" for i in range(len(path))) + ";1"
+    )
+    goes, spins = (
+        ";".join([*values, values[-1]])
+        for values in (list(map(_pair, place)), [f"{t:.5g}" for t in turns])
+    )
     much = f'dur="{SECONDS:g}s" repeatCount="indefinite" keyTimes="{times}"'
     go = f'<animateTransform attributeName="transform" type="translate" values="{goes}" {much}/>'
     spin = f'<animateTransform attributeName="transform" type="rotate" values="{spins}" {much}/>'

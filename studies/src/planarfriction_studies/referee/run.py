@@ -23,7 +23,11 @@ from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import QUANTITIES, Case, Path3, Truth
 from planarfriction_studies.referee.engines import Engine
 
-MARKS = {"ok": "within what is allowed", "off": "up to ten times that", "fails": "beyond, or no result"}
+MARKS = {
+    "ok": "within what is allowed",
+    "off": "up to ten times that",
+    "fails": "beyond, or no result",
+}
 
 FRAMES = 16
 """Times of a path that are kept."""
@@ -73,7 +77,8 @@ def trace(case: Case, engine: Engine, dt: float) -> tuple[Path3, float, float]:
         if any(body.velocity):
             world.throw(i, np.array(body.velocity))
     steps = round(case.time / dt)
-    poses, costs = [world.poses()], []
+    poses = [world.poses()]
+    costs = []
     for i in range(steps):
         wrenches = case.wrenches((i + 0.5) * dt, *poses[-1])
         start = time.process_time()
@@ -82,7 +87,11 @@ def trace(case: Case, engine: Engine, dt: float) -> tuple[Path3, float, float]:
         poses.append(world.poses())
     positions, rotations = (np.array(each) for each in zip(*poses, strict=True))
     turns = np.unwrap(np.arctan2(rotations[..., 1, 0], rotations[..., 0, 0]), axis=0)
-    return Path3(dt * np.arange(steps + 1), positions, turns), float(np.median(costs)), built
+    return (
+        Path3(dt * np.arange(steps + 1), positions, turns),
+        float(np.median(costs)),
+        built,
+    )
 
 
 def judge(case: Case, engine: Engine, steps: Sequence[float] | None = None) -> Verdict:
@@ -90,14 +99,31 @@ def judge(case: Case, engine: Engine, steps: Sequence[float] | None = None) -> V
     if reason := engine.cannot(case):
         return no_result("-", case, engine, reason)
     verdicts = [_judge(case, engine, dt) for dt in steps or case.steps]
-    return max(verdicts, key=lambda each: np.inf if each.error is None else each.error / each.allowed)
+    return max(
+        verdicts,
+        key=lambda each: np.inf if each.error is None else each.error / each.allowed,
+    )
 
 
-def no_result(mark: str, case: Case, engine: Engine, reason: str, dt: float = 0.0) -> Verdict:
+def no_result(
+    mark: str, case: Case, engine: Engine, reason: str, dt: float = 0.0
+) -> Verdict:
     """Return a verdict without numbers, for a reason in one line."""
-    truth, words = case.truths[0], " ".join(reason.split())[:200]
+    truth = case.truths[0]
+    words = " ".join(reason.split())[:200]
     unit = QUANTITIES[truth.quantity]
-    return Verdict(case.name, engine.name, mark, None, truth.allowed, unit, "", dt, None, reason=words)
+    return Verdict(
+        case.name,
+        engine.name,
+        mark,
+        None,
+        truth.allowed,
+        unit,
+        "",
+        dt,
+        None,
+        reason=words,
+    )
 
 
 def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
@@ -110,20 +136,40 @@ def _judge(case: Case, engine: Engine, dt: float) -> Verdict:
     if not (np.isfinite(path.positions).all() and np.isfinite(path.turns).all()):
         return no_result("fails", case, engine, "positions are not finite", dt)
     errors = [abs(case.measure(truth, path) - truth.value) for truth in case.truths]
-    error, truth = max(zip(errors, case.truths, strict=True), key=lambda pair: pair[0] / pair[1].allowed)
+    error, truth = max(
+        zip(errors, case.truths, strict=True),
+        key=lambda pair: pair[0] / pair[1].allowed,
+    )
     share = error / truth.allowed
     mark = "ok" if share <= 1.0 else "off" if share <= _FAILS else "fails"
-    what, unit = f"{truth.quantity} of {truth.body}", QUANTITIES[truth.quantity]
+    what = f"{truth.quantity} of {truth.body}"
+    unit = QUANTITIES[truth.quantity]
     frames = _frames(case, truth, path)
-    return Verdict(case.name, engine.name, mark, error, truth.allowed, unit, what, dt, cost, start, path=frames)
+    return Verdict(
+        case.name,
+        engine.name,
+        mark,
+        error,
+        truth.allowed,
+        unit,
+        what,
+        dt,
+        cost,
+        start,
+        path=frames,
+    )
 
 
-def _frames(case: Case, truth: Truth, path: Path3) -> tuple[tuple[float, float, float], ...]:
+def _frames(
+    case: Case, truth: Truth, path: Path3
+) -> tuple[tuple[float, float, float], ...]:
     """Return displacements and turns of the body of a truth, with four digits."""
     body = [each.name for each in case.moving].index(truth.body)
     kept = np.linspace(0, len(path.times) - 1, FRAMES).round().astype(int)
     rows = np.column_stack([path.positions[kept, body, :2], path.turns[kept, body]])
-    x, y, turn = ([float(f"{each:.4g}") for each in column] for column in (rows - rows[0]).T)
+    x, y, turn = (
+        [float(f"{each:.4g}") for each in column] for column in (rows - rows[0]).T
+    )
     return tuple(zip(x, y, turn, strict=True))
 
 
@@ -145,7 +191,9 @@ class Apart:
             self._pool.shutdown(wait=False, cancel_futures=True)
             self._pool = None
 
-    def judge(self, case: Case, engine: Engine, steps: Sequence[float] | None = None) -> Verdict:
+    def judge(
+        self, case: Case, engine: Engine, steps: Sequence[float] | None = None
+    ) -> Verdict:
         """Judge as the function `judge` does."""
         if self._engine != engine.name:
             self._end()
@@ -168,16 +216,24 @@ class Kept:
         if file is None or not file.exists():
             return
         try:
-            rows = [Verdict(**row) for row in json.loads(read_text(file, "verdicts of the referee"))]
+            rows = [
+                Verdict(**row)
+                for row in json.loads(read_text(file, "verdicts of the referee"))
+            ]
         except (TypeError, ValueError):
-            raise FileError(f"{file}: has no verdicts of the referee: name another file, or remove it") from None
+            raise FileError(
+                f"{file}: has no verdicts of the referee: name another file, or remove it"
+            ) from None
         self.verdicts = {(each.case, each.engine): each for each in rows}
 
     def add(self, verdict: Verdict) -> None:
         """Keep a verdict, in place of an earlier one."""
         self.verdicts[verdict.case, verdict.engine] = verdict
         if self.file is not None:
-            write_text(self.file, json.dumps(to_rows([*self.verdicts.values()]), indent=1) + "\n")
+            write_text(
+                self.file,
+                json.dumps(to_rows([*self.verdicts.values()]), indent=1) + "\n",
+            )
 
     def of(self, cases: Mapping[str, Case], engines: Sequence[Engine]) -> list[Verdict]:
         """Return the verdicts on these engines in these cases."""
@@ -198,14 +254,19 @@ def run(
     pairs = list(itertools.product(engines, cases.values()))
     for done, (engine, case) in enumerate(pairs):
         progress(done, len(pairs), f"{engine.name}, {case.name}")
-        own, known = _fingerprint(case, engine, steps), kept.verdicts.get((case.name, engine.name))
+        own = _fingerprint(case, engine, steps)
+        known = kept.verdicts.get((case.name, engine.name))
         if known is None or known.fingerprint != own:
             kept.add(replace(judged(case, engine, steps), fingerprint=own))
 
 
 def _fingerprint(case: Case, engine: Engine, steps: Sequence[float] | None) -> str:
-    versions = [metadata.version(package) for package in ("planarfriction", engine.package)]
-    return hashlib.sha256(repr((case, engine.settings, versions, steps)).encode()).hexdigest()[:16]
+    versions = [
+        metadata.version(package) for package in ("planarfriction", engine.package)
+    ]
+    return hashlib.sha256(
+        repr((case, engine.settings, versions, steps)).encode()
+    ).hexdigest()[:16]
 
 
 def to_rows(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:

@@ -47,29 +47,45 @@ def stribeck_stop(mu_c: float, mu_s: float, v_s: float, speed: float) -> float:
     from scipy.integrate import quad
 
     return (
-        quad(lambda v: v / (mu_c + (mu_s - mu_c) * math.exp(-((v / v_s) ** 2))), 0.0, speed, epsrel=1e-12)[0] / GRAVITY
+        quad(
+            lambda v: v / (mu_c + (mu_s - mu_c) * math.exp(-((v / v_s) ** 2))),
+            0.0,
+            speed,
+            epsrel=1e-12,
+        )[0]
+        / GRAVITY
     )
 
 
-def grip_slips(mu: float, mass: float, load: float, rate: float, threshold: float) -> float:
+def grip_slips(
+    mu: float, mass: float, load: float, rate: float, threshold: float
+) -> float:
     """Return the time [s] at which an object, held by two pads whose load falls at `rate`, has sunk by `threshold`.
 
     It lets go at `2 mu N = m g` and sinks by `g rate t^3/(6 N)` in the time t after that.
     """
     critical = mass * GRAVITY / (2.0 * mu)
-    return (load - critical) / rate + (6.0 * critical * threshold / (GRAVITY * rate)) ** (1.0 / 3.0)
+    return (load - critical) / rate + (
+        6.0 * critical * threshold / (GRAVITY * rate)
+    ) ** (1.0 / 3.0)
 
 
-def pad_turns(mu: float, load: float, side: float, rate: float, inertia: float, threshold: float) -> float:
+def pad_turns(
+    mu: float, load: float, side: float, rate: float, inertia: float, threshold: float
+) -> float:
     """Return the time [s] at which two square pads under a growing torque have let an object turn by `threshold`.
 
     Torsion lets go at `2 mu N r`, `r = side (sqrt(2) + asinh(1))/6`; then the angle is `rate t^3/(6 I)`.
     """
     radius = side * (math.sqrt(2.0) + math.asinh(1.0)) / 6.0
-    return 2.0 * mu * load * radius / rate + (6.0 * inertia * threshold / rate) ** (1.0 / 3.0)
+    return 2.0 * mu * load * radius / rate + (6.0 * inertia * threshold / rate) ** (
+        1.0 / 3.0
+    )
 
 
-def tower(force: float, below: int, above: int, mass: float, mu: float, time: float) -> float:
+def tower(
+    force: float, below: int, above: int, mass: float, mu: float, time: float
+) -> float:
     """Return the displacement [m] of boxes of a tower that one is pushed with: those above go with it.
 
     `(F - n mu m g)/(n m)` is their acceleration, n boxes from the pushed one up; it is below `mu g`, and the boxes
@@ -84,8 +100,11 @@ def tower(force: float, below: int, above: int, mass: float, mu: float, time: fl
 
 def shaken(mu: float, amplitude: float, frequency: float, time: float) -> float:
     """Return the displacement [m] of a box under a force `amplitude m sin(2 pi f t)`, phase by phase in closed form."""
-    omega, slowing = 2.0 * math.pi * frequency, mu * GRAVITY
-    t, x, v = 0.0, 0.0, 0.0
+    omega = 2.0 * math.pi * frequency
+    slowing = mu * GRAVITY
+    t = 0.0
+    x = 0.0
+    v = 0.0
     while t < time:
         pull = amplitude * math.sin(omega * t)
         if v == 0.0 and abs(pull) < slowing * (1.0 - 1e-12):
@@ -94,14 +113,23 @@ def shaken(mu: float, amplitude: float, frequency: float, time: float) -> float:
         side = math.copysign(1.0, v if v != 0.0 else pull)
 
         def braked(s: float, t: float = t, v: float = v, side: float = side) -> float:
-            speed = v + amplitude / omega * (math.cos(omega * t) - math.cos(omega * s)) - side * slowing * (s - t)
+            speed = (
+                v
+                + amplitude / omega * (math.cos(omega * t) - math.cos(omega * s))
+                - side * slowing * (s - t)
+            )
             return -side * speed
 
         end = _next(braked, t + 1e-6, time)  # pyright: ignore[reportGeneralTypeIssues]
         lasts = end - t
-        x += v * lasts + amplitude / omega * (math.cos(omega * t) * lasts) - 0.5 * side * slowing * lasts**2
+        x += (
+            v * lasts
+            + amplitude / omega * (math.cos(omega * t) * lasts)
+            - 0.5 * side * slowing * lasts**2
+        )
         x -= amplitude / omega**2 * (math.sin(omega * end) - math.sin(omega * t))
-        t, v = end, 0.0
+        t = end
+        v = 0.0
     return x
 
 
@@ -110,15 +138,30 @@ def _next(function: Callable[[float], float], start: float, end: float) -> float
     from scipy.optimize import brentq
 
     times = np.linspace(start, end, 4001)
-    above = next((i for i, t in enumerate(times) if i and function(t) >= 0.0 > function(times[i - 1])), None)
-    return end if above is None else float(np.asarray(brentq(function, times[above - 1], times[above], xtol=1e-14)))
+    above = next(
+        (
+            i
+            for i, t in enumerate(times)
+            if i and function(t) >= 0.0 > function(times[i - 1])
+        ),
+        None,
+    )
+    return (
+        end
+        if above is None
+        else float(
+            np.asarray(brentq(function, times[above - 1], times[above], xtol=1e-14))
+        )
+    )
 
 
 # ---------------------------------------------------------------------- exact motion of a patch
 
 
 def patch_of(
-    rectangles: Sequence[Sequence[float]] = (), disc: float | None = None, gradient: Sequence[float] = (0.0, 0.0)
+    rectangles: Sequence[Sequence[float]] = (),
+    disc: float | None = None,
+    gradient: Sequence[float] = (0.0, 0.0),
 ) -> ContactPatch:
     """Return a patch: one rectangle [x, y, width, height], with a linear pressure, an L of two of them, or a disc."""
     if disc is not None:
@@ -126,10 +169,18 @@ def patch_of(
     if len(rectangles) == 1:
         _, _, width, height = rectangles[0]
         return ContactPatch.rectangle(
-            width, height, pressure=LinearGradient((gradient[0], gradient[1])) if any(gradient) else None
+            width,
+            height,
+            pressure=LinearGradient((gradient[0], gradient[1]))
+            if any(gradient)
+            else None,
         )
-    (x0, y0, x1, y1), (x2, _, x3, y3) = [(x - w / 2, y - h / 2, x + w / 2, y + h / 2) for x, y, w, h in rectangles]
-    return ContactPatch.polygon([(x0, y0), (x1, y0), (x1, y1), (x3, y1), (x3, y3), (x2, y3)])
+    (x0, y0, x1, y1), (x2, _, x3, y3) = [
+        (x - w / 2, y - h / 2, x + w / 2, y + h / 2) for x, y, w, h in rectangles
+    ]
+    return ContactPatch.polygon(
+        [(x0, y0), (x1, y0), (x1, y1), (x3, y1), (x3, y3), (x2, y3)]
+    )
 
 
 _PLACES = "x", "y", "turn"
@@ -164,48 +215,80 @@ def end(
     if along != across:
         patch = patch.with_friction_metric(friction_metric(0.0, 1.0, across / along))
     surface = LimitSurfaceCells(patch) if along != across else LimitSurfaceExact(patch)
-    centre, masses = patch.centre_of_pressure(), np.array([mass, mass, inertia])
+    centre = patch.centre_of_pressure()
+    masses = np.array([mass, mass, inertia])
 
     def acceleration(pose, velocity):
-        c, s = math.cos(pose[2]), math.sin(pose[2])
+        c = math.cos(pose[2])
+        s = math.sin(pose[2])
         turned = np.array([[c, -s], [s, c]])
         lever = np.array(at) - centre
         own = np.array([*(turned.T @ velocity[:2]), velocity[2]])
         origin = own[:2] + own[2] * np.array([centre[1], -centre[0]])
-        fx, fy, torque = along * mass * GRAVITY * np.asarray(surface.wrench((*origin, own[2])))
+        fx, fy, torque = (
+            along * mass * GRAVITY * np.asarray(surface.wrench((*origin, own[2])))
+        )
         torque -= centre[0] * fy - centre[1] * fx
-        force, arm = turned @ (fx, fy) + push, turned @ lever
+        force = turned @ (fx, fy) + push
+        arm = turned @ lever
         return np.array([*force, torque + arm[0] * push[1] - arm[1] * push[0]]) / masses
 
     pose = np.zeros(3)
     velocity = np.array(twist, dtype=float)
     scale = math.sqrt(inertia / mass)
     if not velocity.any():
-        first = np.array([*push, (at[0] - centre[0]) * push[1] - (at[1] - centre[1]) * push[0]]) / masses
-        velocity = 1e-9 * np.asarray(fsolve(lambda a: a - acceleration(pose, a), first, xtol=1e-13))
-    y = _moved(lambda _, *motion: acceleration(*motion), velocity, scale, time, rests=not any(push))
-    c, s = math.cos(y[2]) - 1.0, math.sin(y[2])
+        first = (
+            np.array(
+                [*push, (at[0] - centre[0]) * push[1] - (at[1] - centre[1]) * push[0]]
+            )
+            / masses
+        )
+        velocity = 1e-9 * np.asarray(
+            fsolve(lambda a: a - acceleration(pose, a), first, xtol=1e-13)
+        )
+    y = _moved(
+        lambda _, *motion: acceleration(*motion),
+        velocity,
+        scale,
+        time,
+        rests=not any(push),
+    )
+    c = math.cos(y[2]) - 1.0
+    s = math.sin(y[2])
     shift = np.array([c * centre[0] - s * centre[1], s * centre[0] + c * centre[1]])
     return float(y[0] - shift[0]), float(y[1] - shift[1]), float(y[2])
 
 
 def _moved(
-    acceleration: Callable[..., np.ndarray], velocity: np.ndarray, scale: float, time: float, *, rests: bool
+    acceleration: Callable[..., np.ndarray],
+    velocity: np.ndarray,
+    scale: float,
+    time: float,
+    *,
+    rests: bool,
 ) -> np.ndarray:
     """Integrate an acceleration by time, pose and velocity from pose 0, for a time or to rest; return the pose."""
     from scipy.integrate import solve_ivp
 
-    size = lambda v: math.hypot(v[0], v[1], scale * v[2])  # noqa: E731
+    size = lambda v: math.hypot(v[0], v[1], scale * v[2])
 
     def rates(_, y):
-        factor = min(size(y[3:6]) / 0.1, 1.0) if rests else 1.0  # slower clock where the body comes to rest
-        return np.concatenate([factor * y[3:6], factor * acceleration(y[6], y[:3], y[3:6]), [factor]])
+        factor = (
+            min(size(y[3:6]) / 0.1, 1.0) if rests else 1.0
+        )  # slower clock where the body comes to rest
+        return np.concatenate(
+            [factor * y[3:6], factor * acceleration(y[6], y[:3], y[3:6]), [factor]]
+        )
 
-    stops = [lambda _, y: y[6] - time, lambda _, y: size(y[3:6]) - 1e-11][: 2 if rests else 1]
+    stops = [lambda _, y: y[6] - time, lambda _, y: size(y[3:6]) - 1e-11][
+        : 2 if rests else 1
+    ]
     for event in stops:
         event.terminal = True  # pyright: ignore[reportFunctionMemberAccess]
     start = np.concatenate([np.zeros(3), velocity, [0.0]])
-    return solve_ivp(rates, [0.0, 1e4], start, method="DOP853", rtol=RTOL, atol=1e-13, events=stops).y[:3, -1]
+    return solve_ivp(
+        rates, [0.0, 1e4], start, method="DOP853", rtol=RTOL, atol=1e-13, events=stops
+    ).y[:3, -1]
 
 
 def in_hand(what: str, **motion: Any) -> float:
@@ -216,7 +299,14 @@ def in_hand(what: str, **motion: Any) -> float:
 
 @functools.cache
 def held_plate(
-    mu: float, mass: float, inertia: float, load: float, rate: float, at: tuple[float, float], disc: float, time: float
+    mu: float,
+    mass: float,
+    inertia: float,
+    load: float,
+    rate: float,
+    at: tuple[float, float],
+    disc: float,
+    time: float,
 ) -> tuple[float, float, float]:
     """Integrate a plate between two discs that press with `load + rate t`; return where its centre of mass ends.
 
@@ -225,17 +315,30 @@ def held_plate(
     """
     from scipy.optimize import fsolve
 
-    surface, masses = LimitSurfaceExact(patch_of(disc=disc)), np.array([mass, mass, inertia])
+    surface = LimitSurfaceExact(patch_of(disc=disc))
+    masses = np.array([mass, mass, inertia])
 
     def acceleration(t, pose, velocity):
         x, y = np.array(at) - pose[:2]
-        (vx, vy, omega), bears = velocity, 2.0 * mu * (load + rate * t)
-        fx, fy, torque = bears * np.asarray(surface.wrench((vx - omega * y, vy + omega * x, omega)))
+        (vx, vy, omega) = velocity
+        bears = 2.0 * mu * (load + rate * t)
+        fx, fy, torque = bears * np.asarray(
+            surface.wrench((vx - omega * y, vy + omega * x, omega))
+        )
         return np.array([fx, fy - mass * GRAVITY, torque + x * fy - y * fx]) / masses
 
     weight = np.array([0.0, -GRAVITY, 0.0])
-    velocity = 1e-9 * np.asarray(fsolve(lambda a: a - acceleration(0.0, np.zeros(3), a), 0.5 * weight, xtol=1e-13))
-    return tuple(map(float, _moved(acceleration, velocity, math.sqrt(inertia / mass), time, rests=True)))  # pyright: ignore[reportReturnType]
+    velocity = 1e-9 * np.asarray(
+        fsolve(
+            lambda a: a - acceleration(0.0, np.zeros(3), a), 0.5 * weight, xtol=1e-13
+        )
+    )
+    return tuple(
+        map(
+            float,
+            _moved(acceleration, velocity, math.sqrt(inertia / mass), time, rests=True),
+        )
+    )  # pyright: ignore[reportReturnType]
 
 
 # ---------------------------------------------------------------------- measured slides
@@ -256,12 +359,17 @@ def tosses() -> np.ndarray:
 def sliding(toss: int) -> tuple[np.ndarray, np.ndarray]:
     """Return twist and displacement to rest [m, m, rad] of a slide in the cube's first axes."""
     rows = tosses()[tosses()["toss"] == toss]
-    first, last, yaw = rows[FIRST], rows[-1], np.unwrap(rows["yaw_rad"])
-    c, s = math.cos(first["yaw_rad"]), math.sin(first["yaw_rad"])
+    first = rows[FIRST]
+    last = rows[-1]
+    yaw = np.unwrap(rows["yaw_rad"])
+    c = math.cos(first["yaw_rad"])
+    s = math.sin(first["yaw_rad"])
     axes = np.array([[c, s], [-s, c]])
     velocity = axes @ [first["vx_mps"], first["vy_mps"]]
     moved = axes @ [last["x_m"] - first["x_m"], last["y_m"] - first["y_m"]]
-    return np.array([*velocity, first["wz_radps"]]), np.array([*moved, yaw[-1] - yaw[FIRST]])
+    return np.array([*velocity, first["wz_radps"]]), np.array(
+        [*moved, yaw[-1] - yaw[FIRST]]
+    )
 
 
 def measured(toss: int, what: str) -> float:
@@ -271,7 +379,20 @@ def measured(toss: int, what: str) -> float:
 
 SOURCES: dict[str, Callable[..., float]] = {
     each.__name__: each
-    for each in (held, slope, stop, disc, stribeck_stop, grip_slips, pad_turns, tower, shaken, slide, in_hand, measured)
+    for each in (
+        held,
+        slope,
+        stop,
+        disc,
+        stribeck_stop,
+        grip_slips,
+        pad_turns,
+        tower,
+        shaken,
+        slide,
+        in_hand,
+        measured,
+    )
 }
 
 

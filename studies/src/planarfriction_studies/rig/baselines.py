@@ -37,20 +37,29 @@ class Regression(NamedTuple):
 
 
 def regression(
-    force: ArrayLike, torque: ArrayLike, normal_force: ArrayLike, speed: ArrayLike, spin: ArrayLike
+    force: ArrayLike,
+    torque: ArrayLike,
+    normal_force: ArrayLike,
+    speed: ArrayLike,
+    spin: ArrayLike,
 ) -> Regression:
     """Fit friction to samples `[T]` of a slip by the published rule.
 
     `|f|/f_N = mu_c + mu_v v` where v >= 2 mm/s and |omega| <= 0.1 rad/s, `mu_s` the maximum at lower speeds, and
     `|tau|/f_N = b + a |omega|` where |omega| >= 0.1 rad/s and v <= 5 mm/s, `r = b/mu_c`.
     """
-    f, tau, load, v, omega = (np.abs(np.asarray(each, float)) for each in (force, torque, normal_force, speed, spin))
+    f, tau, load, v, omega = (
+        np.abs(np.asarray(each, float))
+        for each in (force, torque, normal_force, speed, spin)
+    )
     slides = (v >= SLIDING_SPEED) & (omega <= SLIDING_SPIN)
     turns = (omega >= SLIDING_SPIN) & (v <= TURNING_SPEED)
     mu_c, mu_v = _line(v[slides], (f / load)[slides])
     below = (f / load)[v < SLIDING_SPEED]
     b, _ = _line(omega[turns], (tau / load)[turns])
-    return Regression(mu_c, mu_v, float(below.max()) if len(below) else np.nan, b / mu_c)
+    return Regression(
+        mu_c, mu_v, float(below.max()) if len(below) else np.nan, b / mu_c
+    )
 
 
 def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
@@ -70,16 +79,24 @@ def ellipsoid_load(wrench: ArrayLike, radius: ArrayLike, mu: ArrayLike) -> np.nd
 
 
 def hold_rule(
-    wrench: ArrayLike, speed: ArrayLike, radius: ArrayLike, mu: ArrayLike, before: ArrayLike = 0.0
+    wrench: ArrayLike,
+    speed: ArrayLike,
+    radius: ArrayLike,
+    mu: ArrayLike,
+    before: ArrayLike = 0.0,
 ) -> np.ndarray:
     """Return the target `2 max(f_ellipsoid, 2 N) + 100 |v|` [N]; from `before` it rises at once, and decays by 0.95."""
-    target = 2.0 * np.maximum(ellipsoid_load(wrench, radius, mu), LEAST_HOLD) + 100.0 * np.abs(speed)
+    target = 2.0 * np.maximum(
+        ellipsoid_load(wrench, radius, mu), LEAST_HOLD
+    ) + 100.0 * np.abs(speed)
     return np.maximum(target, 0.95 * np.asarray(before))
 
 
 def hinge_rule(force: ArrayLike, speed: ArrayLike, mu: ArrayLike) -> np.ndarray:
     """Return the normal force `max(0.6, 1.4 |f|/mu + 100 v)` [N] under which a part pivots without sliding."""
-    return np.maximum(LEAST_HINGE, 1.4 * np.asarray(force) / np.asarray(mu) + 100.0 * np.abs(speed))
+    return np.maximum(
+        LEAST_HINGE, 1.4 * np.asarray(force) / np.asarray(mu) + 100.0 * np.abs(speed)
+    )
 
 
 @dataclass(frozen=True)
@@ -99,9 +116,13 @@ class SlipRule:
         """Return the commanded speed `v_c`."""
         return wanted_speed + 2.0 * (wanted - place)
 
-    def grip(self, holding: Any, speed: Any, commanded: Any, acceleration: Any, total: Any) -> Any:
+    def grip(
+        self, holding: Any, speed: Any, commanded: Any, acceleration: Any, total: Any
+    ) -> Any:
         """Return the normal force [N] for the `total` of `int(v_c - v)` so far."""
-        pushed = 1.0 + self.acceleration * acceleration + self.speed * (speed - commanded)
+        pushed = (
+            1.0 + self.acceleration * acceleration + self.speed * (speed - commanded)
+        )
         return np.maximum(holding * pushed - self.integral * total, 0.0)
 
 
@@ -132,7 +153,13 @@ class DiscObserver:
     """Luenberger gain `l` [rad/s^2/(N m)]."""
 
     def step(
-        self, state: ArrayLike, applied: float, measured: float, largest: float, lever: float, dt: float
+        self,
+        state: ArrayLike,
+        applied: float,
+        measured: float,
+        largest: float,
+        lever: float,
+        dt: float,
     ) -> np.ndarray:
         """Advance `(omega, z)` by `dt` [s] under a torque `applied`, with the `measured` one and the `largest` [N m].
 
@@ -145,4 +172,6 @@ class DiscObserver:
         slopes = np.array([[-self.damping / inertia, by_z], [1.0, -decay]])
         drive = np.array([applied / inertia + self.gain * measured, 0.0])
         rate = slopes @ (omega, z) + drive
-        return np.array([omega, z]) + np.linalg.solve(np.eye(2) - dt * slopes, dt * rate)
+        return np.array([omega, z]) + np.linalg.solve(
+            np.eye(2) - dt * slopes, dt * rate
+        )

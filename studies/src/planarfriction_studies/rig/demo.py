@@ -44,17 +44,41 @@ def record_hold(seed: int = 0, steps: int = 4000) -> GripRecord:
 
     Raises InvalidValueError for a seed or a number of steps that is not a whole number, or steps below 1.
     """
-    tap, tilt = {"tap": (0.4, 0.5, 0.0), "tap_time": 2.0}, {"tilt": -0.6, "tilt_time": 2.5, "tilt_duration": 1.0}
-    parts = Parts([0.25], [3.5e-4], [(0.012, -0.012)], [0.75], delay=0.02, bias=(0.03, -0.02, 2e-4), **tap, **tilt)
-    gripper, observer = Gripper(parts, 15.0, seed=count("seed", seed, 0)), FrictionObserver(known_model(), batch=1)
+    tap = {"tap": (0.4, 0.5, 0.0), "tap_time": 2.0}
+    tilt = {"tilt": -0.6, "tilt_time": 2.5, "tilt_duration": 1.0}
+    parts = Parts(
+        [0.25],
+        [3.5e-4],
+        [(0.012, -0.012)],
+        [0.75],
+        delay=0.02,
+        bias=(0.03, -0.02, 2e-4),
+        **tap,
+        **tilt,
+    )
+    gripper = Gripper(parts, 15.0, seed=count("seed", seed, 0))
+    observer = FrictionObserver(known_model(), batch=1)
     for sample in gripper.empty_hand():
         observer.update(sample)
-    hold, sample, rows = Hold(observer), gripper.measurement, []
+    hold = Hold(observer)
+    sample = gripper.measurement
+    rows = []
     for step in range(count("steps", steps, 1)):
         sample = gripper.step(hold.update(sample))
         if step % EVERY == 0:
-            e, shown = hold.estimate, parts.tilt * np.clip((gripper.time - parts.tilt_time) / parts.tilt_duration, 0, 1)
+            e = hold.estimate
+            shown = parts.tilt * np.clip(
+                (gripper.time - parts.tilt_time) / parts.tilt_duration, 0, 1
+            )
             mu = np.concatenate([e.mu_c[:, None], e.interval()[:, 0]], axis=1)
-            found = (gripper.slip, gripper.centre, shown, gripper.normal_force, gripper.radius, mu, e.slip)
+            found = (
+                gripper.slip,
+                gripper.centre,
+                shown,
+                gripper.normal_force,
+                gripper.radius,
+                mu,
+                e.slip,
+            )
             rows.append((gripper.time, *(each[0].copy() for each in found)))
     return GripRecord(parts, *(np.array(each) for each in zip(*rows, strict=True)))

@@ -105,7 +105,12 @@ class Fault(NamedTuple):
 def expected() -> list[Fault]:
     """Return the faults of the table."""
     head, *rows = (line.split() for line in EXPECTED.strip().splitlines())
-    return [Fault(row[0], kind, end) for row in rows for kind, end in zip(head[1:], row[1:], strict=True) if end != "-"]
+    return [
+        Fault(row[0], kind, end)
+        for row in rows
+        for kind, end in zip(head[1:], row[1:], strict=True)
+        if end != "-"
+    ]
 
 
 class Batch:
@@ -113,7 +118,9 @@ class Batch:
 
     def __init__(self, task: str, count: int, seed: int, kind: int) -> None:
         parts, goal = task_of(task, count, seed, kind)
-        self.task, self.goal, self.random = task, np.asarray(goal), np.random.default_rng([seed, kind, 7])
+        self.task = task
+        self.goal = np.asarray(goal)
+        self.random = np.random.default_rng([seed, kind, 7])
         self.gripper = Gripper(parts, 30.0, seed=seed + kind, cells=5)
         observer = FrictionObserver(known_model(), batch=count)
         makes: dict[str, Any] = {
@@ -141,113 +148,194 @@ class Batch:
 
     def take(self, index: np.ndarray) -> None:
         """Let rows be those of an index: copies where it names one twice, none of those it leaves out."""
-        gripper, controller = self.gripper, self.controller
-        for name in ("_bristles", "_lag", "_rate", "_velocity", "_scaled_wrench", "_counted", "_late"):
+        gripper = self.gripper
+        controller = self.controller
+        for name in (
+            "_bristles",
+            "_lag",
+            "_rate",
+            "_velocity",
+            "_scaled_wrench",
+            "_counted",
+            "_late",
+        ):
             setattr(gripper, name, getattr(gripper, name)[index])
         for name in ("normal_force", "centre", "angle", "slip"):
             setattr(gripper, name, getattr(gripper, name)[index])
         gripper._past = gripper._past[:, index]
         arrays = ["mass", "inertia", "centre", "mu_c", "radius", "delay", "bias"]
         arrays += ["tap", "tap_time", "tilt", "tilt_time"]
-        gripper.parts = dataclasses.replace(gripper.parts, **{n: getattr(gripper.parts, n)[index] for n in arrays})
-        controller.state, controller.observer.state = controller.state[index], controller.observer.state[index]
+        gripper.parts = dataclasses.replace(
+            gripper.parts, **{n: getattr(gripper.parts, n)[index] for n in arrays}
+        )
+        controller.state = controller.state[index]
+        controller.observer.state = controller.observer.state[index]
         self.rows = {name: each[index] for name, each in self.rows.items()}
         self.goal = self.goal[index]
 
     def sense(self, sample: Measurement, faults: list[Fault]) -> Measurement:
         """Return what is left of a sample of the rows whose fault began."""
-        rows, step = self.rows, self.gripper.steps
-        right = np.column_stack([sample.time, sample.wrench, sample.normal_force, sample.slip_velocity])
+        rows = self.rows
+        step = self.gripper.steps
+        right = np.column_stack(
+            [sample.time, sample.wrench, sample.normal_force, sample.slip_velocity]
+        )
         past = rows["past"]
         past[:, step % (LATE + 1)] = right
         healthy = (rows["fault"] < 0)[:, None] & np.isfinite(right)
         rows["frozen"] = np.where(healthy, right, rows["frozen"])
         wrong = right * rows["factor"]
         for number, fault in enumerate(faults):
-            own = np.flatnonzero(rows["fault"] == number) if fault.kind not in FACTORS else ()
+            own = (
+                np.flatnonzero(rows["fault"] == number)
+                if fault.kind not in FACTORS
+                else ()
+            )
             if len(own) == 0:
                 continue
             at = np.ix_(own, CHANNELS[fault.channel])
             wrong[at] = self._wrong(fault, own, at, right[at])
-        return Measurement(wrong[:, 0].copy(), wrong[:, 1:4].copy(), wrong[:, 4].copy(), wrong[:, 5:].copy())
+        return Measurement(
+            wrong[:, 0].copy(),
+            wrong[:, 1:4].copy(),
+            wrong[:, 4].copy(),
+            wrong[:, 5:].copy(),
+        )
 
-    def _wrong(self, fault: Fault, own: np.ndarray, at: Any, right: np.ndarray) -> np.ndarray:
+    def _wrong(
+        self, fault: Fault, own: np.ndarray, at: Any, right: np.ndarray
+    ) -> np.ndarray:
         """Return wrong values of a fault's columns."""
-        step, columns = self.gripper.steps, CHANNELS[fault.channel]
+        step = self.gripper.steps
+        columns = CHANNELS[fault.channel]
         if fault.kind in ("late", "jitter"):
             if fault.channel == "time" and fault.kind == "jitter":
                 return right + self.random.uniform(-STAMP, STAMP, right.shape)
-            back = LATE if fault.kind == "late" else self.random.integers(0, JITTER, len(own))
+            back = (
+                LATE
+                if fault.kind == "late"
+                else self.random.integers(0, JITTER, len(own))
+            )
             return self.rows["past"][own, (step - back) % (LATE + 1)][:, columns]
         if fault.kind == "dropped":
             lost = (step // WINDOW * 7919 + own * 104729) % 97 % 2 == 0
             return np.where(lost[:, None], np.nan, right)
-        return np.where(np.isnan(right), np.nan, self.rows["frozen"][at])  # as long as samples come
+        return np.where(
+            np.isnan(right), np.nan, self.rows["frozen"][at]
+        )  # as long as samples come
 
     def reached(self, moment: int) -> np.ndarray:
         """Return which rows have come to a moment of their task."""
-        gripper, state, now = self.gripper, self.controller.state, self.gripper.time
-        turn, slid = np.abs(gripper.slip[:, 2]), np.hypot(*gripper.slip[:, :2].T)
+        gripper = self.gripper
+        state = self.controller.state
+        now = self.gripper.time
+        turn = np.abs(gripper.slip[:, 2])
+        slid = np.hypot(*gripper.slip[:, :2].T)
         if moment == 0:
             return np.full(len(turn), now >= 0.5)
         if self.task == "hold":
             path = slid + RIM * turn
-            return path > 1.5e-4 if moment == 1 else (state["found"] > 0.0) & (now >= 2.2)
+            return (
+                path > 1.5e-4 if moment == 1 else (state["found"] > 0.0) & (now >= 2.2)
+            )
         axis = 1 if self.task == "slide" else 2
         return gripper.slip[:, axis] / self.goal > (0.4 if moment == 1 else 0.85)
 
     def watch(self) -> np.ndarray:
         """Note flags and rest of rows; return which have come to their end."""
-        gripper, rows = self.gripper, self.rows
+        gripper = self.gripper
+        rows = self.rows
         rows["flags"] |= self.controller.estimate.flags | 1024 * self.controller.blind
         rows["since"] += rows["fault"] >= 0
-        place = np.column_stack([gripper.slip[:, :2], RIM * gripper.slip[:, 2], self.controller.state["grip"]])
-        still = (np.abs(place - rows["seen"])[:, :3] < 5e-5).all(axis=1) & (place[:, 3] > rows["seen"][:, 3] - 0.02)
+        place = np.column_stack(
+            [
+                gripper.slip[:, :2],
+                RIM * gripper.slip[:, 2],
+                self.controller.state["grip"],
+            ]
+        )
+        still = (np.abs(place - rows["seen"])[:, :3] < 5e-5).all(axis=1) & (
+            place[:, 3] > rows["seen"][:, 3] - 0.02
+        )
         rows["quiet"] = np.where(still, rows["quiet"] + 1, 0)
         rows["seen"] = np.where(still[:, None], rows["seen"], place)
         gone = np.hypot(*gripper.slip[:, :2].T) > 0.08
-        still = (rows["quiet"] > REST) & (rows["since"] > REST) & ((rows["moment"] < 2) | (self.task != "hold"))
+        still = (
+            (rows["quiet"] > REST)
+            & (rows["since"] > REST)
+            & ((rows["moment"] < 2) | (self.task != "hold"))
+        )
         return (rows["fault"] >= 0) & (gone | still)
 
     def results(self, which: np.ndarray) -> np.ndarray:
         """Return part, fault, moment, flags, slip (3), goal, grip and its command, speed of rows."""
-        rows, gripper = self.rows, self.gripper
+        rows = self.rows
+        gripper = self.gripper
         speed = np.hypot(*gripper.twist[:, :2].T) + RIM * np.abs(gripper.twist[:, 2])
-        columns = [rows["part"], rows["fault"], rows["moment"], rows["flags"], gripper.slip, self.goal]
-        return np.column_stack([*columns, gripper.normal_force, self.controller.state["grip"], speed])[which]
+        columns = [
+            rows["part"],
+            rows["fault"],
+            rows["moment"],
+            rows["flags"],
+            gripper.slip,
+            self.goal,
+        ]
+        return np.column_stack(
+            [*columns, gripper.normal_force, self.controller.state["grip"], speed]
+        )[which]
 
 
 def task_of(task: str, count: int, seed: int, kind: int) -> tuple[Any, Any]:
     """Return parts and goals of a task; a held part is tapped at 2.4 s and tilted at 2.5 s."""
-    base, random = random_parts(count, seed, kind), np.random.default_rng([seed, kind, 1])
+    base = random_parts(count, seed, kind)
+    random = np.random.default_rng([seed, kind, 1])
     still = dataclasses.replace(base, tap=(0.0, 0.0, 0.0), tilt=0.0)
     if task == "hold":
-        return dataclasses.replace(base, tap_time=2.4, tilt_time=2.5, tilt_duration=0.3), np.zeros(count)
+        return dataclasses.replace(
+            base, tap_time=2.4, tilt_time=2.5, tilt_duration=0.3
+        ), np.zeros(count)
     if task == "slide":
         centre = random.uniform((-1e-3, -0.02), (1e-3, 0.0), (count, 2))
-        return dataclasses.replace(still, centre=centre), -random.choice([0.02, 0.04], count)
+        return dataclasses.replace(still, centre=centre), -random.choice(
+            [0.02, 0.04], count
+        )
     if task == "turn":
         centre = random.uniform((0.02, -3e-3), (0.03, 3e-3), (count, 2))
-        return dataclasses.replace(still, centre=centre), -np.radians(random.choice([45.0, 60.0], count))
+        return dataclasses.replace(still, centre=centre), -np.radians(
+            random.choice([45.0, 60.0], count)
+        )
     angle = np.radians(random.uniform(60.0, 120.0, count))
     centre = random.uniform((0.0, -0.06), (0.0, -0.03), (count, 2))
-    return dataclasses.replace(still, centre=centre, tilt=angle, tilt_time=0.5, tilt_duration=1.5), -angle
+    return dataclasses.replace(
+        still, centre=centre, tilt=angle, tilt_time=0.5, tilt_duration=1.5
+    ), -angle
 
 
 def run_faults(
-    task: str, count: int = 16, seed: int = 0, kinds: Iterable[int] = range(len(KINDS)), faults: Any = None
+    task: str,
+    count: int = 16,
+    seed: int = 0,
+    kinds: Iterable[int] = range(len(KINDS)),
+    faults: Any = None,
 ) -> np.ndarray:
     """Run a task with every fault on `count` parts of each kind; return rows of `Batch.results`, kind in front.
 
     Rows whose fault is -1 are those of healthy sensors; their grip is the mean over the run.
     """
     faults = expected() if faults is None else faults
-    return np.concatenate([np.insert(_run(Batch(task, count, seed, kind), faults), 0, kind, axis=1) for kind in kinds])
+    return np.concatenate(
+        [
+            np.insert(_run(Batch(task, count, seed, kind), faults), 0, kind, axis=1)
+            for kind in kinds
+        ]
+    )
 
 
 def _run(batch: Batch, faults: list[Fault]) -> np.ndarray:
-    count, done = len(batch.gripper.parts), []
-    came, grips = np.zeros((len(MOMENTS), count), bool), []
+    count = len(batch.gripper.parts)
+    done = []
+    came = np.zeros((len(MOMENTS), count), bool)
+    grips = []
     sample = batch.gripper.measurement
     for _ in range(round(ENDS[batch.task] / DT)):
         index = [np.arange(len(batch.goal))]
@@ -260,10 +348,14 @@ def _run(batch: Batch, faults: list[Fault]) -> np.ndarray:
         if marks:
             first = len(batch.goal)
             batch.take(np.concatenate(index))
-            batch.rows["moment"][first:], batch.rows["fault"][first:] = np.array(marks).T
+            batch.rows["moment"][first:], batch.rows["fault"][first:] = np.array(
+                marks
+            ).T
             batch.rows["flags"][first:] = 0
             for row, (_, fault) in enumerate(marks, first):
-                batch.rows["factor"][row, list(CHANNELS[faults[fault].channel])] = FACTORS.get(faults[fault].kind, 1.0)
+                batch.rows["factor"][row, list(CHANNELS[faults[fault].channel])] = (
+                    FACTORS.get(faults[fault].kind, 1.0)
+                )
         sample = batch.sense(batch.gripper.measurement, faults)
         batch.gripper.step(np.minimum(batch.controller.update(sample), 60.0))
         grips.append(batch.gripper.normal_force[:count])
@@ -288,8 +380,10 @@ class Ends(NamedTuple):
 
 def ends(task: str, found: np.ndarray) -> Ends:
     """Return how runs ended: rows of `run_faults`."""
-    slip, goal = found[:, 5:8], np.abs(found[:, 8])
-    slid, turn = np.hypot(slip[:, 0], slip[:, 1]), np.abs(slip[:, 2])
+    slip = found[:, 5:8]
+    goal = np.abs(found[:, 8])
+    slid = np.hypot(slip[:, 0], slip[:, 1])
+    turn = np.abs(slip[:, 2])
     if task == "hold":
         kept = (slid <= PAST) & (RIM * turn <= PAST)
     elif task == "slide":

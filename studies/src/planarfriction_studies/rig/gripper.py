@@ -81,12 +81,30 @@ class Parts(ByValue):
     def __post_init__(self) -> None:
         count = len(validation.positive_array("mass", self.mass, (None,)))
         for name in ("mass", "inertia", "mu_c", "radius"):
-            self._set(**{name: validation.positive_array(name, self._full(name, (count,)), (count,))})
+            self._set(
+                **{
+                    name: validation.positive_array(
+                        name, self._full(name, (count,)), (count,)
+                    )
+                }
+            )
         for name in ("delay", "tap_time", "tilt_time"):
-            self._set(**{name: validation.non_negative_array(name, self._full(name, (count,)), (count,))})
+            self._set(
+                **{
+                    name: validation.non_negative_array(
+                        name, self._full(name, (count,)), (count,)
+                    )
+                }
+            )
         self._set(tilt=validation.array("tilt", self._full("tilt", (count,)), (count,)))
         for name, width in (("centre", 2), ("bias", 3), ("tap", 3)):
-            self._set(**{name: validation.array(name, self._full(name, (count, width)), (count, width))})
+            self._set(
+                **{
+                    name: validation.array(
+                        name, self._full(name, (count, width)), (count, width)
+                    )
+                }
+            )
         for name in ("v_s", "sigma_0", "exponent", "tap_duration", "tilt_duration"):
             self._set(**{name: validation.positive(name, getattr(self, name))})
         for name in ("sigma_2", "growth"):
@@ -125,7 +143,11 @@ class Gripper:
         seed: int = 0,
     ) -> None:
         self.parts = validation.instance("parts", parts, Parts, "Parts")
-        self.sensors = Sensors() if sensors is None else validation.instance("sensors", sensors, Sensors, "Sensors")
+        self.sensors = (
+            Sensors()
+            if sensors is None
+            else validation.instance("sensors", sensors, Sensors, "Sensors")
+        )
         self.rate_limit = validation.positive("rate_limit", rate_limit)
         self._random = np.random.default_rng(validation.count("seed", seed, 0))
         finger = SoftFinger(c=UNIT, k=parts.exponent)
@@ -139,17 +161,27 @@ class Gripper:
             elasto_plastic=0.9,
         )
         self.model = DistributedModel(
-            ContactPatch.disc(UNIT, validation.count("cells", cells, 3), pressure=finger), law
+            ContactPatch.disc(
+                UNIT, validation.count("cells", cells, 3), pressure=finger
+            ),
+            law,
         )
         self._patches = CoupledPatches([self.model])
         count = len(parts)
         self.normal_force = validation.filled("grip", grip, (count,))
         if not (self.normal_force > 0.0).all():
             raise InvalidValueError("grip", "be > 0", float(self.normal_force.min()))
-        self._bristles, self._lag, self._rate = self._patches.rest(count), np.zeros(count), np.zeros(count)
-        self.steps, self.centre, self.angle = 0, parts.centre.copy(), np.zeros(count)
-        self._velocity, self._scaled_wrench = np.zeros((count, 3)), np.zeros((count, 3))
-        self.slip, self._counted, self._ticked = np.zeros((count, 3)), np.zeros((count, 3)), 0
+        self._bristles = self._patches.rest(count)
+        self._lag = np.zeros(count)
+        self._rate = np.zeros(count)
+        self.steps = 0
+        self.centre = parts.centre.copy()
+        self.angle = np.zeros(count)
+        self._velocity = np.zeros((count, 3))
+        self._scaled_wrench = np.zeros((count, 3))
+        self.slip = np.zeros((count, 3))
+        self._counted = np.zeros((count, 3))
+        self._ticked = 0
         self._late = np.rint(parts.delay / DT).astype(int)
         self._settle()
         self._past = np.empty((int(self._late.max()) + 1, count, 8))
@@ -175,8 +207,15 @@ class Gripper:
     @property
     def measurement(self) -> Measurement:
         """Sensors as they have arrived: each part's by its delay ago."""
-        late = self._past[(self.steps - self._late) % len(self._past), np.arange(len(self.parts))]
-        return Measurement(late[:, 0].copy(), late[:, 1:4].copy(), late[:, 4].copy(), late[:, 5:].copy())
+        late = self._past[
+            (self.steps - self._late) % len(self._past), np.arange(len(self.parts))
+        ]
+        return Measurement(
+            late[:, 0].copy(),
+            late[:, 1:4].copy(),
+            late[:, 4].copy(),
+            late[:, 5:].copy(),
+        )
 
     def empty_hand(self, samples: int = 100) -> Iterator[Measurement]:
         """Return what the sensors said before the hand gripped: bias and noise, from which an observer learns the bias.
@@ -193,23 +232,40 @@ class Gripper:
 
     def _sensed(self) -> np.ndarray:
         """Return bias and noise of the wrenches and the grip force `[P, 4]`."""
-        force, torque = self.sensors.force_noise, self.sensors.torque_noise
-        sensed = self._random.normal(size=(4, len(self.parts))).T * (force, force, torque, force)
+        force = self.sensors.force_noise
+        torque = self.sensors.torque_noise
+        sensed = self._random.normal(size=(4, len(self.parts))).T * (
+            force,
+            force,
+            torque,
+            force,
+        )
         sensed[:, :3] += self.parts.bias
         return sensed
 
     def _record(self, step: int) -> None:
         """Sample the sensors."""
-        sensors, row = self.sensors, self._past[step % len(self._past)]
-        row[:, 0], row[:, 5:] = step * DT, np.nan
+        sensors = self.sensors
+        row = self._past[step % len(self._past)]
+        row[:, 0] = step * DT
+        row[:, 5:] = np.nan
         row[:, 1:5] = self._sensed()
         row[:, 1:4] += self.wrench
         row[:, 4] += self.normal_force
-        if int((step + 1) * DT * sensors.slip_rate) > int(step * DT * sensors.slip_rate) and step > 0:
-            unit = sensors.quantum / sensors.slip_rate * np.array([1.0, 1.0, 1.0 / sensors.base])
+        if (
+            int((step + 1) * DT * sensors.slip_rate)
+            > int(step * DT * sensors.slip_rate)
+            and step > 0
+        ):
+            unit = (
+                sensors.quantum
+                / sensors.slip_rate
+                * np.array([1.0, 1.0, 1.0 / sensors.base])
+            )
             places = np.rint(self.slip / unit)
             row[:, 5:] = (places - self._counted) * unit / ((step - self._ticked) * DT)
-            self._counted, self._ticked = places, step
+            self._counted = places
+            self._ticked = step
 
     # ------------------------------------------------------------------ truth
 
@@ -221,7 +277,10 @@ class Gripper:
     @property
     def radius(self) -> np.ndarray:
         """Radius of the contacts at the present grip force `[P]` [m]."""
-        return self.parts.radius * np.maximum(self.normal_force, LEAST) ** self.parts.growth
+        return (
+            self.parts.radius
+            * np.maximum(self.normal_force, LEAST) ** self.parts.growth
+        )
 
     @property
     def wrench(self) -> np.ndarray:
@@ -231,17 +290,27 @@ class Gripper:
     @property
     def twist(self) -> np.ndarray:
         """Velocity of the part at the grip's centre `[P, 3]` [m/s, m/s, rad/s]."""
-        u, (x, y) = self._velocity, self.centre.T
-        return np.stack([u[:, 0] + u[:, 2] * y, u[:, 1] - u[:, 2] * x, u[:, 2]], axis=-1)
+        u = self._velocity
+        (x, y) = self.centre.T
+        return np.stack(
+            [u[:, 0] + u[:, 2] * y, u[:, 1] - u[:, 2] * x, u[:, 2]], axis=-1
+        )
 
     def load(self) -> np.ndarray:
         """Return gravity and taps on half of each part, about the grip's centre `[P, 3]` [N, N, N m]."""
-        parts, now = self.parts, self.time
-        tilt = parts.tilt * np.clip((now - parts.tilt_time) / parts.tilt_duration, 0.0, 1.0)
+        parts = self.parts
+        now = self.time
+        tilt = parts.tilt * np.clip(
+            (now - parts.tilt_time) / parts.tilt_duration, 0.0, 1.0
+        )
         weight = parts.mass * GRAVITY
         phase = (now - parts.tap_time) / parts.tap_duration
-        tap = np.where((phase > 0.0) & (phase < 1.0), np.sin(np.pi * phase), 0.0)[:, None] * parts.tap
-        fx, fy = tap[:, 0] - weight * np.sin(tilt), tap[:, 1] - weight * np.cos(tilt)
+        tap = (
+            np.where((phase > 0.0) & (phase < 1.0), np.sin(np.pi * phase), 0.0)[:, None]
+            * parts.tap
+        )
+        fx = tap[:, 0] - weight * np.sin(tilt)
+        fy = tap[:, 1] - weight * np.cos(tilt)
         torque = tap[:, 2] + self.centre[:, 0] * fy - self.centre[:, 1] * fx
         return 0.5 * np.stack([fx, fy, torque], axis=-1)
 
@@ -256,15 +325,22 @@ class Gripper:
         for _ in range(50):
             self._advance()
             self._velocity[:] = 0.0
-        self.centre, self.angle = self.parts.centre.copy(), np.zeros(len(self.parts))
-        self.slip[:], self.steps = 0.0, 0
+        self.centre = self.parts.centre.copy()
+        self.angle = np.zeros(len(self.parts))
+        self.slip[:] = 0.0
+        self.steps = 0
 
     def _advance(self) -> None:
         """Advance bodies and bristles by `DT`: the bristles find the twist at its end."""
-        parts, (x, y), scale = self.parts, self.centre.T, self._scale()
-        levers = np.zeros((len(parts), 3, 3))  # the twist at the grip of that of the centre of mass
+        parts = self.parts
+        (x, y) = self.centre.T
+        scale = self._scale()
+        levers = np.zeros(
+            (len(parts), 3, 3)
+        )  # the twist at the grip of that of the centre of mass
         levers[:, (0, 1, 2), (0, 1, 2)] = 1.0
-        levers[:, 0, 2], levers[:, 1, 2] = y, -x
+        levers[:, 0, 2] = y
+        levers[:, 1, 2] = -x
         per_mass = 2.0 / np.stack([parts.mass, parts.mass, parts.inertia], axis=-1)
         response = DT * np.einsum("pij,pj,pkj->pik", levers, per_mass, levers)
         free = self.twist + np.einsum("pij,pj->pi", response, self.load() + self.wrench)
@@ -278,7 +354,8 @@ class Gripper:
             ),
             DT,
         )
-        self._bristles, self._scaled_wrench = step.state, step.wrench[:, 0]
+        self._bristles = step.state
+        self._scaled_wrench = step.wrench[:, 0]
         vx, vy, omega = (step.twist[:, 0] / scale).T
         self._velocity = np.stack([vx - omega * y, vy + omega * x, omega], axis=-1)
         self.slip += DT * self.twist

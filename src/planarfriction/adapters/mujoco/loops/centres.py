@@ -35,21 +35,30 @@ excess = kernel(placing.excess)
 @kernel
 def _centre(d, own, s, nefc, p):
     """Return the force of the contacts of patch p, and their centre in its frame."""
-    owners, places, total, x, y = owners_of(s, nefc), places_of(s, nefc), 0.0, 0.0, 0.0
+    owners = owners_of(s, nefc)
+    places = places_of(s, nefc)
+    total = 0.0
+    x = 0.0
+    y = 0.0
     force = doubles(integers(d + own.data.efc_force)[0])
     for r in range(nefc):
         if owners[r] == p:
-            total, x, y = total + force[r], x + force[r] * places[r], y + force[r] * places[nefc + r]
+            total = total + force[r]
+            x = x + force[r] * places[r]
+            y = y + force[r] * places[nefc + r]
     return (total, x / total, y / total) if total > 0.0 else (0.0, 0.0, 0.0)
 
 
 @kernel
 def _share(own, d, s, p, radius, dt):
     """Return the share of the displacement to the centre that patch p, of a lever arm `radius`, takes in this step."""
-    velocity, rows = doubles(integers(d + own.data.qvel)[0]), at(s.jacobian, 3 * own.nv * p)
-    vx, vy = s.drift[3 * p], s.drift[3 * p + 1]
+    velocity = doubles(integers(d + own.data.qvel)[0])
+    rows = at(s.jacobian, 3 * own.nv * p)
+    vx = s.drift[3 * p]
+    vy = s.drift[3 * p + 1]
     for i in range(own.nv):
-        vx, vy = vx + rows[i] * velocity[i], vy + rows[own.nv + i] * velocity[i]
+        vx = vx + rows[i] * velocity[i]
+        vy = vy + rows[own.nv + i] * velocity[i]
     slid = math.sqrt(vx * vx + vy * vy) / radius if radius > 0.0 else 0.0
     return xp.minimum(1.0, dt * (s.tilts[p] + slid) / FOLLOWS)
 
@@ -57,14 +66,17 @@ def _share(own, d, s, p, radius, dt):
 @kernel
 def _move(own, s, nefc, p, guess, dx, dy):
     """Move the origin of patch p: its Jacobian, its contacts, and the guess of its wrench, whose forces stay."""
-    nv, rows, frame = own.nv, at(s.jacobian, 3 * own.nv * p), at(s.frames, 6 * p)
+    nv = own.nv
+    rows = at(s.jacobian, 3 * own.nv * p)
+    frame = at(s.frames, 6 * p)
     for i in range(nv):
         rows[i] -= dy * rows[2 * nv + i]
         rows[nv + i] += dx * rows[2 * nv + i]
     s.drift[3 * p] -= dy * s.drift[3 * p + 2]
     s.drift[3 * p + 1] += dx * s.drift[3 * p + 2]
     guess[2] -= dx * guess[1] - dy * guess[0]
-    owners, places = owners_of(s, nefc), places_of(s, nefc)
+    owners = owners_of(s, nefc)
+    places = places_of(s, nefc)
     for r in range(nefc):
         if owners[r] == p:
             places[r], places[nefc + r] = places[r] - dx, places[nefc + r] - dy
@@ -75,9 +87,14 @@ def _move(own, s, nefc, p, guess, dx, dy):
 @kernel
 def _fault(own, m, d, s, p, x, y):
     """Return the fault of patch p, with the centre of its contact forces at x, y in its frame."""
-    scale, (dx, dy) = scale_of(own, m, p), displacement_of(own, m, p)
-    reach, site = at(doubles(own.extents), 5 * p), integers(own.site)[p]
-    if not is_at_contact(own, d, s, p) and xp.maximum(*excess(x - dx, y - dy, scale, reach)) > 0.0:
+    scale = scale_of(own, m, p)
+    (dx, dy) = displacement_of(own, m, p)
+    reach = at(doubles(own.extents), 5 * p)
+    site = integers(own.site)[p]
+    if (
+        not is_at_contact(own, d, s, p)
+        and xp.maximum(*excess(x - dx, y - dy, scale, reach)) > 0.0
+    ):
         return placing.BEYOND
     along = column(at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site), 0)
     upright = across(along, axes(s, p)[2]) < placing.MARGIN**2
@@ -90,7 +107,8 @@ def _support(own, m, d, s, p, support):
 
     Lengths are those of the patch in the size of its friction model.
     """
-    other, shrunk = integers(own.other)[p], 1.0 / scale_of(own, m, p)
+    other = integers(own.other)[p]
+    shrunk = 1.0 / scale_of(own, m, p)
     support[4] = 0.0
     if integers(own.on_box)[p] == 0:
         return
@@ -101,19 +119,28 @@ def _support(own, m, d, s, p, support):
     away = plus(place, -1.0, three(at(s.frames, 6 * p + 3)))
     for k in range(3):
         if across(column(turned, k), normal) < placing.MARGIN**2:
-            i, j = (k + 1) % 3, (k + 2) % 3
+            i = (k + 1) % 3
+            j = (k + 2) % 3
             first = column(turned, i)
             support[0], support[1] = shrunk * dot(x, away), shrunk * dot(y, away)
-            support[2], support[3], support[6] = dot(x, first), dot(y, first), doubles(own.extents)[5 * p + 4]
-            support[4], support[5] = shrunk * half[i], shrunk * half[j]
+            support[2], support[3], support[6] = (
+                dot(x, first),
+                dot(y, first),
+                doubles(own.extents)[5 * p + 4],
+            )
+            support[4] = shrunk * half[i]
+            support[5] = shrunk * half[j]
 
 
 @kernel
 def _resize(own, m, s, nefc, p, guess):
     """Displace patch p from its origin, and go over to twists, torques and places in the size of its friction model."""
-    scale, (dx, dy) = scale_of(own, m, p), displacement_of(own, m, p)
+    scale = scale_of(own, m, p)
+    (dx, dy) = displacement_of(own, m, p)
     _move(own, s, nefc, p, guess, dx, dy)
-    rows, owners, places = at(s.jacobian, 3 * own.nv * p), owners_of(s, nefc), places_of(s, nefc)
+    rows = at(s.jacobian, 3 * own.nv * p)
+    owners = owners_of(s, nefc)
+    places = places_of(s, nefc)
     for i in range(own.nv):
         rows[2 * own.nv + i] *= scale
     s.drift[3 * p + 2] *= scale
@@ -131,8 +158,12 @@ def follow_centres(own, m, d, s, nefc, radius, problem, kept):
     """
     kept.misplaced[0], dt = 0.0, doubles(m + own.model.timestep)[0]
     for p in range(own.count):
-        held, centre, site = at(kept.held, 3 * p), at(kept.centre, 3 * p), integers(own.site)[p]
-        centre[0], centre[1], centre[2] = 0.0, 0.0, 0.0
+        held = at(kept.held, 3 * p)
+        centre = at(kept.centre, 3 * p)
+        site = integers(own.site)[p]
+        centre[0] = 0.0
+        centre[1] = 0.0
+        centre[2] = 0.0
         if s.counts[p] == 0:
             continue
         force, x, y = _centre(d, own, s, nefc, p)
@@ -143,7 +174,9 @@ def follow_centres(own, m, d, s, nefc, radius, problem, kept):
         guess = at(problem.guess, 3 * p)
         if is_at_contact(own, d, s, p):
             lever = scale_of(own, m, p) * radius[p]
-            share = 1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, lever, dt)
+            share = (
+                1.0 if square(three(held)) == 0.0 else _share(own, d, s, p, lever, dt)
+            )
             _move(own, s, nefc, p, guess, share * x, share * y)
         turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
         place = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))

@@ -14,7 +14,16 @@ from __future__ import annotations
 
 import math
 
-from planarfriction._engine.codegen.vectors import clear, dot, norm, plus, square, three, times, zeros
+from planarfriction._engine.codegen.vectors import (
+    clear,
+    dot,
+    norm,
+    plus,
+    square,
+    three,
+    times,
+    zeros,
+)
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.calls import call_c
@@ -43,8 +52,11 @@ def places_of(s, nefc):
 @kernel
 def _collect(own, d, s, nefc):
     """Collect the owners of constraints, and sums over the contacts of each patch."""
-    owners, counts, frames = owners_of(s, nefc), s.counts, s.frames
-    contacts, ncon = integers(d + own.data.contact)[0], integers32(d + own.data.ncon)[0]
+    owners = owners_of(s, nefc)
+    counts = s.counts
+    frames = s.frames
+    contacts = integers(d + own.data.contact)[0]
+    ncon = integers32(d + own.data.ncon)[0]
     for r in range(nefc):
         owners[r] = -1
     for p in range(own.count):
@@ -55,10 +67,13 @@ def _collect(own, d, s, nefc):
         row = integers32(contact + own.contact.efc_address)[0]
         if row < 0:
             continue
-        one, two = integers32(contact + own.contact.geom)[0], integers32(contact + own.contact.geom)[1]
+        one = integers32(contact + own.contact.geom)[0]
+        two = integers32(contact + own.contact.geom)[1]
         for p in range(own.count):
-            first, second = integers(own.other)[p], integers(own.own)[p]
-            forward, back = one == first and two == second, one == second and two == first
+            first = integers(own.other)[p]
+            second = integers(own.own)[p]
+            forward = one == first and two == second
+            back = one == second and two == first
             if forward or back:
                 sign = 1.0 if forward else -1.0
                 for i in range(3):
@@ -71,13 +86,21 @@ def _collect(own, d, s, nefc):
 @kernel
 def cross(a, b):
     """Return `a x b`."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
 
 
 @kernel
 def turned_by(matrix, vector):
     """Return a vector in the world, from a frame with a matrix of nine numbers."""
-    return dot(three(matrix), vector), dot(three(at(matrix, 3)), vector), dot(three(at(matrix, 6)), vector)
+    return (
+        dot(three(matrix), vector),
+        dot(three(at(matrix, 3)), vector),
+        dot(three(at(matrix, 6)), vector),
+    )
 
 
 @kernel
@@ -95,7 +118,8 @@ def column_of(matrix, count, i):
 @kernel
 def axes(s, p):
     """Return the axes of patch p: x, y, normal."""
-    frame, x = three(at(s.frames, 6 * p)), three(at(s.axes, 3 * p))
+    frame = three(at(s.frames, 6 * p))
+    x = three(at(s.axes, 3 * p))
     n = times(1.0 / norm(frame), frame)
     return x, cross(n, x), n
 
@@ -104,22 +128,23 @@ def axes(s, p):
 def _put_axis(own, d, s, p, before, axis):
     """Write the x axis of patch p: that of its site, across the normal, on the side of the last one; see `FLAT`."""
     turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * integers(own.site)[p])
-    frame, x, y, last = (
-        three(at(s.frames, 6 * p)),
-        column(turned, 0),
-        column(turned, 1),
-        turned_by(turned, three(before)),
-    )
+    frame = three(at(s.frames, 6 * p))
+    x = column(turned, 0)
+    y = column(turned, 1)
+    last = turned_by(turned, three(before))
     n = times(1.0 / norm(frame), frame)
-    x, last = plus(x, -dot(x, n), n), plus(last, -dot(last, n), n)
-    flat, carried = square(x), square(last) >= ALONG
+    x = plus(x, -dot(x, n), n)
+    last = plus(last, -dot(last, n), n)
+    flat = square(x)
+    carried = square(last) >= ALONG
     if carried:
         last = times(1.0 / norm(last), last)
         x = last if flat < FLAT else (times(-1.0, x) if dot(x, last) < 0.0 else x)
     elif flat < ALONG:
         x = plus(y, -dot(y, n), n)
     x = times(1.0 / norm(x), x)
-    s.carried[2 * p], s.carried[2 * p + 1] = 1.0, 0.0
+    s.carried[2 * p] = 1.0
+    s.carried[2 * p + 1] = 0.0
     if carried:
         s.carried[2 * p], s.carried[2 * p + 1] = dot(last, x), dot(n, cross(last, x))
     for i in range(3):
@@ -133,15 +158,26 @@ def _add_surface(own, m, d, s, p, geom, spin, sign):
 
     Return velocity and spin of the surface where the step begins.
     """
-    surface, dt = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom), doubles(m + own.model.timestep)[0]
+    surface = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom)
+    dt = doubles(m + own.model.timestep)[0]
     turned = at(doubles(integers(d + own.data.geom_xmat)[0]), 9 * geom)
-    away = plus(three(at(s.frames, 6 * p + 3)), -1.0, three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * geom)))
+    away = plus(
+        three(at(s.frames, 6 * p + 3)),
+        -1.0,
+        three(at(doubles(integers(d + own.data.geom_xpos)[0]), 3 * geom)),
+    )
     turn = turned_by(turned, three(at(surface, 3)))
     move = plus(turned_by(turned, three(surface)), 1.0, cross(turn, away))
     first, second = turning_mean(xp, dt * norm(turn))
     across = cross(turn, move)
     mean = plus(plus(move, dt * first, across), dt * dt * second, cross(turn, across))
-    _add_drift(s, p, sign, plus(mean, dt, cross(spin, move)), plus(turn, 0.5 * dt, cross(spin, turn)))
+    _add_drift(
+        s,
+        p,
+        sign,
+        plus(mean, dt, cross(spin, move)),
+        plus(turn, 0.5 * dt, cross(spin, turn)),
+    )
     return move, turn
 
 
@@ -157,18 +193,26 @@ def _add_drift(s, p, factor, move, turn):
 @kernel
 def _add_side(own, m, d, s, p, body, geom, sign):
     """Add the surface of a geom on a body to rows and drift of patch p; return velocity, spin and acceleration."""
-    nv, rows, point = own.nv, at(s.jacobian, 3 * own.nv * p), at(s.frames, 6 * p + 3)
-    half, velocity = 0.5 * doubles(m + own.model.timestep)[0], doubles(integers(d + own.data.qvel)[0])
+    nv = own.nv
+    rows = at(s.jacobian, 3 * own.nv * p)
+    point = at(s.frames, 6 * p + 3)
+    half = 0.5 * doubles(m + own.model.timestep)[0]
+    velocity = doubles(integers(d + own.data.qvel)[0])
     x, y, normal = axes(s, p)
-    move, turn, gain, gained = zeros(x), zeros(x), zeros(x), zeros(x)
+    move = zeros(x)
+    turn = zeros(x)
+    gain = zeros(x)
+    gained = zeros(x)
     if body != 0:
         call_c(own.functions.mj_jac, (m, d, s.moves, s.turns, point, body))
         for i in range(nv):
-            moves, turns = column_of(s.moves, nv, i), column_of(s.turns, nv, i)
+            moves = column_of(s.moves, nv, i)
+            turns = column_of(s.turns, nv, i)
             rows[i] += sign * dot(x, moves)
             rows[nv + i] += sign * dot(y, moves)
             rows[2 * nv + i] += sign * dot(normal, turns)
-            move, turn = plus(move, velocity[i], moves), plus(turn, velocity[i], turns)
+            move = plus(move, velocity[i], moves)
+            turn = plus(turn, velocity[i], turns)
         call_c(own.functions.mj_jacDot, (m, d, s.moves, s.turns, point, body))
         for i in range(nv):
             gain = plus(gain, velocity[i], column_of(s.moves, nv, i))
@@ -176,14 +220,17 @@ def _add_side(own, m, d, s, p, body, geom, sign):
         _add_drift(s, p, sign * half, gain, gained)
     if own.model.geom_surfacevel >= 0:
         slide, spin = _add_surface(own, m, d, s, p, geom, turn, sign)
-        move, turn = plus(move, 1.0, slide), plus(turn, 1.0, spin)
+        move = plus(move, 1.0, slide)
+        turn = plus(turn, 1.0, spin)
     return move, turn, gain
 
 
 @kernel
 def _put_places(own, d, s, nefc, p, centre, x, y):
     """Write the places of the contacts of patch p, from its centre along its axes."""
-    contacts, owners, places = integers(d + own.data.contact)[0], owners_of(s, nefc), places_of(s, nefc)
+    contacts = integers(d + own.data.contact)[0]
+    owners = owners_of(s, nefc)
+    places = places_of(s, nefc)
     for c in range(integers32(d + own.data.ncon)[0]):
         contact = contacts + own.contact.size * c
         row = integers32(contact + own.contact.efc_address)[0]
@@ -202,11 +249,18 @@ def _turns_over(own, d, geom, normal):
 @kernel
 def is_curved(own, d, s, p):
     """Return True if patch p lies on a curved side, of either geom."""
-    sides, normal = integers(own.curved)[p], axes(s, p)[2]
+    sides = integers(own.curved)[p]
+    normal = axes(s, p)[2]
     return (
         sides & placing.ROUND != 0
-        or (sides & placing.OWN != 0 and _turns_over(own, d, integers(own.own)[p], normal))
-        or (sides & placing.OTHER != 0 and _turns_over(own, d, integers(own.other)[p], normal))
+        or (
+            sides & placing.OWN != 0
+            and _turns_over(own, d, integers(own.own)[p], normal)
+        )
+        or (
+            sides & placing.OTHER != 0
+            and _turns_over(own, d, integers(own.other)[p], normal)
+        )
     )
 
 
@@ -214,7 +268,9 @@ def is_curved(own, d, s, p):
 def is_at_contact(own, d, s, p):
     """Return True if the origin of patch p follows the contact forces."""
     centre = integers(own.centre)[p]
-    return centre == placing.AT_CONTACT or (centre == placing.AUTO and is_curved(own, d, s, p))
+    return centre == placing.AT_CONTACT or (
+        centre == placing.AUTO and is_curved(own, d, s, p)
+    )
 
 
 @kernel
@@ -223,9 +279,11 @@ def _put_origin(own, d, s, p, normal, held):
 
     It lies below the site, or at the last centre, if any, which moves with the body of the site.
     """
-    frame, local = at(s.frames, 6 * p), three(held)
+    frame = at(s.frames, 6 * p)
+    local = three(held)
     middle = times(1.0 / s.counts[p], three(at(frame, 3)))
-    site, new = integers(own.site)[p], square(local) == 0.0
+    site = integers(own.site)[p]
+    new = square(local) == 0.0
     turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * site)
     origin = three(at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site))
     if is_at_contact(own, d, s, p):
@@ -239,18 +297,35 @@ def _rows(own, m, d, s, nefc, p, kept):
     frame = at(s.frames, 6 * p)
     _put_axis(own, d, s, p, at(kept.before, 3 * p), at(kept.axis, 3 * p))
     x, y, normal = axes(s, p)
-    centre, rows = at(frame, 3), at(s.jacobian, 3 * own.nv * p)
+    centre = at(frame, 3)
+    rows = at(s.jacobian, 3 * own.nv * p)
     _put_origin(own, d, s, p, normal, at(kept.held, 3 * p))
     _put_places(own, d, s, nefc, p, centre, x, y)
     clear(rows, 3 * own.nv)
-    move, turn, gain = _add_side(own, m, d, s, p, integers(own.owner)[p], integers(own.own)[p], 1.0)
-    below, spin, bent = _add_side(own, m, d, s, p, integers(own.support)[p], integers(own.other)[p], -1.0)
-    call_c(own.functions.mj_objectVelocity, (m, d, own.constants.GEOM, integers(own.carrier)[p], s.block, 0))
-    tilt, dt = plus(turn, -1.0, spin), doubles(m + own.model.timestep)[0]
-    apart = dot(normal, plus(move, -1.0, below)) + 0.5 * dt * dot(normal, plus(gain, -1.0, bent))
+    move, turn, gain = _add_side(
+        own, m, d, s, p, integers(own.owner)[p], integers(own.own)[p], 1.0
+    )
+    below, spin, bent = _add_side(
+        own, m, d, s, p, integers(own.support)[p], integers(own.other)[p], -1.0
+    )
+    call_c(
+        own.functions.mj_objectVelocity,
+        (m, d, own.constants.GEOM, integers(own.carrier)[p], s.block, 0),
+    )
+    tilt = plus(turn, -1.0, spin)
+    dt = doubles(m + own.model.timestep)[0]
+    apart = dot(normal, plus(move, -1.0, below)) + 0.5 * dt * dot(
+        normal, plus(gain, -1.0, bent)
+    )
     goes = integers(own.carrier)[p] == integers(own.own)[p]
     over = plus(move if goes else below, -1.0, three(at(s.block, 3)))
-    _add_drift(s, p, 1.0, bend(over, tilt, plus(turn, 1.0, spin), normal, apart, dt), zeros(tilt))
+    _add_drift(
+        s,
+        p,
+        1.0,
+        bend(over, tilt, plus(turn, 1.0, spin), normal, apart, dt),
+        zeros(tilt),
+    )
     s.tilts[p] = math.sqrt(dot(x, tilt) ** 2 + dot(y, tilt) ** 2)
 
 
@@ -263,9 +338,11 @@ def place(own, m, d, s, nefc, kept):
     _collect(own, d, s, nefc)
     touching = 0
     for p in range(own.count):
-        s.carried[2 * p], s.carried[2 * p + 1] = 1.0, 0.0
+        s.carried[2 * p] = 1.0
+        s.carried[2 * p + 1] = 0.0
         for i in range(3):
-            s.drift[3 * p + i], kept.axis[3 * p + i] = 0.0, kept.before[3 * p + i]
+            s.drift[3 * p + i] = 0.0
+            kept.axis[3 * p + i] = kept.before[3 * p + i]
         if s.counts[p] > 0:
             _rows(own, m, d, s, nefc, p, kept)
             touching += 1

@@ -21,14 +21,18 @@ DIGEST = 5
 
 COUNT = len(PARAMETERS)
 
-_PLACES = tuple(LawNumbers._fields.index(name) for name in PARAMETERS if name in LawNumbers._fields)
+_PLACES = tuple(
+    LawNumbers._fields.index(name) for name in PARAMETERS if name in LawNumbers._fields
+)
 _SIGMA_0, _SIGMA_1, _SIGMA_2, _MU_C, _MU_S, _V_S, _RATIO, _SCALE, _X, _Y = range(COUNT)
 
 
 @kernel
 def parameters_of(own, m, p):
     """Return the parameters of patch p in a model, in the order of `PARAMETERS`."""
-    return at(doubles(integers(m + own.model.numeric_data)[0]), own.parameters + COUNT * p)
+    return at(
+        doubles(integers(m + own.model.numeric_data)[0]), own.parameters + COUNT * p
+    )
 
 
 @kernel
@@ -39,7 +43,9 @@ def are_in_range(own, m):
         q = parameters_of(own, m, p)
         for i in range(COUNT):
             valid = valid and xp.in_range(q[i])
-        valid = valid and q[_SIGMA_0] > 0.0 and q[_SIGMA_1] >= 0.0 and q[_SIGMA_2] >= 0.0
+        valid = (
+            valid and q[_SIGMA_0] > 0.0 and q[_SIGMA_1] >= 0.0 and q[_SIGMA_2] >= 0.0
+        )
         valid = valid and q[_MU_C] > 0.0 and q[_MU_S] >= q[_MU_C] and q[_V_S] > 0.0
         valid = valid and q[_RATIO] >= 0.0 and q[_RATIO] < 1.0 and q[_SCALE] > 0.0
     return valid
@@ -64,9 +70,12 @@ def write_laws(own, m, patches, problem, place):
     for p in range(patches.count):
         if integers(own.laws)[p] == 0:
             continue
-        words, record, copied = integers(own.record_words)[p], integers(problem.records[p]), integers(place)
+        words = integers(own.record_words)[p]
+        record = integers(problem.records[p])
+        copied = integers(place)
         copy(record, copied, words)
-        law, q = doubles(place), parameters_of(own, m, p)
+        law = doubles(place)
+        q = parameters_of(own, m, p)
         for i in range(len(_PLACES)):
             law[_PLACES[i]] = q[i]
         problem.records[p] = place
@@ -76,12 +85,15 @@ def write_laws(own, m, patches, problem, place):
 @kernel
 def _alike(own, m, i):
     """Return True if two models share the array of row i of `Host.same`; the last bytes of names count by their map."""
-    array, count, size = integers(own.same)[3 * i], integers(own.same)[3 * i + 1], integers(own.same)[3 * i + 2]
+    array = integers(own.same)[3 * i]
+    count = integers(own.same)[3 * i + 1]
+    size = integers(own.same)[3 * i + 2]
     n = integers32(m + count)[0]
     if n != integers32(own.m + count)[0]:
         return False
     if array >= 0:
-        one, other = integers32(integers(m + array)[0]), integers32(integers(own.m + array)[0])
+        one = integers32(integers(m + array)[0])
+        other = integers32(integers(own.m + array)[0])
         for j in range(n * size // 4):
             if one[j] != other[j]:
                 return False
@@ -97,7 +109,8 @@ def serves(own, m):
     for i in range(own.same_count):
         alike = alike and _alike(own, m, i)
     if alike:
-        one, other = integers(m + own.model.numeric_data)[0], integers(own.m + own.model.numeric_data)[0]
+        one = integers(m + own.model.numeric_data)[0]
+        other = integers(own.m + own.model.numeric_data)[0]
         for i in range(own.parameters - DIGEST, own.parameters):
             alike = alike and doubles(one)[i] == doubles(other)[i]
     return alike
@@ -106,12 +119,20 @@ def serves(own, m):
 @kernel
 def fits(own, m):
     """Return True if the options of a model fit its steps (`Friction` says which do not)."""
-    offsets, e, dt = own.model, own.constants, doubles(m + own.model.timestep)[0]
+    offsets = own.model
+    e = own.constants
+    dt = doubles(m + own.model.timestep)[0]
     integrator = integers32(m + offsets.integrator)[0]
     implicit = integrator == e.IMPLICIT or integrator == e.IMPLICITFAST
-    fit = (implicit or integrator == e.EULER) and integers32(m + offsets.noslip_iterations)[0] <= 0
+    fit = (implicit or integrator == e.EULER) and integers32(
+        m + offsets.noslip_iterations
+    )[0] <= 0
     fit = fit and integers32(m + offsets.enableflags)[0] & e.SLEEP == 0
-    softened = implicit and dt <= LONGEST and integers32(m + offsets.disableflags)[0] & e.NO_REFSAFE == 0
+    softened = (
+        implicit
+        and dt <= LONGEST
+        and integers32(m + offsets.disableflags)[0] & e.NO_REFSAFE == 0
+    )
     for p in range(own.count):
         pair = integers(own.pair)[p]
         constant = doubles(integers(m + offsets.pair_solref)[0])[2 * pair]

@@ -7,7 +7,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from planarfriction._engine.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
+from planarfriction._engine.compiler.memory import (
+    Doubles,
+    Integers,
+    Layout,
+    offsets_of,
+    reader,
+)
 
 
 def _integers(name: str, fields: str) -> Any:
@@ -33,7 +39,9 @@ DataOffsets = _integers(
 SlopeOffsets = _integers("SlopeOffsets", "in_model D_rownnz D_rowadr D_colind")
 """Offsets of the sparsity of `qDeriv`, in the model (`in_model` is 1) or, in older versions, in the data (0)."""
 
-ContactOffsets = _integers("ContactOffsets", "size dist pos frame H dim geom efc_address")
+ContactOffsets = _integers(
+    "ContactOffsets", "size dist pos frame H dim geom efc_address"
+)
 """Size of an `mjContact`, and its offsets."""
 
 Functions = _integers(
@@ -102,9 +110,17 @@ Memory = offsets_of(Remembered)
 
 def memory_layout(states: int, k: int, nv: int) -> Layout:
     """Return the layout of `Remembered` for k patches with so many states in all."""
-    shapes = dict.fromkeys(Remembered._fields, 1) | dict.fromkeys(("state", "after"), states) | {"load": k}
-    shapes |= dict.fromkeys(("guess", "wrench", "twist", "held", "centre", "before", "axis"), 3 * k)
-    return Layout(Remembered, **shapes | dict.fromkeys(("warmstart", "passive", "total"), nv))
+    shapes = (
+        dict.fromkeys(Remembered._fields, 1)
+        | dict.fromkeys(("state", "after"), states)
+        | {"load": k}
+    )
+    shapes |= dict.fromkeys(
+        ("guess", "wrench", "twist", "held", "centre", "before", "axis"), 3 * k
+    )
+    return Layout(
+        Remembered, **shapes | dict.fromkeys(("warmstart", "passive", "total"), nv)
+    )
 
 
 class Scratch(NamedTuple):
@@ -166,10 +182,21 @@ def scratch_layout(words: int, records: int, k: int, nv: int) -> Layout:
     `words` are those of a problem, `records` those of the records of all patches.
     """
     n = 3 * k
-    shapes = {"problem": words, "records": records, "jacobian": n * nv, "more": nv, "block": 36, "frames": 2 * n}
+    shapes = {
+        "problem": words,
+        "records": records,
+        "jacobian": n * nv,
+        "more": nv,
+        "block": 36,
+        "frames": 2 * n,
+    }
     shapes |= {"counts": k, "tilts": k, "carried": 2 * k, "misses": 0}
-    shapes |= dict.fromkeys(("inertia", "stiff"), nv * nv) | dict.fromkeys(("answers", "held"), nv * (n + 1))
-    shapes |= dict.fromkeys(("moves", "turns"), 3 * nv) | dict.fromkeys(("start", "goal", "move", "axes", "drift"), n)
+    shapes |= dict.fromkeys(("inertia", "stiff"), nv * nv) | dict.fromkeys(
+        ("answers", "held"), nv * (n + 1)
+    )
+    shapes |= dict.fromkeys(("moves", "turns"), 3 * nv) | dict.fromkeys(
+        ("start", "goal", "move", "axes", "drift"), n
+    )
     return Layout(Scratch, **shapes)
 
 

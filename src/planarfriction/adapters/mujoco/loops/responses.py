@@ -12,7 +12,11 @@ from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.calls import call_c
 from planarfriction._engine.compiler.memory import at, doubles, integers, integers32
-from planarfriction.adapters.mujoco.loops.elimination import backward, eliminate, multiply
+from planarfriction.adapters.mujoco.loops.elimination import (
+    backward,
+    eliminate,
+    multiply,
+)
 from planarfriction.adapters.mujoco.loops.geometry import owners_of, places_of
 
 MISFIT = 3e-9
@@ -31,7 +35,11 @@ def row_of(own, d, sparse, r):
     if sparse:
         first = integers32(integers(d + own.data.efc_J_rowadr)[0])[r]
         count = integers32(integers(d + own.data.efc_J_rownnz)[0])[r]
-        return count, at(integers(d + own.data.efc_J)[0], first), integers(d + own.data.efc_J_colind)[0] + 4 * first
+        return (
+            count,
+            at(integers(d + own.data.efc_J)[0], first),
+            integers(d + own.data.efc_J_colind)[0] + 4 * first,
+        )
     return own.nv, at(integers(d + own.data.efc_J)[0], own.nv * r), 0
 
 
@@ -70,7 +78,8 @@ def _update(own, m, d, s, sparse, nefc):
 
     The solver may leave states behind that are not those of its forces.
     """
-    acceleration, aref = doubles(integers(d + own.data.qacc)[0]), doubles(integers(d + own.data.efc_aref)[0])
+    acceleration = doubles(integers(d + own.data.qacc)[0])
+    aref = doubles(integers(d + own.data.efc_aref)[0])
     for r in range(nefc):
         s.misses[r] = row_times(own, d, sparse, r, acceleration) - aref[r]
     call_c(own.functions.mj_constraintUpdate, (m, d, s.misses, 0, 1))
@@ -79,15 +88,25 @@ def _update(own, m, d, s, sparse, nefc):
 @kernel
 def _add_cones(own, d, sparse, h):
     """Add the Hessians of elliptic contacts that slide."""
-    contacts, states = integers(d + own.data.contact)[0], integers32(integers(d + own.data.efc_state)[0])
+    contacts = integers(d + own.data.contact)[0]
+    states = integers32(integers(d + own.data.efc_state)[0])
     for c in range(integers32(d + own.data.ncon)[0]):
         contact = contacts + own.contact.size * c
-        row, dim = integers32(contact + own.contact.efc_address)[0], integers32(contact + own.contact.dim)[0]
+        row = integers32(contact + own.contact.efc_address)[0]
+        dim = integers32(contact + own.contact.dim)[0]
         if row < 0 or states[row] != own.constants.CONE:
             continue
         for i in range(dim):
             for j in range(dim):
-                _add_rows(own, d, sparse, row + i, row + j, doubles(contact + own.contact.H)[dim * i + j], h)
+                _add_rows(
+                    own,
+                    d,
+                    sparse,
+                    row + i,
+                    row + j,
+                    doubles(contact + own.contact.H)[dim * i + j],
+                    h,
+                )
 
 
 @kernel
@@ -97,10 +116,13 @@ def _stiff(own, m, d, s, sparse, nefc):
         call_c(own.functions.mj_fullM, (m, s.inertia, integers(d + own.inertia)[0]))
     else:
         call_c(own.functions.mj_fullM, (m, d, s.inertia))
-    h, inertia, cones = s.stiff, s.inertia, False
+    h = s.stiff
+    inertia = s.inertia
+    cones = False
     copy(inertia, h, own.nv * own.nv)
     _update(own, m, d, s, sparse, nefc)
-    states, weights = integers32(integers(d + own.data.efc_state)[0]), doubles(integers(d + own.data.efc_D)[0])
+    states = integers32(integers(d + own.data.efc_state)[0])
+    weights = doubles(integers(d + own.data.efc_D)[0])
     for r in range(nefc):
         if states[r] == own.constants.QUADRATIC:
             _add_rows(own, d, sparse, r, r, weights[r], h)
@@ -112,7 +134,8 @@ def _stiff(own, m, d, s, sparse, nefc):
 @kernel
 def _has_metric(own, m):
     """Return True if the integrator has another metric than M."""
-    integrator, damping = integers32(m + own.model.integrator)[0], doubles(integers(m + own.model.dof_damping)[0])
+    integrator = integers32(m + own.model.integrator)[0]
+    damping = doubles(integers(m + own.model.dof_damping)[0])
     if integrator != own.constants.EULER:
         return True
     damped = False
@@ -126,8 +149,13 @@ def _has_metric(own, m):
 def _free_metric(own, m, d, s, metric, dt):
     """Add the derivatives of free bodies, which newer versions turn by all of them, gyroscopic ones too."""
     for f in range(own.free_count):
-        joint, first = integers(own.free_joints)[f], integers(own.free_dofs)[f]
-        if call_c(own.functions.mjd_freeMhat, (m, d, joint, dt, s.block, 0)) & 0xFFFFFFFF != 0:
+        joint = integers(own.free_joints)[f]
+        first = integers(own.free_dofs)[f]
+        if (
+            call_c(own.functions.mjd_freeMhat, (m, d, joint, dt, s.block, 0))
+            & 0xFFFFFFFF
+            != 0
+        ):
             for i in range(6):
                 for j in range(6):
                     metric[own.nv * (first + i) + first + j] = s.block[6 * i + j]
@@ -136,12 +164,16 @@ def _free_metric(own, m, d, s, metric, dt):
 @kernel
 def _metric(own, m, d, s):
     """Write the metric of the integrator in the place of H."""
-    nv, metric, dt = own.nv, s.stiff, doubles(m + own.model.timestep)[0]
+    nv = own.nv
+    metric = s.stiff
+    dt = doubles(m + own.model.timestep)[0]
     copy(s.inertia, metric, nv * nv)
     integrator = integers32(m + own.model.integrator)[0]
     if integrator == own.constants.EULER:
         for i in range(nv):
-            metric[(nv + 1) * i] += dt * doubles(integers(m + own.model.dof_damping)[0])[i]
+            metric[(nv + 1) * i] += (
+                dt * doubles(integers(m + own.model.dof_damping)[0])[i]
+            )
         return
     fast = integrator == own.constants.IMPLICITFAST
     call_c(own.functions.mjd_smooth_vel, (m, d, 0 if fast else 1))
@@ -166,14 +198,23 @@ def _metric(own, m, d, s):
 @kernel
 def _loads(own, d, sparse, nefc):
     """Write loads, their moments and their responses into the problem."""
-    host, s, k, columns = own.host, own.scratch, own.host.count, 3 * own.host.count + 1
-    load, answers, owners = own.problem.free_load, own.problem.load_response, owners_of(own.scratch, nefc)
-    moments, points = own.problem.moments, places_of(own.scratch, nefc)
+    host = own.host
+    s = own.scratch
+    k = own.host.count
+    columns = 3 * own.host.count + 1
+    load = own.problem.free_load
+    answers = own.problem.load_response
+    owners = owners_of(own.scratch, nefc)
+    moments = own.problem.moments
+    points = places_of(own.scratch, nefc)
     for p in range(k):
-        load[p], moments[2 * p], moments[2 * p + 1] = 0.0, 0.0, 0.0
+        load[p] = 0.0
+        moments[2 * p] = 0.0
+        moments[2 * p + 1] = 0.0
         for i in range(3 * k):
             answers[3 * k * p + i] = 0.0
-    states, weights = integers32(integers(d + host.data.efc_state)[0]), doubles(integers(d + host.data.efc_D)[0])
+    states = integers32(integers(d + host.data.efc_state)[0])
+    weights = doubles(integers(d + host.data.efc_D)[0])
     force = doubles(integers(d + host.data.efc_force)[0])
     for r in range(nefc):
         p = owners[r]
@@ -186,7 +227,8 @@ def _loads(own, d, sparse, nefc):
             continue
         count, numbers, places = row_of(host, d, sparse, r)
         for i in range(count):
-            factor, first = weights[r] * doubles(numbers)[i], columns * column(places, i)
+            factor = weights[r] * doubles(numbers)[i]
+            first = columns * column(places, i)
             if factor != 0.0:
                 for c in range(3 * k):
                     answers[3 * k * p + c] -= factor * s.answers[first + c]
@@ -197,9 +239,14 @@ def _loads(own, d, sparse, nefc):
 @kernel
 def respond(own, m, d, sparse, nefc):
     """Write twists, loads and their responses, at the accelerations and forces in the data, into the problem."""
-    host, s = own.host, own.scratch
-    nv, n, dt = host.nv, 3 * host.count, doubles(m + host.model.timestep)[0]
-    columns, jacobian, answers = n + 1, s.jacobian, s.answers
+    host = own.host
+    s = own.scratch
+    nv = host.nv
+    n = 3 * host.count
+    dt = doubles(m + host.model.timestep)[0]
+    columns = n + 1
+    jacobian = s.jacobian
+    answers = s.answers
     _stiff(host, m, d, s, sparse, nefc)
     stiff = s.stiff
     eliminate(stiff, nv)
@@ -208,7 +255,8 @@ def respond(own, m, d, sparse, nefc):
             answers[columns * i + c] = jacobian[nv * c + i]
         answers[columns * i + n] = 0.0
     backward(stiff, nv, answers, columns)
-    acceleration, velocity = doubles(integers(d + host.data.qacc)[0]), doubles(integers(d + host.data.qvel)[0])
+    acceleration = doubles(integers(d + host.data.qacc)[0])
+    velocity = doubles(integers(d + host.data.qvel)[0])
     for i in range(nv):
         answers[columns * i + n] = acceleration[i]
     held = answers
@@ -218,7 +266,8 @@ def respond(own, m, d, sparse, nefc):
         _metric(host, m, d, s)
         eliminate(stiff, nv)
         backward(stiff, nv, held, columns)
-    response, twist = own.problem.response, own.problem.free_twist
+    response = own.problem.response
+    twist = own.problem.free_twist
     for r in range(n):
         twist[r] = s.drift[r]
         for c in range(n):
@@ -235,11 +284,17 @@ def respond(own, m, d, sparse, nefc):
 @kernel
 def leaves_range(own, m, d, s, sparse, nefc):
     """Return True if the acceleration `more` takes a constraint out of its range: the solution does not hold."""
-    kinds, states = integers32(integers(d + own.data.efc_type)[0]), integers32(integers(d + own.data.efc_state)[0])
-    inverse, more = doubles(integers(d + own.data.efc_R)[0]), s.more
-    loss, dt, e = doubles(integers(d + own.data.efc_frictionloss)[0]), doubles(m + own.model.timestep)[0], own.constants
+    kinds = integers32(integers(d + own.data.efc_type)[0])
+    states = integers32(integers(d + own.data.efc_state)[0])
+    inverse = doubles(integers(d + own.data.efc_R)[0])
+    more = s.more
+    loss = doubles(integers(d + own.data.efc_frictionloss)[0])
+    dt = doubles(m + own.model.timestep)[0]
+    e = own.constants
     for r in range(nefc):
-        change, kind, state = row_times(own, d, sparse, r, more), kinds[r], states[r]
+        change = row_times(own, d, sparse, r, more)
+        kind = kinds[r]
+        state = states[r]
         if change == 0.0 or kind == e.EQUALITY:
             continue
         if kind == e.ELLIPTIC:
@@ -247,10 +302,15 @@ def leaves_range(own, m, d, s, sparse, nefc):
                 return True
             continue
         miss = s.misses[r] + change
-        beyond, then = miss, e.QUADRATIC if miss < 0.0 else e.SATISFIED
+        beyond = miss
+        then = e.QUADRATIC if miss < 0.0 else e.SATISFIED
         if kind == e.FRICTION_DOF or kind == e.FRICTION_TENDON:
             bound = inverse[r] * loss[r]
-            then = e.LINEARNEG if miss <= -bound else (e.LINEARPOS if miss >= bound else e.QUADRATIC)
+            then = (
+                e.LINEARNEG
+                if miss <= -bound
+                else (e.LINEARPOS if miss >= bound else e.QUADRATIC)
+            )
             beyond = abs(miss) - bound
         if then != state and dt * abs(beyond) > MISFIT:
             return True

@@ -13,8 +13,22 @@ from numba import types
 
 from planarfriction._engine.codegen.vectors import clear, copy
 from planarfriction._engine.compiler import callback, entry, jit, kernel
-from planarfriction._engine.compiler.calls import address_of, c_address_of, call, call_c, pointer, shared_word
-from planarfriction._engine.compiler.memory import Place, arrays_at, at, doubles, integers, integers32
+from planarfriction._engine.compiler.calls import (
+    address_of,
+    c_address_of,
+    call,
+    call_c,
+    pointer,
+    shared_word,
+)
+from planarfriction._engine.compiler.memory import (
+    Place,
+    arrays_at,
+    at,
+    doubles,
+    integers,
+    integers32,
+)
 from planarfriction._engine.coupled.coupling import shortening_of, too_far
 from planarfriction._engine.coupled.coupling_rows import Problem
 from planarfriction._engine.coupled.coupling_rows import read as read_patches
@@ -22,9 +36,19 @@ from planarfriction._engine.coupled.coupling_steps import step_all
 from planarfriction._engine.coupled.following import hold
 from planarfriction.adapters.mujoco.loops.centres import follow_centres
 from planarfriction.adapters.mujoco.loops.geometry import place
-from planarfriction.adapters.mujoco.loops.models import displacement_of, fits, scale_of, serves, write_laws
+from planarfriction.adapters.mujoco.loops.models import (
+    displacement_of,
+    fits,
+    scale_of,
+    serves,
+    write_laws,
+)
 from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
-from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
+from planarfriction.adapters.mujoco.loops.responses import (
+    is_sparse,
+    leaves_range,
+    respond,
+)
 
 PASSES = 10
 """Largest number of solutions of a step, again after it has activated other constraints."""
@@ -49,8 +73,10 @@ class _Own(NamedTuple):
 @kernel
 def _recall(host, kept, d):
     """Bring state, guess and start of the solver to the time of the data; return True if the step is planned anew."""
-    now, warmstart = doubles(d + host.data.time)[0], doubles(integers(d + host.data.qacc_warmstart)[0])
-    started, again = False, now == kept.time[0] and now != kept.next[0]
+    now = doubles(d + host.data.time)[0]
+    warmstart = doubles(integers(d + host.data.qacc_warmstart)[0])
+    started = False
+    again = now == kept.time[0] and now != kept.next[0]
     for i in range(host.nv):
         started = started or warmstart[i] != 0.0
     if again and started:
@@ -69,7 +95,8 @@ def _recall(host, kept, d):
 @kernel
 def _take_off(host, kept, d, again):
     """Keep the passive forces without friction: with it, they are still there where velocities were not updated."""
-    passive, same = doubles(integers(d + host.data.qfrc_passive)[0]), again
+    passive = doubles(integers(d + host.data.qfrc_passive)[0])
+    same = again
     for i in range(host.nv):
         same = same and passive[i] == kept.total[i]
     if same:
@@ -81,7 +108,9 @@ def _take_off(host, kept, d, again):
 @kernel
 def _apply(own, d, w):
     """Add wrenches to the passive forces."""
-    nv, kept, passive = own.host.nv, own.kept, doubles(integers(d + own.host.data.qfrc_passive)[0])
+    nv = own.host.nv
+    kept = own.kept
+    passive = doubles(integers(d + own.host.data.qfrc_passive)[0])
     copy(kept.passive, passive, nv)
     for r in range(3 * own.host.count):
         if w[r] != 0.0:
@@ -99,35 +128,45 @@ def _accelerate(host, m, d):
 @kernel
 def _add(own, d):
     """Write the acceleration that the change of wrenches adds, and the start of the solver's next run."""
-    host, n, problem, more = own.host, 3 * own.host.count, own.problem, own.scratch.more
+    host = own.host
+    n = 3 * own.host.count
+    problem = own.problem
+    more = own.scratch.more
     acceleration = doubles(integers(d + host.data.qacc)[0])
     warmstart = doubles(integers(d + host.data.qacc_warmstart)[0])
     for i in range(host.nv):
         more[i] = 0.0
         for r in range(n):
-            more[i] += own.scratch.answers[(n + 1) * i + r] * (problem.wrench[r] - problem.guess[r])
+            more[i] += own.scratch.answers[(n + 1) * i + r] * (
+                problem.wrench[r] - problem.guess[r]
+            )
         warmstart[i] = acceleration[i] + more[i]
 
 
 @kernel
 def _slope(own, patches):
     """Return `move . (w(V, N) - W)` at the host's twists, loads and wrenches: positive before the root only."""
-    problem, n = own.problem, 3 * own.host.count
+    problem = own.problem
+    n = 3 * own.host.count
     copy(problem.free_twist, problem.twist, n)
     copy(problem.free_load, problem.load, own.host.count)
     step_all(patches, problem, patches.steps)
     total = 0.0
     for i in range(n):
-        total += own.scratch.move[i] * (problem.load[i // 3] * problem.unit[i] - problem.guess[i])
+        total += own.scratch.move[i] * (
+            problem.load[i // 3] * problem.unit[i] - problem.guess[i]
+        )
     return total
 
 
 @kernel
 def _set_out(own):
     """Keep the way to the solution, and begin the next from there."""
-    problem, s = own.problem, own.scratch
+    problem = own.problem
+    s = own.scratch
     for i in range(3 * own.host.count):
-        s.start[i], s.goal[i] = problem.guess[i], problem.wrench[i]
+        s.start[i] = problem.guess[i]
+        s.goal[i] = problem.wrench[i]
         s.move[i] = problem.twist[i] - problem.free_twist[i]
 
 
@@ -135,7 +174,8 @@ def _set_out(own):
 def _begin(own, far):
     """Write the next guess: this share of the displacement."""
     for i in range(3 * own.host.count):
-        begin, end = own.scratch.start[i], own.scratch.goal[i]
+        begin = own.scratch.start[i]
+        end = own.scratch.goal[i]
         guess = end if far == 1.0 else begin + far * (end - begin)
         own.problem.guess[i] = guess
         own.problem.wrench[i] = guess
@@ -144,8 +184,14 @@ def _begin(own, far):
 @kernel
 def _solve(own, patches, m, d, nefc):
     """Solve for wrenches that fit the step, into the problem and the passive forces; return iterations and passes."""
-    host, problem, sparse = own.host, own.problem, is_sparse(own.host, m)
-    iterations, passes, shortenings, first, far = 0.0, 0, 0, 0.0, 1.0
+    host = own.host
+    problem = own.problem
+    sparse = is_sparse(own.host, m)
+    iterations = 0.0
+    passes = 0
+    shortenings = 0
+    first = 0.0
+    far = 1.0
     while True:
         respond(own, m, d, sparse, nefc)
         if passes > 0 and shortenings < SHORTENINGS:
@@ -170,7 +216,9 @@ def _solve(own, patches, m, d, nefc):
         if passes >= PASSES or not leaves_range(host, m, d, own.scratch, sparse, nefc):
             break
         _set_out(own)
-        first, shortenings, far = _slope(own, patches), 0, 1.0
+        first = _slope(own, patches)
+        shortenings = 0
+        far = 1.0
         _begin(own, far)
         _accelerate(host, m, d)
     return iterations, passes
@@ -179,16 +227,24 @@ def _solve(own, patches, m, d, nefc):
 @kernel
 def _forget(host, kept, d):
     """Clear the memory: no patch is in contact, or none can have friction."""
-    clear(kept.after, host.states + 10 * host.count)  # and wrenches, origins, twists and loads behind the state
+    clear(
+        kept.after, host.states + 10 * host.count
+    )  # and wrenches, origins, twists and loads behind the state
     copy(doubles(integers(d + host.data.qfrc_passive)[0]), kept.total, host.nv)
-    kept.iterations[0], kept.passes[0], kept.residual[0], kept.converged[0] = 0.0, 0.0, 0.0, 1.0
+    kept.iterations[0] = 0.0
+    kept.passes[0] = 0.0
+    kept.residual[0] = 0.0
+    kept.converged[0] = 1.0
     kept.misplaced[0] = 0.0
 
 
 @kernel
 def _remember(own, m, iterations, passes):
     """Store the result of the step in the user data."""
-    host, kept, problem, valid = own.host, own.kept, own.problem, iterations >= 0.0
+    host = own.host
+    kept = own.kept
+    problem = own.problem
+    valid = iterations >= 0.0
     copy(problem.wrench, kept.wrench, 3 * host.count)
     for p in range(host.count):
         kept.wrench[3 * p + 2] *= scale_of(host, m, p)
@@ -200,17 +256,22 @@ def _remember(own, m, iterations, passes):
             kept.twist[3 * p + 2] /= scale_of(host, m, p)
     else:
         clear(kept.after, host.states)
-    kept.iterations[0], kept.passes[0] = iterations, passes
-    kept.residual[0], kept.converged[0] = problem.residual[0], problem.converged[0] if valid else 0.0
+    kept.iterations[0] = iterations
+    kept.passes[0] = passes
+    kept.residual[0] = problem.residual[0]
+    kept.converged[0] = problem.converged[0] if valid else 0.0
 
 
 @kernel
 def _carry(s, p, vectors, count):
     """Write vectors of patch p, all x before all y, in its axes of this step instead of the last ones."""
-    c, sine = s.carried[2 * p], s.carried[2 * p + 1]
+    c = s.carried[2 * p]
+    sine = s.carried[2 * p + 1]
     for i in range(count):
-        x, y = vectors[i], vectors[count + i]
-        vectors[i], vectors[count + i] = c * x + sine * y, c * y - sine * x
+        x = vectors[i]
+        y = vectors[count + i]
+        vectors[i] = c * x + sine * y
+        vectors[count + i] = c * y - sine * x
 
 
 @kernel
@@ -227,8 +288,10 @@ def _put_guess(host, m, p, s, kept, guess):
 def plan(place_of_host: Place, m: Place, d: Place) -> None:
     """Add friction to the passive forces of the data d, for the step from where they are."""
     host = read(place_of_host)
-    patches, kept = read_patches(host.patches), arrays_at(host.memory, integers(d + host.data.userdata)[0])
-    nefc, dt = integers32(d + host.data.nefc)[0], doubles(m + host.model.timestep)[0]
+    patches = read_patches(host.patches)
+    kept = arrays_at(host.memory, integers(d + host.data.userdata)[0])
+    nefc = integers32(d + host.data.nefc)[0]
+    dt = doubles(m + host.model.timestep)[0]
     _take_off(host, kept, d, _recall(host, kept, d))
     kept.next[0] = doubles(d + host.data.time)[0] + dt
     call_c(host.functions.mj_markStack, (d,))
@@ -236,7 +299,8 @@ def plan(place_of_host: Place, m: Place, d: Place) -> None:
     s = arrays_at(host.scratch, taken)
     if not fits(host, m):
         _forget(host, kept, d)
-        kept.iterations[0], kept.converged[0] = UNFIT, 0.0
+        kept.iterations[0] = UNFIT
+        kept.converged[0] = 0.0
     elif place(host, m, d, s, nefc, kept) == 0:
         _forget(host, kept, d)
     else:
@@ -248,7 +312,12 @@ def plan(place_of_host: Place, m: Place, d: Place) -> None:
         write_laws(host, m, patches, problem, at(taken, host.scratch.records))
         for p in range(host.count):
             first = patches.firsts[p]
-            _carry(s, p, at(problem.state, first), (patches.firsts[p + 1] - first) // patches.bristle[p])
+            _carry(
+                s,
+                p,
+                at(problem.state, first),
+                (patches.firsts[p + 1] - first) // patches.bristle[p],
+            )
             _put_guess(host, m, p, s, at(kept.guess, 3 * p), at(problem.guess, 3 * p))
         copy(problem.guess, problem.wrench, 3 * host.count)
         _apply(own, d, problem.guess)

@@ -11,7 +11,9 @@ gained = wp.func(placing.bend)
 
 
 @wp.func
-def motion_of(host: Host, w: int, point: wp.vec3, body: int, geom: int, surface: wp.spatial_vector):
+def motion_of(
+    host: Host, w: int, point: wp.vec3, body: int, geom: int, surface: wp.spatial_vector
+):
     """Return the velocity and spin of the surface of a geom at a point, and their rates without accelerations.
 
     The surface moves on the body: `v = v_b + u` and `a = a_b + (2 w_b + w) x u`, with `u = s + w x away`.
@@ -24,11 +26,19 @@ def motion_of(host: Host, w: int, point: wp.vec3, body: int, geom: int, surface:
     spin = wp.spatial_top(velocity)
     away = point - host.centre[w, host.root[body]]
     v = wp.spatial_bottom(velocity) + wp.cross(spin, away)
-    a = wp.spatial_bottom(bend) + wp.cross(wp.spatial_top(bend), away) + wp.cross(spin, v)
+    a = (
+        wp.spatial_bottom(bend)
+        + wp.cross(wp.spatial_top(bend), away)
+        + wp.cross(spin, v)
+    )
     frame = host.geom_xmat[w, geom]
     turn = frame * wp.spatial_bottom(surface)
-    u = frame * wp.spatial_top(surface) + wp.cross(turn, point - host.geom_xpos[w, geom])
-    rate = wp.spatial_vector(a + wp.cross(2.0 * spin + turn, u), wp.spatial_top(bend) + wp.cross(spin, turn))
+    u = frame * wp.spatial_top(surface) + wp.cross(
+        turn, point - host.geom_xpos[w, geom]
+    )
+    rate = wp.spatial_vector(
+        a + wp.cross(2.0 * spin + turn, u), wp.spatial_top(bend) + wp.cross(spin, turn)
+    )
     return wp.spatial_vector(v + u, spin + turn), rate
 
 
@@ -54,15 +64,30 @@ def bend(patches: Patches, host: Host, frames: Frames):
             continue
         point = frames.origin[w, p]
         axes = frames.axes[w, p]
-        own, own_rate = motion_of(host, w, point, patches.owner[p], patches.own[p], patches.surface[p, 0])
-        other, other_rate = motion_of(host, w, point, patches.support[p], patches.other[p], patches.surface[p, 1])
+        own, own_rate = motion_of(
+            host, w, point, patches.owner[p], patches.own[p], patches.surface[p, 0]
+        )
+        other, other_rate = motion_of(
+            host, w, point, patches.support[p], patches.other[p], patches.surface[p, 1]
+        )
         rate = 0.5 * dt * (own_rate - other_rate)
         normal = wp.vec3(axes[2, 0], axes[2, 1], axes[2, 2])
         apart = wp.dot(normal, wp.spatial_top(own - other) + wp.spatial_top(rate))
-        over = over_centre(host, w, wp.spatial_top(own), patches.owner[p], patches.own[p])
+        over = over_centre(
+            host, w, wp.spatial_top(own), patches.owner[p], patches.own[p]
+        )
         if patches.carrier[p] != patches.own[p]:
-            over = over_centre(host, w, wp.spatial_top(other), patches.support[p], patches.other[p])
-        x, y, z = gained(over, wp.spatial_bottom(own - other), wp.spatial_bottom(own + other), normal, apart, dt)
+            over = over_centre(
+                host, w, wp.spatial_top(other), patches.support[p], patches.other[p]
+            )
+        x, y, z = gained(
+            over,
+            wp.spatial_bottom(own - other),
+            wp.spatial_bottom(own + other),
+            normal,
+            apart,
+            dt,
+        )
         move = axes * (wp.spatial_top(rate) + wp.vec3(x, y, z))
         turn = wp.dot(normal, wp.spatial_bottom(rate))
         frames.drift[w, p] = frames.drift[w, p] + wp.vec3(move[0], move[1], turn)

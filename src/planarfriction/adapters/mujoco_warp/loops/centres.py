@@ -9,7 +9,12 @@ import warp as wp
 
 from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
-from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches, Problem
+from planarfriction.adapters.mujoco_warp.loops.geometry import (
+    Frames,
+    Host,
+    Patches,
+    Problem,
+)
 
 excess = wp.func(placing.excess)
 
@@ -19,12 +24,20 @@ def speed_of(host: Host, frames: Frames, w: int, p: int) -> float:
     """Return the speed at which a patch slides [m/s]."""
     v = wp.vec2(frames.drift[w, p][0], frames.drift[w, p][1])
     for i in range(frames.jacobian.shape[2]):
-        v += host.qvel[w, i] * wp.vec2(frames.jacobian[w, 3 * p, i], frames.jacobian[w, 3 * p + 1, i])
+        v += host.qvel[w, i] * wp.vec2(
+            frames.jacobian[w, 3 * p, i], frames.jacobian[w, 3 * p + 1, i]
+        )
     return wp.length(v)
 
 
 @wp.kernel(enable_backward=False)
-def follow_centres(patches: Patches, host: Host, frames: Frames, problem: Problem, parameters: wp.array2d(dtype=float)):
+def follow_centres(
+    patches: Patches,
+    host: Host,
+    frames: Frames,
+    problem: Problem,
+    parameters: wp.array2d(dtype=float),
+):
     """Move origins towards the centres of the contact forces, as far as bodies move on each other, and note them.
 
     Note patches that lie beside these forces, too.
@@ -56,20 +69,37 @@ def follow_centres(patches: Patches, host: Host, frames: Frames, problem: Proble
                 rate = frames.rolling[w, p]
                 if patches.radius[p] > 0.0:
                     rate += speed_of(host, frames, w, p) / patches.radius[p]
-                share = wp.min(1.0, host.timestep[w % host.timestep.shape[0]] * rate / wp.static(FOLLOWS))
+                share = wp.min(
+                    1.0,
+                    host.timestep[w % host.timestep.shape[0]]
+                    * rate
+                    / wp.static(FOLLOWS),
+                )
             move = (share / total) * sum
             for i in range(frames.jacobian.shape[2]):
                 spin = frames.jacobian[w, 3 * p + 2, i]
-                frames.jacobian[w, 3 * p, i] = frames.jacobian[w, 3 * p, i] - move[1] * spin
-                frames.jacobian[w, 3 * p + 1, i] = frames.jacobian[w, 3 * p + 1, i] + move[0] * spin
+                frames.jacobian[w, 3 * p, i] = (
+                    frames.jacobian[w, 3 * p, i] - move[1] * spin
+                )
+                frames.jacobian[w, 3 * p + 1, i] = (
+                    frames.jacobian[w, 3 * p + 1, i] + move[0] * spin
+                )
             drift = frames.drift[w, p]
             frames.drift[w, p] = drift + drift[2] * wp.vec3(-move[1], move[0], 0.0)
-            guess = problem.guess[w, p, 2] - move[0] * problem.guess[w, p, 1] + move[1] * problem.guess[w, p, 0]
+            guess = (
+                problem.guess[w, p, 2]
+                - move[0] * problem.guess[w, p, 1]
+                + move[1] * problem.guess[w, p, 0]
+            )
             problem.guess[w, p, 2] = guess
             for r in range(nefc):
                 if frames.owner[w, r] == p:
                     frames.lever[w, r] = frames.lever[w, r] - move
             axes = frames.axes[w, p]
-            frames.origin[w, p] = frames.origin[w, p] + wp.transpose(axes) * wp.vec3(move[0], move[1], 0.0)
+            frames.origin[w, p] = frames.origin[w, p] + wp.transpose(axes) * wp.vec3(
+                move[0], move[1], 0.0
+            )
         site = patches.site[p]
-        frames.centre[w, p] = wp.transpose(host.site_xmat[w, site]) * (frames.origin[w, p] - host.site_xpos[w, site])
+        frames.centre[w, p] = wp.transpose(host.site_xmat[w, site]) * (
+            frames.origin[w, p] - host.site_xpos[w, site]
+        )

@@ -143,12 +143,21 @@ class Frames:
     one less those of the other [E, k]."""
 
 
-Places = wp.struct(type("Places", (), {"__annotations__": dict.fromkeys(Memory._fields, int)}))
+Places = wp.struct(
+    type("Places", (), {"__annotations__": dict.fromkeys(Memory._fields, int)})
+)
 """Places of what patches remember (see `Memory`)."""
 
 
 @wp.kernel(enable_backward=False)
-def recall(patches: Patches, at: Places, host: Host, frames: Frames, problem: Problem, memory: wp.array2d(dtype=float)):
+def recall(
+    patches: Patches,
+    at: Places,
+    host: Host,
+    frames: Frames,
+    problem: Problem,
+    memory: wp.array2d(dtype=float),
+):
     """Bring states, guesses and origins to the times of the worlds: those of the last step's end, or of its start."""
     w = wp.tid()
     time = host.time[w]
@@ -162,21 +171,29 @@ def recall(patches: Patches, at: Places, host: Host, frames: Frames, problem: Pr
         problem.state[w, i] = memory[w, at.state + i]
     for p in range(patches.count):
         first = at.held + 3 * p
-        frames.held[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
+        frames.held[w, p] = wp.vec3(
+            memory[w, first], memory[w, first + 1], memory[w, first + 2]
+        )
         first = at.before + 3 * p
-        frames.before[w, p] = wp.vec3(memory[w, first], memory[w, first + 1], memory[w, first + 2])
+        frames.before[w, p] = wp.vec3(
+            memory[w, first], memory[w, first + 1], memory[w, first + 2]
+        )
         for i in range(3):
             problem.guess[w, p, i] = memory[w, at.guess + 3 * p + i]
 
 
 @wp.func
-def jacobian_of(host: Host, w: int, point: wp.vec3, body: int, dof: int) -> wp.spatial_vector:
+def jacobian_of(
+    host: Host, w: int, point: wp.vec3, body: int, dof: int
+) -> wp.spatial_vector:
     """Return the velocity of a point of a body, and its spin, by a degree of freedom."""
     if host.ancestor[body, dof] == 0:
         return wp.spatial_vector()
     axis = host.axis[w, dof]
     turn = wp.spatial_top(axis)
-    move = wp.spatial_bottom(axis) + wp.cross(turn, point - host.centre[w, host.root[body]])
+    move = wp.spatial_bottom(axis) + wp.cross(
+        turn, point - host.centre[w, host.root[body]]
+    )
     return wp.spatial_vector(move, turn)
 
 
@@ -216,11 +233,15 @@ def carried(turned: wp.mat33, normal: wp.vec3, before: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def drift_of(frame: wp.mat33, away: wp.vec3, surface: wp.spatial_vector, axes: wp.mat33) -> wp.vec3:
+def drift_of(
+    frame: wp.mat33, away: wp.vec3, surface: wp.spatial_vector, axes: wp.mat33
+) -> wp.vec3:
     """Return the twist of the surface of a geom relative to it, at a place away from its origin, in some axes."""
     turn = frame * wp.spatial_bottom(surface)
     move = axes * (frame * wp.spatial_top(surface) + wp.cross(turn, away))
-    return wp.vec3(move[0], move[1], wp.dot(wp.vec3(axes[2, 0], axes[2, 1], axes[2, 2]), turn))
+    return wp.vec3(
+        move[0], move[1], wp.dot(wp.vec3(axes[2, 0], axes[2, 1], axes[2, 2]), turn)
+    )
 
 
 @wp.func
@@ -261,7 +282,15 @@ def is_curved(patches: Patches, host: Host, w: int, p: int, normal: wp.vec3) -> 
 
 
 @wp.func
-def carry(patches: Patches, problem: Problem, w: int, p: int, last: wp.vec3, x: wp.vec3, normal: wp.vec3):
+def carry(
+    patches: Patches,
+    problem: Problem,
+    w: int,
+    p: int,
+    last: wp.vec3,
+    x: wp.vec3,
+    normal: wp.vec3,
+):
     """Write bristles and guess of a patch in its axes of this step instead of the last ones, if there are any."""
     if wp.dot(last, last) > 0.0:
         cosine = wp.dot(last, x)
@@ -281,7 +310,14 @@ def carry(patches: Patches, problem: Problem, w: int, p: int, last: wp.vec3, x: 
 
 @wp.func
 def write_rows(
-    patches: Patches, host: Host, frames: Frames, problem: Problem, w: int, p: int, origin: wp.vec3, axes: wp.mat33
+    patches: Patches,
+    host: Host,
+    frames: Frames,
+    problem: Problem,
+    w: int,
+    p: int,
+    origin: wp.vec3,
+    axes: wp.mat33,
 ) -> wp.vec3:
     """Write the Jacobian of a patch, add its guess to the passive forces, and return the spin in its axes."""
     tilt = wp.vec3()
@@ -297,7 +333,9 @@ def write_rows(
         frames.jacobian[w, 3 * p + 1, i] = move[1]
         frames.jacobian[w, 3 * p + 2, i] = turn[2]
         tilt += host.qvel[w, i] * turn
-        host.passive[w, i] = host.passive[w, i] + move[0] * w_x + move[1] * w_y + turn[2] * w_spin
+        host.passive[w, i] = (
+            host.passive[w, i] + move[0] * w_x + move[1] * w_y + turn[2] * w_spin
+        )
     return tilt
 
 
@@ -334,21 +372,35 @@ def place(patches: Patches, host: Host, frames: Frames, problem: Problem):
         curved = is_curved(patches, host, w, p, normal)
         centre = patches.centre[p]
         frames.at_contact[w, p] = 0
-        if centre == wp.static(placing.AT_CONTACT) or (centre == wp.static(placing.AUTO) and curved):
+        if centre == wp.static(placing.AT_CONTACT) or (
+            centre == wp.static(placing.AUTO) and curved
+        ):
             frames.at_contact[w, p] = 1
             if held[0] == 0.0 and held[1] == 0.0 and held[2] == 0.0:
                 origin = middle
             else:
                 origin += turned * held
         frames.fault[w, p] = 0
-        if not curved and across(axis_of(turned, 0), normal) < wp.static(placing.MARGIN**2):
+        if not curved and across(axis_of(turned, 0), normal) < wp.static(
+            placing.MARGIN**2
+        ):
             frames.fault[w, p] = wp.static(placing.ALONG_X)
         o_x, o_y, o_z = onto_plane(origin, middle, normal)
         origin = wp.vec3(o_x, o_y, o_z)
         own = patches.own[p]
         other = patches.other[p]
-        drift = drift_of(host.geom_xmat[w, own], origin - host.geom_xpos[w, own], patches.surface[p, 0], axes)
-        drift -= drift_of(host.geom_xmat[w, other], origin - host.geom_xpos[w, other], patches.surface[p, 1], axes)
+        drift = drift_of(
+            host.geom_xmat[w, own],
+            origin - host.geom_xpos[w, own],
+            patches.surface[p, 0],
+            axes,
+        )
+        drift -= drift_of(
+            host.geom_xmat[w, other],
+            origin - host.geom_xpos[w, other],
+            patches.surface[p, 1],
+            axes,
+        )
         frames.drift[w, p] = drift
         tilt = write_rows(patches, host, frames, problem, w, p, origin, axes)
         frames.rolling[w, p] = wp.sqrt(tilt[0] * tilt[0] + tilt[1] * tilt[1])

@@ -10,7 +10,13 @@ import mujoco
 import warp as wp
 
 from planarfriction._engine.coupled import placing
-from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches, Places, Problem
+from planarfriction.adapters.mujoco_warp.loops.geometry import (
+    Frames,
+    Host,
+    Patches,
+    Places,
+    Problem,
+)
 
 EQUALITY = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_EQUALITY))
 DOF_LOSS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
@@ -64,7 +70,9 @@ def number_of(host: Host, w: int, r: int, i: int) -> wp.float64:
 
 
 @wp.func
-def gap_of(host: Host, acceleration: wp.array2d(dtype=wp.float64), w: int, r: int) -> wp.float64:
+def gap_of(
+    host: Host, acceleration: wp.array2d(dtype=wp.float64), w: int, r: int
+) -> wp.float64:
     """Return the excess of the acceleration of a row over the one at which it has no force."""
     total = -wp.float64(host.aref[w, r])
     for i in range(count_of(host, w, r, acceleration.shape[1])):
@@ -89,7 +97,12 @@ def range_of(kind: int, force: wp.float64, loss: wp.float64) -> int:
 
 
 @wp.func
-def write_inertia(host: Host, numbers: wp.array2d(dtype=float), w: int, out: wp.array3d(dtype=wp.float64)):
+def write_inertia(
+    host: Host,
+    numbers: wp.array2d(dtype=float),
+    w: int,
+    out: wp.array3d(dtype=wp.float64),
+):
     nv = out.shape[1]
     for i in range(nv):
         for j in range(nv):
@@ -163,7 +176,9 @@ def accelerate(host: Host, frames: Frames, s: Scratch, w: int, nefc: int):
             if kind == 1 and one != wp.float64(0.0):
                 for m in range(count):
                     j = column_of(host, w, r, m)
-                    s.stiff[w, i, j] = s.stiff[w, i, j] + weight * one * number_of(host, w, r, m)
+                    s.stiff[w, i, j] = s.stiff[w, i, j] + weight * one * number_of(
+                        host, w, r, m
+                    )
     solve(s.stiff, w, s.answers)
 
 
@@ -187,12 +202,16 @@ def gain(host: Host, s: Scratch, w: int, dt: wp.float64):
         write_inertia(host, host.metric, w, s.stiff)
     else:
         for i in range(nv):
-            s.stiff[w, i, i] = s.stiff[w, i, i] + dt * wp.float64(host.damping[w % host.damping.shape[0], i])
+            s.stiff[w, i, i] = s.stiff[w, i, i] + dt * wp.float64(
+                host.damping[w % host.damping.shape[0], i]
+            )
     solve(s.stiff, w, s.gains)
 
 
 @wp.func
-def write_twists(host: Host, frames: Frames, s: Scratch, out: Problem, w: int, n: int, dt: wp.float64):
+def write_twists(
+    host: Host, frames: Frames, s: Scratch, out: Problem, w: int, n: int, dt: wp.float64
+):
     """Write the twists at the end of the step and their response."""
     for c in range(n):
         v = wp.float64(frames.drift[w, c / 3][c % 3])
@@ -203,31 +222,44 @@ def write_twists(host: Host, frames: Frames, s: Scratch, out: Problem, w: int, n
             if share != wp.float64(0.0):
                 v += share * (wp.float64(host.qvel[w, i]) + dt * s.gains[w, i, n])
                 for e in range(n):
-                    out.response[w, c, e] = out.response[w, c, e] + float(dt * share * s.gains[w, i, e])
+                    out.response[w, c, e] = out.response[w, c, e] + float(
+                        dt * share * s.gains[w, i, e]
+                    )
         out.twist[w, c / 3, c % 3] = float(v)
 
 
 @wp.func
 def write_loads(
-    patches: Patches, host: Host, frames: Frames, s: Scratch, out: Problem, w: int, nefc: int, first_pass: int
+    patches: Patches,
+    host: Host,
+    frames: Frames,
+    s: Scratch,
+    out: Problem,
+    w: int,
+    nefc: int,
+    first_pass: int,
 ):
     """Write the loads at the end of the step, their response, and their moments as the first pass finds them."""
     n = 3 * patches.count
     for p in range(patches.count):
-        load, moments = wp.float64(0.0), wp.vec2()
+        load = wp.float64(0.0)
+        moments = wp.vec2()
         for e in range(n):
             out.load_response[w, p, e] = 0.0
         for r in range(nefc):
             if frames.owner[w, r] == p and s.active[w, r] == 1:
                 weight = wp.float64(host.stiffness[w, r])
                 force = -weight * gap_of(host, s.acceleration, w, r)
-                load, moments = load + force, moments + float(force) * frames.lever[w, r]
+                load = load + force
+                moments = moments + float(force) * frames.lever[w, r]
                 for i in range(count_of(host, w, r, s.stiff.shape[1])):
                     share = weight * number_of(host, w, r, i)
                     if share != wp.float64(0.0):
                         j = column_of(host, w, r, i)
                         for e in range(n):
-                            out.load_response[w, p, e] = out.load_response[w, p, e] - float(share * s.answers[w, j, e])
+                            out.load_response[w, p, e] = out.load_response[
+                                w, p, e
+                            ] - float(share * s.answers[w, j, e])
         out.load[w, p] = wp.max(float(load), 0.0)
         if first_pass != 0:
             s.pressed[w, p] = wp.vec2()
@@ -238,7 +270,14 @@ def write_loads(
 
 
 @wp.kernel(enable_backward=False)
-def respond(patches: Patches, host: Host, frames: Frames, s: Scratch, out: Problem, first_pass: int):
+def respond(
+    patches: Patches,
+    host: Host,
+    frames: Frames,
+    s: Scratch,
+    out: Problem,
+    first_pass: int,
+):
     """Write twists, loads and their responses; first with the constraints that MuJoCo's solver has found."""
     w = wp.tid()
     nefc = wp.min(host.nefc[w], frames.owner.shape[1])
@@ -250,7 +289,11 @@ def respond(patches: Patches, host: Host, frames: Frames, s: Scratch, out: Probl
         s.passes[w] = 0
         s.rounds[w] = 0
         for r in range(nefc):
-            s.active[w, r] = range_of(host.type[w, r], wp.float64(host.force[w, r]), wp.float64(host.loss[w, r]))
+            s.active[w, r] = range_of(
+                host.type[w, r],
+                wp.float64(host.force[w, r]),
+                wp.float64(host.loss[w, r]),
+            )
     if s.done[w] != 0:
         return
     dt = wp.float64(host.timestep[w % host.timestep.shape[0]])
@@ -333,7 +376,9 @@ def remember(
             if touches:
                 change = wrench[w, p, i] - problem.guess[w, p, i]
                 for j in range(host.passive.shape[1]):
-                    host.passive[w, j] = host.passive[w, j] + frames.jacobian[w, place, j] * change
+                    host.passive[w, j] = (
+                        host.passive[w, j] + frames.jacobian[w, place, j] * change
+                    )
     if touches:
         for j in range(host.passive.shape[1]):
             host.warmstart[w, j] = float(s.acceleration[w, j])

@@ -22,7 +22,14 @@ from planarfriction_studies.experiments.runs import LAW, simulated
 GRAIN = {"angle": np.radians(-50.0), "along": 0.6, "across": 1.0}
 """Direction of the grooves from the x axis [rad], friction along and across them relative to `GROOVED`."""
 
-GROOVED = LuGre(mu_c=0.5, mu_s=0.5, sigma_0=1e5, sigma_1=200.0, sigma_2=0.0, elasto_plastic=ElastoPlastic(0.9))
+GROOVED = LuGre(
+    mu_c=0.5,
+    mu_s=0.5,
+    sigma_0=1e5,
+    sigma_1=200.0,
+    sigma_2=0.0,
+    elasto_plastic=ElastoPlastic(0.9),
+)
 """Law of the grooved sole."""
 
 GROOVED_MODELS = ("distributed", "ReducedModel", "published reduced, LimitSurfaceTable")
@@ -61,7 +68,8 @@ def closed_drift(slope: float) -> float:
     """
     from scipy.optimize import brentq
 
-    m, down = metric(), np.array([0.0, -1.0])
+    m = metric()
+    down = np.array([0.0, -1.0])
 
     def turning(angle: float) -> float:
         e = np.array([np.sin(angle), -np.cos(angle)])
@@ -69,13 +77,21 @@ def closed_drift(slope: float) -> float:
         return float(e[0] * pull[1] - e[1] * pull[0])
 
     first = np.linalg.solve(m, down)
-    return float(brentq(turning, 0.0, 1.2 * np.arctan2(first[0], -first[1]), xtol=1e-14))  # pyright: ignore[reportArgumentType]
+    return float(
+        brentq(turning, 0.0, 1.2 * np.arctan2(first[0], -first[1]), xtol=1e-14)
+    )  # pyright: ignore[reportArgumentType]
 
 
 def _slid(slope: float, model: Any) -> float:
     """Return the angle [rad] from the fall line to where the block went, simulated with bristles."""
-    body = Body(MASS, MASS / 12.0 * (BLOCK[0] ** 2 + BLOCK[1] ** 2), gravity=(0.0, -GRAVITY * np.sin(slope)))
-    sole = Contact(model, MASS * GRAVITY * np.cos(slope), mounted_on="body", name="sole")
+    body = Body(
+        MASS,
+        MASS / 12.0 * (BLOCK[0] ** 2 + BLOCK[1] ** 2),
+        gravity=(0.0, -GRAVITY * np.sin(slope)),
+    )
+    sole = Contact(
+        model, MASS * GRAVITY * np.cos(slope), mounted_on="body", name="sole"
+    )
     end = simulated(Scene(body, [sole], SLIDE, name="grooves"), rtol=1e-7, atol=1e-5)
     return float(np.arctan2(end["x"][-1], -end["y"][-1]))
 
@@ -86,8 +102,15 @@ def grooves(quick: bool) -> dict[str, Any]:
     patch = ContactPatch.rectangle(*BLOCK, 15).with_friction_metric(metric())
     table = ReducedModelPublished(patch, GROOVED, surface=LimitSurfaceTable(patch))
     every = (DistributedModel(patch, GROOVED), ReducedModel(patch, GROOVED), table)
-    drifts = {kind: [_slid(s, model) for s in slopes] for kind, model in zip(GROOVED_MODELS, every, strict=True)}
-    return {"slope": slopes, "closed form": [closed_drift(slope) for slope in slopes], **drifts}
+    drifts = {
+        kind: [_slid(s, model) for s in slopes]
+        for kind, model in zip(GROOVED_MODELS, every, strict=True)
+    }
+    return {
+        "slope": slopes,
+        "closed form": [closed_drift(slope) for slope in slopes],
+        **drifts,
+    }
 
 
 def grooves_comparisons(found: dict[str, Any]) -> list[Comparison]:
@@ -96,18 +119,35 @@ def grooves_comparisons(found: dict[str, Any]) -> list[Comparison]:
     closed = np.asarray(found["closed form"])
     return compare_all(
         "closed form",
-        ((f"drift on grooves, {kind}, all slopes", found[kind], closed, 2e-4, "rad", cause) for kind in GROOVED_MODELS),
+        (
+            (
+                f"drift on grooves, {kind}, all slopes",
+                found[kind],
+                closed,
+                2e-4,
+                "rad",
+                cause,
+            )
+            for kind in GROOVED_MODELS
+        ),
     )
 
 
 def plateaus() -> dict[str, float]:
     """Return the angle [rad] of the published disc under a torque that friction holds, by model, and in closed form."""
-    patch, result = PUBLISHED_PATCHES["Circle"](width=WIDTH), {}
+    patch = PUBLISHED_PATCHES["Circle"](width=WIDTH)
+    result = {}
     for name, model in HELD_MODELS.items():
         scene = drift(model(patch, LAW), load="normal", t_end=1.0)
         result[name] = float(simulated(scene, rtol=1e-7, atol=3e-7)["theta"][-1])
-    moments = {"closed form": patch.second_moment(), "closed form, discs": patch.discs().second_moment()}
-    return result | {name: TORQUE / (LAW.sigma_0 * GRAVITY * float(moment)) for name, moment in moments.items()}
+    moments = {
+        "closed form": patch.second_moment(),
+        "closed form, discs": patch.discs().second_moment(),
+    }
+    return result | {
+        name: TORQUE / (LAW.sigma_0 * GRAVITY * float(moment))
+        for name, moment in moments.items()
+    }
 
 
 def plateau_comparisons(angles: dict[str, float]) -> list[Comparison]:
@@ -120,7 +160,14 @@ def plateau_comparisons(angles: dict[str, float]) -> list[Comparison]:
     return compare_all(
         "closed form",
         (
-            (f"torsional plateau, {name}", angles[name], angles[exact], SHARE * angles[exact], "rad", cause)
+            (
+                f"torsional plateau, {name}",
+                angles[name],
+                angles[exact],
+                SHARE * angles[exact],
+                "rad",
+                cause,
+            )
             for name, exact in rows
         ),
     )
@@ -132,10 +179,19 @@ def soft_finger(quick: bool) -> dict[str, float]:
     Returned are the end of an in-hand run [s], distances of ends from the distributed model's there [m], and the
     largest difference of steady wrenches at 1 N [N, N m].
     """
-    patch, t_end = soft_patch(2), QUICK_TIME if quick else TIME
-    whole, few = DistributedModel(patch, LAW), ReducedModel(patch, LAW)
-    models = {"distributed": whole, "reduced": few, "published": ReducedModelPublished(patch, LAW)}
-    ended = {name: simulated(scenes.in_hand(model), t_end=t_end) for name, model in models.items()}
+    patch = soft_patch(2)
+    t_end = QUICK_TIME if quick else TIME
+    whole = DistributedModel(patch, LAW)
+    few = ReducedModel(patch, LAW)
+    models = {
+        "distributed": whole,
+        "reduced": few,
+        "published": ReducedModelPublished(patch, LAW),
+    }
+    ended = {
+        name: simulated(scenes.in_hand(model), t_end=t_end)
+        for name, model in models.items()
+    }
     apart = np.array([_steady_apart(few, whole, load) for load in LOADS]).max(axis=0)
     return {
         "end [s]": t_end,
@@ -149,6 +205,13 @@ def soft_finger(quick: bool) -> dict[str, float]:
 def _steady_apart(model: Any, rebuilt: Any, load: float) -> np.ndarray:
     """Return the largest difference `[3]` of steady wrenches at 1 N between two models at a load [N]."""
     generator = np.random.default_rng(3)
-    twists = generator.normal(size=(200, 3)) * [1.0, 1.0, 150.0] * 10.0 ** generator.uniform(-4.0, -1.5, (200, 1))
-    wrenches = [each.step(np.zeros((200, *each.state_shape)), twists, load, 10.0)[1] for each in (model, rebuilt)]
+    twists = (
+        generator.normal(size=(200, 3))
+        * [1.0, 1.0, 150.0]
+        * 10.0 ** generator.uniform(-4.0, -1.5, (200, 1))
+    )
+    wrenches = [
+        each.step(np.zeros((200, *each.state_shape)), twists, load, 10.0)[1]
+        for each in (model, rebuilt)
+    ]
     return np.abs(wrenches[0] - wrenches[1]).max(axis=0) / load

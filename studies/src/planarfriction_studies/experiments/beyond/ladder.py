@@ -18,7 +18,13 @@ from planarfriction.scenes.ready import FINE, driven, in_hand, in_hand_load
 from planarfriction_studies.experiments.experiment import Arrays, median_and_quartiles
 from planarfriction_studies.experiments.in_hand import runs
 from planarfriction_studies.experiments.in_hand.runs import Case
-from planarfriction_studies.experiments.runs import IN_WORDS, LAW, SIX_SHAPES, at_centre_of_pressure, simulated
+from planarfriction_studies.experiments.runs import (
+    IN_WORDS,
+    LAW,
+    SIX_SHAPES,
+    at_centre_of_pressure,
+    simulated,
+)
 from planarfriction_studies.experiments.velocity_driven import boxes
 
 DISCS = (1, 4, 8, 16, 32, 64)
@@ -26,7 +32,9 @@ DISCS = (1, 4, 8, 16, 32, 64)
 
 DEFAULT = ReducedModel.cells
 
-NAMES = {n: "reduced" if n == DEFAULT else f"{n} discs" for n in sorted({*DISCS, DEFAULT})}
+NAMES = {
+    n: "reduced" if n == DEFAULT else f"{n} discs" for n in sorted({*DISCS, DEFAULT})
+}
 """Number of discs -> name of the model."""
 
 ALL = "all discs"
@@ -103,8 +111,13 @@ def shape_of(case: str) -> str:
 
 def reduced_models(patch: ContactPatch, discs: Iterable[int]) -> dict[str, Any]:
     """Return the published reduced model, and `ReducedModel` by default and with numbers of discs, by name."""
-    few: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
-    return few | {f"{count} discs": ReducedModel(patch, LAW, cells=count) for count in discs}
+    few: dict[str, Any] = {
+        "published": ReducedModelPublished(patch, LAW),
+        "reduced": ReducedModel(patch, LAW),
+    }
+    return few | {
+        f"{count} discs": ReducedModel(patch, LAW, cells=count) for count in discs
+    }
 
 
 @functools.lru_cache(maxsize=8)
@@ -113,8 +126,12 @@ def models(shape: str) -> dict[str, Any]:
     patch = PUBLISHED_PATCHES[shape]()
     result: dict[str, Any] = {
         "full": DistributedModel(patch, LAW),
-        "published, smooth": ReducedModelPublished(patch, LAW, surface=LimitSurfaceTable(patch)),
-        "published, ellipsoid": ReducedModelPublished(patch, LAW, surface=LimitSurfaceEllipsoid(patch)),
+        "published, smooth": ReducedModelPublished(
+            patch, LAW, surface=LimitSurfaceTable(patch)
+        ),
+        "published, ellipsoid": ReducedModelPublished(
+            patch, LAW, surface=LimitSurfaceEllipsoid(patch)
+        ),
     }
     result |= reduced_models(patch, (count for count in DISCS if count < patch.cells))
     return result | {ALL: ReducedModel(patch, LAW, cells=patch.cells)}
@@ -138,7 +155,9 @@ def in_hand_rows(cases: tuple[Case, ...] = CASES) -> list[Row]:
     rows = []
     for case in cases:
         scene = scenes_of(case.shape)[case.words]
-        run = functools.cache(lambda model, scene=scene: simulated(scene(model), **CLOSE))
+        run = functools.cache(
+            lambda model, scene=scene: simulated(scene(model), **CLOSE)
+        )
         whole = run(models(case.shape)["full"])
         for name, model in models(case.shape).items():
             apart = runs.distance(run(model), whole)
@@ -151,7 +170,9 @@ def reference(patch: ContactPatch) -> ContactPatch:
     """Return the patch with each cell cut into an odd number of parts a side, as many as `REFERENCE_CELLS` allow."""
     sides = int((patch.cell_extents() > 0.0).any(axis=0).sum())
     most = (REFERENCE_CELLS / patch.cells) ** (1.0 / sides)
-    return patch.refined(int(np.clip((int(most) - 1) // 2 * 2 + 1, LEAST_PARTS, MOST_PARTS)))
+    return patch.refined(
+        int(np.clip((int(most) - 1) // 2 * 2 + 1, LEAST_PARTS, MOST_PARTS))
+    )
 
 
 def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES) -> list[Row]:
@@ -165,8 +186,12 @@ def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES) -> list[Row]:
         for name, model in models(shape).items():
             miss = (at_centre_of_pressure(run(model), patch) - wanted)[1:]
             torque = boxes.statistics(np.abs(miss[:, 2]))
-            errors = boxes.statistics(np.hypot(miss[:, 0], miss[:, 1])) | {f"torque {k}": v for k, v in torque.items()}
-            rows.append(Row(f"driven, {shape}", name, int(np.prod(model.state_shape)), errors))
+            errors = boxes.statistics(np.hypot(miss[:, 0], miss[:, 1])) | {
+                f"torque {k}": v for k, v in torque.items()
+            }
+            rows.append(
+                Row(f"driven, {shape}", name, int(np.prod(model.state_shape)), errors)
+            )
     return rows
 
 
@@ -184,7 +209,15 @@ def _time(scene: Scene) -> float:
     """Return the least time in the solver [s] of a few runs: other work beside them only ever adds to it."""
     simulate(scene, t_end=SHORT)
     first = simulate(scene).statistics.wall_time
-    return min([first, *(simulate(scene).statistics.wall_time for _ in range(REPEATS * (first < LONG)))])
+    return min(
+        [
+            first,
+            *(
+                simulate(scene).statistics.wall_time
+                for _ in range(REPEATS * (first < LONG))
+            ),
+        ]
+    )
 
 
 def driven_errors(rows: list[Row]) -> dict[str, dict[str, dict[str, float]]]:
@@ -202,14 +235,19 @@ def ratios(
 ) -> dict[str, dict[str, float]]:
     """Return the error of a model of the ladder over that of another, by shape and statistic, force and torque."""
     names = [f"{before}{name}" for before in ("", "torque ") for name in STATISTICS]
-    return {shape: {name: each[model][name] / each[over][name] for name in names} for shape, each in errors.items()}
+    return {
+        shape: {name: each[model][name] / each[over][name] for name in names}
+        for shape, each in errors.items()
+    }
 
 
 def step_costs(shape: str = "Circle") -> dict[str, Any]:
     """Return times of a step in a compiled loop [s] by reduced model, one of each round in which all take part."""
     patch = PUBLISHED_PATCHES[shape]()
     directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
-    twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
+    twists = directions * 10.0 ** np.random.default_rng(8).uniform(
+        -4.0, -1.5, size=(STEPS, 1)
+    )
     models = reduced_models(patch, DISCS)
     times = {name: np.empty(ROUNDS) for name in models}
     for turn in range(-1, ROUNDS):  # the first compiles
@@ -224,7 +262,10 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
 def step_numbers(times: Arrays) -> dict[str, dict[str, list[float]]]:
     """Return medians and quartiles of the time of a step [s], and of its ratio to the published model's in a round."""
     return {
-        name: {"time": median_and_quartiles(each), "ratio": median_and_quartiles(each / times["published"])}
+        name: {
+            "time": median_and_quartiles(each),
+            "ratio": median_and_quartiles(each / times["published"]),
+        }
         for name, each in times.items()
     }
 
@@ -234,13 +275,19 @@ def spin_up(shape: str) -> dict[str, float]:
     patch = PUBLISHED_PATCHES[shape]()
     dt = SPIN_STEP / (SPIN * patch.contact_radius())
     wanted = _spun(DistributedModel(patch, LAW), dt)
-    models = reduced_models(patch, (8,)) | {ALL: ReducedModel(patch, LAW, cells=patch.cells)}
-    return {name: float(np.abs(_spun(model, dt) - wanted).max()) for name, model in models.items()}
+    models = reduced_models(patch, (8,)) | {
+        ALL: ReducedModel(patch, LAW, cells=patch.cells)
+    }
+    return {
+        name: float(np.abs(_spun(model, dt) - wanted).max())
+        for name, model in models.items()
+    }
 
 
 def _spun(model: Any, dt: float) -> np.ndarray:
     """Return the torque [N m] of a spin from rest, step by step."""
-    state, torques = model.rest(), np.empty(SPIN_STEPS)
+    state = model.rest()
+    torques = np.empty(SPIN_STEPS)
     for i in range(SPIN_STEPS):
         state, wrench = model.step(state, (0.0, 0.0, SPIN), 1.0, dt)
         torques[i] = wrench[2]
@@ -264,16 +311,28 @@ def friction_shift(case: Case) -> float:
     return 0.5 * sum(runs.end_distance(run, base) for run in changed)
 
 
-def end_distances(rows: list[Row], shifts: dict[str, float]) -> dict[str, dict[str, float]]:
+def end_distances(
+    rows: list[Row], shifts: dict[str, float]
+) -> dict[str, dict[str, float]]:
     """Return by case the distance of the end [m] from the distributed model's by model, and the shift by friction."""
     result: dict[str, dict[str, float]] = {}
     for row in rows:
         if "end" in row.errors and row.model != "full":
-            result.setdefault(row.case, {SHIFT: shifts[row.case]})[row.model] = row.errors["end"]
+            result.setdefault(row.case, {SHIFT: shifts[row.case]})[row.model] = (
+                row.errors["end"]
+            )
     return result
 
 
 def score(ends: dict[str, dict[str, float]], load: int, model: str) -> dict[str, Any]:
     """Count the runs under a load in which a model ends nearer than the published one, and compute the ratios."""
-    ratios = {case: each[model] / each["published"] for case, each in ends.items() if case.endswith(f"load {load}")}
-    return {"runs": len(ratios), "nearer": sum(ratio < 1.0 for ratio in ratios.values()), "ratios": ratios}
+    ratios = {
+        case: each[model] / each["published"]
+        for case, each in ends.items()
+        if case.endswith(f"load {load}")
+    }
+    return {
+        "runs": len(ratios),
+        "nearer": sum(ratio < 1.0 for ratio in ratios.values()),
+        "ratios": ratios,
+    }

@@ -15,7 +15,11 @@ from planarfriction.scenes.signal import Signal
 from planarfriction_studies.experiments import experiment
 from planarfriction_studies.experiments.beyond.ladder import reduced_models
 from planarfriction_studies.experiments.experiment import Table
-from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, simulated
+from planarfriction_studies.experiments.runs import (
+    LAW,
+    at_centre_of_pressure,
+    simulated,
+)
 
 DISCS, SEEDS = (8, 16, 64), tuple(range(10))
 """Numbers of discs of `ReducedModel`, beside its default, and seeds of the twists."""
@@ -41,14 +45,23 @@ QUANTITIES = {"force": "N", "torque": "N m"}
 
 def _sector() -> ContactPatch:
     angle = np.linspace(0.0, 1.9, 25)
-    outer, inner = (radius * np.column_stack([np.cos(angle), np.sin(angle)]) for radius in (0.012, 0.006))
-    return ContactPatch.polygon(np.concatenate([outer, inner[::-1]]), 21, name="annulus sector")
+    outer, inner = (
+        radius * np.column_stack([np.cos(angle), np.sin(angle)])
+        for radius in (0.012, 0.006)
+    )
+    return ContactPatch.polygon(
+        np.concatenate([outer, inner[::-1]]), 21, name="annulus sector"
+    )
 
 
 def _feet() -> ContactPatch:
     places = np.array([(0.0, 0.010), (-0.009, -0.006), (0.008, -0.005)])
-    grid = 6e-4 * (np.stack(np.meshgrid(range(4), range(4)), axis=-1).reshape(-1, 2) - 1.5)
-    return ContactPatch.points((places[:, None] + grid).reshape(-1, 2), name="three feet")
+    grid = 6e-4 * (
+        np.stack(np.meshgrid(range(4), range(4)), axis=-1).reshape(-1, 2) - 1.5
+    )
+    return ContactPatch.points(
+        (places[:, None] + grid).reshape(-1, 2), name="three feet"
+    )
 
 
 def _gaussian() -> ContactPatch:
@@ -58,7 +71,14 @@ def _gaussian() -> ContactPatch:
     return ContactPatch.rectangle(0.02, pressure=pressure, name="Gaussian off centre")
 
 
-_CORNER = [(0.0, 0.0), (0.02, 0.0), (0.02, 0.006), (0.006, 0.006), (0.006, 0.02), (0.0, 0.02)]
+_CORNER = [
+    (0.0, 0.0),
+    (0.02, 0.0),
+    (0.02, 0.006),
+    (0.006, 0.006),
+    (0.006, 0.02),
+    (0.0, 0.02),
+]
 
 SHAPES: dict[str, Callable[[], ContactPatch]] = {
     "L": lambda: ContactPatch.polygon(_CORNER, 21, name="L"),
@@ -74,10 +94,15 @@ def twist(seed: int) -> Signal:
     rng = np.random.default_rng([seed, 17])
     time = np.arange(0.0, T_END + 0.5 * DT, DT)
     waves = np.arange(1, WAVES + 1)[:, None, None]
-    sizes, phases = rng.normal(size=(WAVES, 1, 3)) / waves, rng.uniform(0.0, 2.0 * np.pi, (WAVES, 1, 3))
+    sizes = rng.normal(size=(WAVES, 1, 3)) / waves
+    phases = rng.uniform(0.0, 2.0 * np.pi, (WAVES, 1, 3))
     sums = (sizes * np.sin(np.pi * waves * time[:, None] / T_END + phases)).sum(axis=0)
     speed = 10.0 ** rng.uniform(SLOWEST, FASTEST)
-    return Signal.sampled(time, np.minimum(time / START, 1.0)[:, None] * speed * sums * [1.0, 1.0, 1.0 / ARM], "linear")
+    return Signal.sampled(
+        time,
+        np.minimum(time / START, 1.0)[:, None] * speed * sums * [1.0, 1.0, 1.0 / ARM],
+        "linear",
+    )
 
 
 def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.ndarray]:
@@ -87,7 +112,8 @@ def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.n
     """
     patch = SHAPES[shape]()
     fine = patch.refined(FINER) if (patch.cell_extents() > 0.0).any() else patch
-    models, reference = reduced_models(patch, DISCS), DistributedModel(fine, LAW)
+    models = reduced_models(patch, DISCS)
+    reference = DistributedModel(fine, LAW)
     result = {}
     for seed in seeds:
         wrench = functools.partial(_wrench, twist=twist(seed))
@@ -100,13 +126,19 @@ def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.n
 
 
 def _wrench(model: Any, twist: Signal) -> np.ndarray:
-    return at_centre_of_pressure(simulated(driven(model, twist=twist, t_end=T_END), save_every=EVERY), model.patch)
+    return at_centre_of_pressure(
+        simulated(driven(model, twist=twist, t_end=T_END), save_every=EVERY),
+        model.patch,
+    )
 
 
 def ratios(errors: dict[str, np.ndarray]) -> dict[str, dict[str, list[float]]]:
     """Return the largest errors of `ReducedModel` over the published model's, by model and quantity, of each twist."""
     return {
-        name: {quantity: (errors[name] / errors["published"])[:, i].tolist() for i, quantity in enumerate(QUANTITIES)}
+        name: {
+            quantity: (errors[name] / errors["published"])[:, i].tolist()
+            for i, quantity in enumerate(QUANTITIES)
+        }
         for name in errors
         if name != "published"
     }
@@ -125,4 +157,10 @@ def table(found: dict[str, dict[str, np.ndarray]]) -> Table:
     }
     note = f"Twists of {T_END:g} s, samples every {1e3 * EVERY:g} ms; from a grid cut {FINER} times finer."
     title = "New shapes: largest error over the published reduced model's, median / worst twist"
-    return experiment.table(title, {shape: ratios(each) for shape, each in found.items()}, columns, "patch", note)
+    return experiment.table(
+        title,
+        {shape: ratios(each) for shape, each in found.items()},
+        columns,
+        "patch",
+        note,
+    )

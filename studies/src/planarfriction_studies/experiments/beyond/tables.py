@@ -11,9 +11,24 @@ import numpy as np
 from planarfriction.plots.style import PlotFigure
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import contacts
-from planarfriction_studies.experiments.beyond.ladder import ALL, ENDS, MOVED, NAMES, SHIFT, STATISTICS, Row, shape_of
+from planarfriction_studies.experiments.beyond.ladder import (
+    ALL,
+    ENDS,
+    MOVED,
+    NAMES,
+    SHIFT,
+    STATISTICS,
+    Row,
+    shape_of,
+)
 from planarfriction_studies.experiments.beyond.surfaces import KINDS
-from planarfriction_studies.experiments.experiment import Arrays, Numbers, Table, entry, table
+from planarfriction_studies.experiments.experiment import (
+    Arrays,
+    Numbers,
+    Table,
+    entry,
+    table,
+)
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
 from planarfriction_studies.experiments.velocity_driven import boxes
 from planarfriction_studies.experiments.wording import fmt, short, span
@@ -34,14 +49,26 @@ shown = functools.partial(short, digits=2)
 
 def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
     """Return surfaces, models in both kinds of runs, every combination, spin-up, costs and plateaus."""
-    surfaces, ends = numbers["surfaces"], numbers["in hand"]
-    kinds = [kind for kind in KINDS if any(f"{kind}/force" in each for each in surfaces.values())]
-    spins, steps, angles = numbers["spin-up"], numbers["step"], numbers["plateaus"]
+    surfaces = numbers["surfaces"]
+    ends = numbers["in hand"]
+    kinds = [
+        kind
+        for kind in KINDS
+        if any(f"{kind}/force" in each for each in surfaces.values())
+    ]
+    spins = numbers["spin-up"]
+    steps = numbers["step"]
+    angles = numbers["plateaus"]
     return (
         table(
             "Error of the force from the exact surface, mean / largest [mN]",
             _by_shape(surfaces),
-            {kind: lambda each, kind=kind: _mean_and_largest(each.get(f"{kind}/force")) for kind in kinds},
+            {
+                kind: lambda each, kind=kind: _mean_and_largest(
+                    each.get(f"{kind}/force")
+                )
+                for kind in kinds
+            },
             "patch",
             "$\\mu f_N$ = 1 N.",
         ),
@@ -59,17 +86,34 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             },
             "run",
         ),
-        _ratios(numbers["driven ratios"], "Error of ReducedModel over the published reduced model's"),
+        _ratios(
+            numbers["driven ratios"],
+            "Error of ReducedModel over the published reduced model's",
+        ),
         table(
             "In hand: distance of the end from the distributed model's",
             ends,
-            {f"{words} [mm]": _scaled(name) for name, words in (ENDS | {SHIFT: "0.1 % of friction"}).items()}
-            | {"default / published": lambda each: shown(each["reduced"] / each["published"])},
+            {
+                f"{words} [mm]": _scaled(name)
+                for name, words in (ENDS | {SHIFT: "0.1 % of friction"}).items()
+            }
+            | {
+                "default / published": lambda each: shown(
+                    each["reduced"] / each["published"]
+                )
+            },
             "run",
         ),
-        _combinations(rows, "third quartile", "driven", "error of the force, third quartile [mN]"),
+        _combinations(
+            rows, "third quartile", "driven", "error of the force, third quartile [mN]"
+        ),
         *(
-            _combinations(rows, "end", load, f"in hand, {load}: end from the distributed model [mm]")
+            _combinations(
+                rows,
+                "end",
+                load,
+                f"in hand, {load}: end from the distributed model [mm]",
+            )
             for load in ("load 2", "load 1")
         ),
         table(
@@ -83,7 +127,9 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             "Step in a compiled loop, disc",
             {MODEL_WORDS[model]: each for model, each in steps.items()},
             {
-                "time [µs]": lambda each: _spread(1e6 * value for value in each["time"]),
+                "time [µs]": lambda each: _spread(
+                    1e6 * value for value in each["time"]
+                ),
                 "relative to the published model": lambda each: _spread(each["ratio"]),
             },
             "model",
@@ -94,7 +140,9 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             angles,
             {
                 "angle [µrad]": entry(scale=1e6),
-                "off": lambda angle: f"{fmt(100.0 * (angle / angles['closed form'] - 1.0), '+.3f')} %",
+                "off": lambda angle: (
+                    f"{fmt(100.0 * (angle / angles['closed form'] - 1.0), '+.3f')} %"
+                ),
             },
             "model",
         ),
@@ -111,33 +159,64 @@ def _scaled(name: str) -> Callable[[dict[str, float]], str]:
 
 
 def _mean_and_largest(each: dict[str, float] | None) -> str:
-    return "" if each is None else f"{shown(1e3 * each['mean'])} / {shown(1e3 * each['max'])}"
+    return (
+        ""
+        if each is None
+        else f"{shown(1e3 * each['mean'])} / {shown(1e3 * each['max'])}"
+    )
 
 
 def _ratios(ratios: dict[str, dict[str, float]], title: str) -> Table:
     names = list(next(iter(ratios.values())))
-    return table(title, _by_shape(ratios), {name: lambda each, name=name: shown(each[name]) for name in names}, "patch")
+    return table(
+        title,
+        _by_shape(ratios),
+        {name: lambda each, name=name: shown(each[name]) for name in names},
+        "patch",
+    )
 
 
 def _combinations(rows: list[Row], quantity: str, run: str, title: str) -> Table:
     """Return a table of every model on the six shapes: one statistic of one kind of run, and the costs of the runs."""
-    chosen = [row for row in rows if run in row.case and quantity in row.errors and "far" not in row.case]
-    shapes = [shape for shape in SIX_SHAPES if any(shape_of(row.case) == IN_WORDS[shape] for row in chosen)]
+    chosen = [
+        row
+        for row in rows
+        if run in row.case and quantity in row.errors and "far" not in row.case
+    ]
+    shapes = [
+        shape
+        for shape in SIX_SHAPES
+        if any(shape_of(row.case) == IN_WORDS[shape] for row in chosen)
+    ]
     result = []
-    for model in (model for model in MODEL_WORDS if any(row.model == model for row in chosen)):
+    for model in (
+        model for model in MODEL_WORDS if any(row.model == model for row in chosen)
+    ):
         own = [row for row in chosen if row.model == model]
         by_shape = {shape_of(row.case): row for row in own}
         values = (by_shape.get(IN_WORDS[shape]) for shape in shapes)
-        cells = ["as full" if row is None else shown(1e3 * row.errors[quantity]) for row in values]
-        costs, states = [row.time for row in own], [row.states for row in own]
-        result.append((MODEL_WORDS[model], _span(states, str), _span(costs, shown), *cells))
+        cells = [
+            "as full" if row is None else shown(1e3 * row.errors[quantity])
+            for row in values
+        ]
+        costs = [row.time for row in own]
+        states = [row.states for row in own]
+        result.append(
+            (MODEL_WORDS[model], _span(states, str), _span(costs, shown), *cells)
+        )
     words = [IN_WORDS[shape] for shape in shapes]
     note = "Time: in the solver, over the distributed model's. As full: no more cells than asked for."
-    return Table(f"Every combination, {title}", ("model and surface", "bristles", "time", *words), result, note)
+    return Table(
+        f"Every combination, {title}",
+        ("model and surface", "bristles", "time", *words),
+        result,
+        note,
+    )
 
 
 def _span(values: list[Any], words: Callable[[Any], str]) -> str:
-    low, high = words(min(values)), words(max(values))
+    low = words(min(values))
+    high = words(max(values))
     return low if low == high else f"{low} to {high}"
 
 
@@ -147,27 +226,52 @@ def _spread(values: Iterable[float]) -> str:
 
 
 COLOURS = dict(
-    zip(KINDS, (looks.REDUCED, looks.OTHERS[0], looks.DISTRIBUTED, looks.QUARTIC, looks.ELLIPSOID), strict=True)
+    zip(
+        KINDS,
+        (
+            looks.REDUCED,
+            looks.OTHERS[0],
+            looks.DISTRIBUTED,
+            looks.QUARTIC,
+            looks.ELLIPSOID,
+        ),
+        strict=True,
+    )
 )
 
 MODEL_COLOURS = dict(
-    zip(MOVED, (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0], looks.DISTRIBUTED), strict=True)
+    zip(
+        MOVED,
+        (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0], looks.DISTRIBUTED),
+        strict=True,
+    )
 )
 
 
 def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
     """Draw errors of force [N] and torque [N mm] of each kind of surface from the exact one."""
-    figure, panels = looks.box_panels([IN_WORDS[shape].replace(", ", ",\n") for shape in errors], 6.8)
-    rows = (("force", 1.0, "error of the force [N]"), ("torque", 1e3, "error of the torque [N mm]"))
+    figure, panels = looks.box_panels(
+        [IN_WORDS[shape].replace(", ", ",\n") for shape in errors], 6.8
+    )
+    rows = (
+        ("force", 1.0, "error of the force [N]"),
+        ("torque", 1e3, "error of the torque [N mm]"),
+    )
     for axes, (quantity, factor, label) in zip(panels, rows, strict=True):
         for place, each in enumerate(errors.values()):
             kinds = [kind for kind in KINDS if f"{kind}/{quantity}" in each]
             for i, kind in enumerate(kinds):
                 at = place + 0.15 * (i - 0.5 * (len(kinds) - 1))
-                numbers = np.percentile(factor * each[f"{kind}/{quantity}"], [5, 25, 50, 75, 95, 100])
+                numbers = np.percentile(
+                    factor * each[f"{kind}/{quantity}"], [5, 25, 50, 75, 95, 100]
+                )
                 looks.box(axes, at, numbers, COLOURS[kind], 0.12)
         axes.set(yscale="log", ylabel=label)
-    shown = {kind: COLOURS[kind] for kind in KINDS if any(f"{kind}/force" in each for each in errors.values())}
+    shown = {
+        kind: COLOURS[kind]
+        for kind in KINDS
+        if any(f"{kind}/force" in each for each in errors.values())
+    }
     looks.box_legend(figure, shown, 6)
     return figure
 
@@ -181,10 +285,21 @@ def staircase(stairs: Arrays) -> PlotFigure:
             (row[0], "", 1e3, "torque [N mm]", "torque, from the exact one [N µm]"),
             (row[1], ", force", 1.0, "force [N]", "force, from the exact one [mN]"),
         ):
-            cells, exact = factor * stairs[f"{shape}/sum{ending}"], factor * stairs[f"{shape}/exact{ending}"]
-            if shape == "Circle":  # steps of a few thousandths do not show beside the curve itself
-                cells, exact, label = 1e3 * (cells - exact), 0.0 * exact, from_exact
-            axes.plot(place, cells, color=looks.DISTRIBUTED, lw=1.1, label="sum over the 21 x 21 grid's cells")
+            cells = factor * stairs[f"{shape}/sum{ending}"]
+            exact = factor * stairs[f"{shape}/exact{ending}"]
+            if (
+                shape == "Circle"
+            ):  # steps of a few thousandths do not show beside the curve itself
+                cells = 1e3 * (cells - exact)
+                exact = 0.0 * exact
+                label = from_exact
+            axes.plot(
+                place,
+                cells,
+                color=looks.DISTRIBUTED,
+                lw=1.1,
+                label="sum over the 21 x 21 grid's cells",
+            )
             axes.plot(place, exact, color=looks.EXACT, lw=1.3, label="exact")
             axes.set(ylabel=label, xlim=(0.0, place[-1]))
             axes.set_title(IN_WORDS[shape], fontsize="medium", loc="left")
@@ -198,15 +313,22 @@ def staircase(stairs: Arrays) -> PlotFigure:
 def driven_boxes(errors: dict[str, dict[str, dict[str, float]]]) -> PlotFigure:
     """Draw errors of force [mN] and torque [N mm] of the models, from the finer grid."""
     figure, panels = looks.box_panels([IN_WORDS[shape] for shape in errors], 7.0)
-    rows = (("", "error of the force [mN]", 1e-2), ("torque ", "error of the torque [N mm]", 1e-4))
+    rows = (
+        ("", "error of the force [mN]", 1e-2),
+        ("torque ", "error of the torque [N mm]", 1e-4),
+    )
     for axes, (before, label, linear) in zip(panels, rows, strict=True):
         axes.set_yscale("symlog", linthresh=linear, linscale=0.4)
         for place, each in enumerate(errors.values()):
-            for offset, (model, colour) in zip((-0.32, -0.16, 0.0, 0.16, 0.32), MODEL_COLOURS.items(), strict=True):
+            for offset, (model, colour) in zip(
+                (-0.32, -0.16, 0.0, 0.16, 0.32), MODEL_COLOURS.items(), strict=True
+            ):
                 values = [1e3 * each[model][before + name] for name in boxes.COLUMNS]
                 looks.box(axes, place + offset, values, colour, 0.13)
         axes.set(ylabel=label, ylim=(0.0, None))
-    looks.box_legend(figure, {MOVED[model]: colour for model, colour in MODEL_COLOURS.items()}, 3)
+    looks.box_legend(
+        figure, {MOVED[model]: colour for model, colour in MODEL_COLOURS.items()}, 3
+    )
     return figure
 
 
@@ -218,10 +340,14 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     closed = np.degrees([contacts.closed_drift(slope) for slope in fine])
     axes.plot(np.degrees(fine), closed, color=looks.EXACT, label="closed form")
     colours = (looks.DISTRIBUTED, looks.FEW, looks.REDUCED)
-    for kind, marker, colour in zip(contacts.GROOVED_MODELS, "ox+", colours, strict=True):
+    for kind, marker, colour in zip(
+        contacts.GROOVED_MODELS, "ox+", colours, strict=True
+    ):
         look = {"color": colour, "label": kind, "fillstyle": "none", "ms": 7}
         axes.plot(np.degrees(slopes), np.degrees(numbers[kind]), marker, **look)
-    axes.set(xlabel="slope [deg]", ylabel="drift from the fall line [deg]", ylim=(0.0, None))
+    axes.set(
+        xlabel="slope [deg]", ylabel="drift from the fall line [deg]", ylim=(0.0, None)
+    )
     axes.legend(frameon=False)
     return figure
 
@@ -247,7 +373,12 @@ FAMILIES = (
 )  # fmt: skip
 
 ROWS = (
-    ("driven, ", "third quartile", "moved with a given velocity", "force error, third quartile [mN]"),
+    (
+        "driven, ",
+        "third quartile",
+        "moved with a given velocity",
+        "force error, third quartile [mN]",
+    ),
     ("load 2", "end", "in hand, load 2 (slips at once)", "distance of the end [mm]"),
     ("load 1", "end", "in hand, load 1 (barely slips)", "distance of the end [mm]"),
 )
@@ -264,25 +395,43 @@ def draw_ladder(rows: list[Row]) -> PlotFigure:
     from matplotlib.ticker import FixedLocator, NullLocator
 
     many = {shape_of(row.case) for row in rows if row.model == "64 discs"}
-    groups = [group for few in (False, True) if (group := [row for row in rows if (shape_of(row.case) in many) ^ few])]
-    figure, panels = looks.panels(8.3, 9.6, len(ROWS), len(groups), sharex="col", sharey="row", squeeze=False)
+    groups = [
+        group
+        for few in (False, True)
+        if (group := [row for row in rows if (shape_of(row.case) in many) ^ few])
+    ]
+    figure, panels = looks.panels(
+        8.3, 9.6, len(ROWS), len(groups), sharex="col", sharey="row", squeeze=False
+    )
     for column, group in zip(panels.T, groups, strict=True):
         cells = [row.states // 2 for row in group if row.model == "full"]
         for axes, (case, quantity, title, label) in zip(column, ROWS, strict=True):
             for family in FAMILIES:
-                _draw_family(axes, family, [row for row in group if case in row.case], quantity)
+                _draw_family(
+                    axes, family, [row for row in group if case in row.case], quantity
+                )
             axes.set(xscale="log", yscale="log", ylabel=label)
             axes.label_outer()
             axes.set_title(title, fontsize="medium", loc="left")
-            axes.set_title("better \N{SOUTH WEST ARROW}", fontsize="medium", loc="right", color="0.35")
+            axes.set_title(
+                "better \N{SOUTH WEST ARROW}",
+                fontsize="medium",
+                loc="right",
+                color="0.35",
+            )
             axes.margins(x=0.12, y=0.1)
             axes.xaxis.set_major_locator(FixedLocator(TICKS))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_locator(NullLocator())
-        column[-1].set_xlabel(f"time of a run / distributed model's [-],\npatches of {span(cells, 'd')} cells")
+        column[-1].set_xlabel(
+            f"time of a run / distributed model's [-],\npatches of {span(cells, 'd')} cells"
+        )
     figure.align_ylabels(panels[:, 0])
     look = {"ls": "-", "lw": 1.4, "ms": 6.5, "mec": "white"}
-    key = [looks.line_key(each.words, marker=each.marker, color=each.colour, **look) for each in FAMILIES]
+    key = [
+        looks.line_key(each.words, marker=each.marker, color=each.colour, **look)
+        for each in FAMILIES
+    ]
     looks.legend(figure, key, 2)
     return figure
 
@@ -300,9 +449,26 @@ def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> N
             axes.axvline(cost, color=family.colour, lw=1.0, ls=":")
             continue
         middle = float(np.median(errors))
-        axes.vlines(cost, errors.min(), errors.max(), color=family.colour, lw=1.6, alpha=0.35)
+        axes.vlines(
+            cost, errors.min(), errors.max(), color=family.colour, lw=1.6, alpha=0.35
+        )
         place = PLACES[len(medians) % 2]
-        axes.annotate(words, (cost, middle), place, textcoords="offset points", fontsize=9, color=family.colour)
+        axes.annotate(
+            words,
+            (cost, middle),
+            place,
+            textcoords="offset points",
+            fontsize=9,
+            color=family.colour,
+        )
         medians.append((cost, middle))
     if medians:
-        axes.plot(*np.transpose(medians), "-", marker=family.marker, ms=6.5, mec="white", lw=1.4, color=family.colour)
+        axes.plot(
+            *np.transpose(medians),
+            "-",
+            marker=family.marker,
+            ms=6.5,
+            mec="white",
+            lw=1.4,
+            color=family.colour,
+        )

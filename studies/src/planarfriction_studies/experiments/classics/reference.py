@@ -14,7 +14,14 @@ import numpy as np
 
 from planarfriction_studies.experiments.experiment import Arrays
 
-SIGMA_0, SIGMA_1, SIGMA_2, COULOMB, STATIC, STRIBECK = 1e5, np.sqrt(1e5), 0.4, 1.0, 1.5, 1e-3
+SIGMA_0, SIGMA_1, SIGMA_2, COULOMB, STATIC, STRIBECK = (
+    1e5,
+    np.sqrt(1e5),
+    0.4,
+    1.0,
+    1.5,
+    1e-3,
+)
 """Parameters of the paper: N/m, N s/m, N s/m, N, N, m/s."""
 
 RTOL, ATOL = 1e-9, 1e-14
@@ -35,7 +42,12 @@ def friction(z: Any, v: Any) -> tuple[Any, Any]:
 
 
 def moved(
-    knots: Sequence[float], force: Course = lambda t: 0.0, pulled: Course = lambda t: 0.0, *, k: float = 0.0, dt: float
+    knots: Sequence[float],
+    force: Course = lambda t: 0.0,
+    pulled: Course = lambda t: 0.0,
+    *,
+    k: float = 0.0,
+    dt: float,
 ) -> Arrays:
     """Integrate a mass of 1 kg from rest under a force and the pull of a spring of stiffness `k` [N/m].
 
@@ -57,10 +69,19 @@ def hunting(gains: Sequence[float], goal: float, t_end: float, dt: float) -> Arr
     def rates(t: float, y: np.ndarray) -> list[float]:
         x, v, z, error = y
         rate, against = friction(z, v)
-        return [v, stiffness * (goal - x) + integral * error - damping * v - against, rate, goal - x]
+        return [
+            v,
+            stiffness * (goal - x) + integral * error - damping * v - against,
+            rate,
+            goal - x,
+        ]
 
     time, (x, v, _, error) = _integrated(rates, (0.0, t_end), np.zeros(4), dt)
-    return {"time": time, "x": x, "force": stiffness * (goal - x) + integral * error - damping * v}
+    return {
+        "time": time,
+        "x": x,
+        "force": stiffness * (goal - x) + integral * error - damping * v,
+    }
 
 
 def driven(t_end: float, speed: Callable[[Any], Any], dt: float) -> Arrays:
@@ -73,7 +94,9 @@ def driven(t_end: float, speed: Callable[[Any], Any], dt: float) -> Arrays:
     return {"time": time, "vx": speed(time), "friction": friction(z, speed(time))[1]}
 
 
-def _integrated(rates: Any, knots: Sequence[float], y: Any, dt: float) -> tuple[np.ndarray, np.ndarray]:
+def _integrated(
+    rates: Any, knots: Sequence[float], y: Any, dt: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return times and states `[n, T]`, piece after piece."""
     from scipy.integrate import solve_ivp
 

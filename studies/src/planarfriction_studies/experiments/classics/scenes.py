@@ -29,16 +29,28 @@ PER_PERIOD = 2000
 
 def point() -> Any:
     """Make the model of the paper: a single point with `sigma_0 = 1e5`, `sigma_1 = sqrt(1e5)`, `sigma_2 = 0.4`."""
-    law = LuGre(mu_c=1.0, mu_s=1.5, v_s=1e-3, sigma_0=1e5, sigma_1=np.sqrt(1e5), sigma_2=0.4)
+    law = LuGre(
+        mu_c=1.0, mu_s=1.5, v_s=1e-3, sigma_0=1e5, sigma_1=np.sqrt(1e5), sigma_2=0.4
+    )
     return DistributedModel(ContactPatch.points([[0.0, 0.0]]), law)
 
 
 def _contact(model: Any, normal_force: Any) -> Contact:
-    return Contact(point() if model is None else model, normal_force, mounted_on="body", name="table")
+    return Contact(
+        point() if model is None else model,
+        normal_force,
+        mounted_on="body",
+        name="table",
+    )
 
 
 def stick_slip(
-    model: Any = None, *, stiffness: float = 2.0, speed: float = 0.1, normal_force: Any = 1.0, t_end: float = 30.0
+    model: Any = None,
+    *,
+    stiffness: float = 2.0,
+    speed: float = 0.1,
+    normal_force: Any = 1.0,
+    t_end: float = 30.0,
 ) -> Scene:
     """Make the scene of a mass pulled over a table by a spring of `stiffness` [N/m] whose end moves at `speed` [m/s].
 
@@ -46,9 +58,18 @@ def stick_slip(
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
-    t_end, way = validation.positive("t_end", t_end), validation.number("speed", speed) * t_end
+    t_end, way = (
+        validation.positive("t_end", t_end),
+        validation.number("speed", speed) * t_end,
+    )
     end = Signal([0.0, t_end], [[0.0, 0.0, 0.0], [way, 0.0, 0.0]], "linear")
-    return Scene(BODY, _contact(model, normal_force), t_end, springs=Spring(stiffness, 0.0, end), name="stick-slip")
+    return Scene(
+        BODY,
+        _contact(model, normal_force),
+        t_end,
+        springs=Spring(stiffness, 0.0, end),
+        name="stick-slip",
+    )
 
 
 def hunting(
@@ -68,44 +89,76 @@ def hunting(
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
-    (stiffness, integral, damping), half = gains, 0.5 * dt
+    (stiffness, integral, damping) = gains
+    half = 0.5 * dt
     model = point() if model is None else model
-    body = SlidingBody(1.0 + half * (damping + half * (stiffness + half * integral)), 1.0, model)
-    state, twist, error = body.rest(), np.zeros(3), 0.0
-    rows = np.zeros((round(validation.positive("t_end", t_end) / validation.positive("dt", dt)) + 1, 3))
+    body = SlidingBody(
+        1.0 + half * (damping + half * (stiffness + half * integral)), 1.0, model
+    )
+    state = body.rest()
+    twist = np.zeros(3)
+    error = 0.0
+    rows = np.zeros(
+        (
+            round(validation.positive("t_end", t_end) / validation.positive("dt", dt))
+            + 1,
+            3,
+        )
+    )
     for i in range(len(rows) - 1):
-        x, v = rows[i, 1], twist[0]
+        x = rows[i, 1]
+        v = twist[0]
         off = goal - x - half * v
         force = stiffness * off + integral * (error + half * off) - damping * v
         state, twist, _ = body.step(state, twist, normal_force, dt, (force, 0.0, 0.0))
         moved = half * (v + twist[0])
         error += dt * (goal - x - 0.5 * moved)
         x += moved
-        rows[i + 1] = (i + 1) * dt, x, stiffness * (goal - x) + integral * error - damping * twist[0]
+        rows[i + 1] = (
+            (i + 1) * dt,
+            x,
+            stiffness * (goal - x) + integral * error - damping * twist[0],
+        )
     return dict(zip(("time", "x", "force"), rows.T, strict=True))
 
 
-def presliding(model: Any = None, *, force: float = 1.425, normal_force: Any = 1.0) -> Scene:
+def presliding(
+    model: Any = None, *, force: float = 1.425, normal_force: Any = 1.0
+) -> Scene:
     """Make the scene of a mass pushed to `force` [N] in 10 s, held for 5 s, to `-force` in 20 s, held for 5 s.
 
     Less than it takes to slide: the path of a few micrometres is a loop, and does not lead back.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
-    force, signs = validation.number("force", force), np.array([0.0, 1.0, 1.0, -1.0, -1.0])
-    push = Signal([0.0, 10.0, 15.0, 35.0, 40.0], force * signs[:, None] * [1.0, 0.0, 0.0], "linear")
-    return Scene(BODY, _contact(model, normal_force), 40.0, push, name="presliding", **FINE)
+    force = validation.number("force", force)
+    signs = np.array([0.0, 1.0, 1.0, -1.0, -1.0])
+    push = Signal(
+        [0.0, 10.0, 15.0, 35.0, 40.0],
+        force * signs[:, None] * [1.0, 0.0, 0.0],
+        "linear",
+    )
+    return Scene(
+        BODY, _contact(model, normal_force), 40.0, push, name="presliding", **FINE
+    )
 
 
-def break_away(model: Any = None, *, rate: float = 1.0, normal_force: float = 1.0) -> Scene:
+def break_away(
+    model: Any = None, *, rate: float = 1.0, normal_force: float = 1.0
+) -> Scene:
     """Make the scene of a mass pushed by a force that grows at `rate` [N/s], up to 1.2 times static friction.
 
     The largest friction on the way, the break-away force, is smaller the faster the force grows.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
-    contact, rate = _contact(model, normal_force), validation.positive("rate", rate)
-    force = 1.2 * contact.model.law.numbers.mu_s * validation.positive("normal_force", normal_force)
+    contact = _contact(model, normal_force)
+    rate = validation.positive("rate", rate)
+    force = (
+        1.2
+        * contact.model.law.numbers.mu_s
+        * validation.positive("normal_force", normal_force)
+    )
     push = Signal([0.0, force / rate], [[0.0, 0.0, 0.0], [force, 0.0, 0.0]], "linear")
     options = FINE | {"save_every": 5e-4 * force / rate}
     return Scene(BODY, contact, force / rate, push, name="break-away", **options)
@@ -126,10 +179,25 @@ def friction_lag(
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
-    speed, amplitude = validation.number("speed", speed), validation.number("amplitude", amplitude)
+    speed = validation.number("speed", speed)
+    amplitude = validation.number("amplitude", amplitude)
     step = 2.0 * np.pi / PER_PERIOD / validation.positive("frequency", frequency)
-    phase = 2.0 * np.pi * np.arange(PER_PERIOD * validation.count("periods", periods) + 1) / PER_PERIOD
+    phase = (
+        2.0
+        * np.pi
+        * np.arange(PER_PERIOD * validation.count("periods", periods) + 1)
+        / PER_PERIOD
+    )
     velocity = (speed + amplitude * np.sin(phase))[:, None] * [1.0, 0.0, 0.0]
     moved = Signal(step * np.arange(len(phase)), velocity, "linear")
-    contact, t_end = _contact(model, normal_force), float(moved.times[-1])
-    return Scene(None, contact, t_end, velocity=moved, name="friction lag", save_every=step, **FINE)
+    contact = _contact(model, normal_force)
+    t_end = float(moved.times[-1])
+    return Scene(
+        None,
+        contact,
+        t_end,
+        velocity=moved,
+        name="friction lag",
+        save_every=step,
+        **FINE,
+    )

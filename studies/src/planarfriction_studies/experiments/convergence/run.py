@@ -12,7 +12,12 @@ from planarfriction.plots.style import LINE_STYLES, PlotFigure
 from planarfriction_studies.experiments import experiment, facts, looks
 from planarfriction_studies.experiments.convergence import runs
 from planarfriction_studies.experiments.convergence.runs import Case, Errors, Family
-from planarfriction_studies.experiments.experiment import TWIST, Comparison, Result, Work
+from planarfriction_studies.experiments.experiment import (
+    TWIST,
+    Comparison,
+    Result,
+    Work,
+)
 from planarfriction_studies.experiments.runs import IN_WORDS
 from planarfriction_studies.experiments.wording import report
 
@@ -46,10 +51,19 @@ def run(work: Work) -> Result:
     errors = runs.solve(cases, counts, work)
     euler = runs.solve_by_euler(cases, counts, work) if work.full else {}
     radii = radius_errors(counts)
-    slopes = {family: {key(case): _slopes(counts, errors[case][family]) for case in cases} for family in runs.FAMILIES}
-    measured, stepped = _comparisons(counts, errors, work), _euler_comparisons(counts, euler)
+    slopes = {
+        family: {key(case): _slopes(counts, errors[case][family]) for case in cases}
+        for family in runs.FAMILIES
+    }
+    measured = _comparisons(counts, errors, work)
+    stepped = _euler_comparisons(counts, euler)
     listed = {
-        family: {key(case): dict(zip(QUANTITIES, errors[case][family].T.tolist(), strict=True)) for case in cases}
+        family: {
+            key(case): dict(
+                zip(QUANTITIES, errors[case][family].T.tolist(), strict=True)
+            )
+            for case in cases
+        }
         for family in runs.FAMILIES
     }
     numbers = {
@@ -57,11 +71,21 @@ def run(work: Work) -> Result:
         "slopes": slopes,
         "errors": listed,
         "disc_radius_errors": {name: each.tolist() for name, each in radii.items()},
-        "base_disc_radius_error": float(runs.patch("Circle", runs.BASE_CELLS).contact_radius()) * 1.5 / RADIUS - 1.0,
+        "base_disc_radius_error": float(
+            runs.patch("Circle", runs.BASE_CELLS).contact_radius()
+        )
+        * 1.5
+        / RADIUS
+        - 1.0,
     }
     cause = "None: straight lines between the same kinks, the velocity is not held over 0.01 s."
-    profile = experiment.compare_profile(runs.profile(), "convergence/velocity", TWIST, cause, dt=1e-4, allowance=0.0)
-    figures = {f"convergence_{family}": _errors_over_counts(family, counts, errors) for family in runs.FAMILIES}
+    profile = experiment.compare_profile(
+        runs.profile(), "convergence/velocity", TWIST, cause, dt=1e-4, allowance=0.0
+    )
+    figures = {
+        f"convergence_{family}": _errors_over_counts(family, counts, errors)
+        for family in runs.FAMILIES
+    }
     if not work.quick:
         torque = errors["Circle", "p0"]["cells_distributed"][:, 1]
         figures["convergence_disc_radius"] = _radius_errors(counts, radii, torque)
@@ -104,8 +128,15 @@ def _slopes(counts: Sequence[int], errors: np.ndarray) -> dict[str, float]:
 
 def radius_errors(counts: Sequence[int]) -> dict[str, np.ndarray]:
     """Return relative errors of a disc's contact radius: of its `mask` from the base's, of a `cut` disc from 2 R/3."""
-    masks = np.array([float(runs.patch("Circle", count).contact_radius()) for count in (*counts, runs.BASE_CELLS)])
-    cut = np.array([float(ContactPatch.disc(RADIUS, count).contact_radius()) for count in counts])
+    masks = np.array(
+        [
+            float(runs.patch("Circle", count).contact_radius())
+            for count in (*counts, runs.BASE_CELLS)
+        ]
+    )
+    cut = np.array(
+        [float(ContactPatch.disc(RADIUS, count).contact_radius()) for count in counts]
+    )
     return {"mask": masks[:-1] / masks[-1] - 1.0, "cut": cut * 1.5 / RADIUS - 1.0}
 
 
@@ -113,11 +144,16 @@ def _cut_radius_comparison(counts: Sequence[int]) -> Comparison:
     finest = ContactPatch.disc(RADIUS, counts[-1])
     words = f"contact radius of the disc with cells cut by the rim, {counts[-1]} x {counts[-1]}"
     cause = "Each cell's pressure acts at its centroid: an error of second order in the size of the cells."
-    ours, within = float(finest.contact_radius()), 0.5 * RADIUS / counts[-1] ** 2
-    return experiment.compare(words, ours, 2.0 * RADIUS / 3.0, "closed form", within, "m", cause)
+    ours = float(finest.contact_radius())
+    within = 0.5 * RADIUS / counts[-1] ** 2
+    return experiment.compare(
+        words, ours, 2.0 * RADIUS / 3.0, "closed form", within, "m", cause
+    )
 
 
-def _comparisons(counts: Sequence[int], errors: Mapping[Case, Errors], work: Work) -> list[Comparison]:
+def _comparisons(
+    counts: Sequence[int], errors: Mapping[Case, Errors], work: Work
+) -> list[Comparison]:
     found = []
     for name in _WORDS:
         family = name.removesuffix("_again")
@@ -126,21 +162,39 @@ def _comparisons(counts: Sequence[int], errors: Mapping[Case, Errors], work: Wor
             cause = "Explicit Euler steps of $10^{-5}$ s in the figure"
             if every > runs.PUBLISHED_INTERVAL:
                 cause += f", and means over samples every {every:g} s here, {runs.PUBLISHED_INTERVAL:g} s there"
-            found += _against_figure(name, counts, case, errors[case][family], TOLERANCE[every], f"{cause}.")
+            found += _against_figure(
+                name, counts, case, errors[case][family], TOLERANCE[every], f"{cause}."
+            )
     return found
 
 
-def _euler_comparisons(counts: Sequence[int], errors: Mapping[Case, Errors]) -> list[Comparison]:
+def _euler_comparisons(
+    counts: Sequence[int], errors: Mapping[Case, Errors]
+) -> list[Comparison]:
     cause = "None: the same explicit Euler steps of $10^{-5}$ s and the same samples; rounding and reading the figure."
     found = []
     for case, each in errors.items():
         for family in runs.FAMILIES:
-            found += _against_figure(family, counts, case, each[family], EULER_TOLERANCE, cause, "explicit Euler, ")
+            found += _against_figure(
+                family,
+                counts,
+                case,
+                each[family],
+                EULER_TOLERANCE,
+                cause,
+                "explicit Euler, ",
+            )
     return found
 
 
 def _against_figure(
-    name: str, counts: Sequence[int], case: Case, errors: np.ndarray, tolerance: float, cause: str, method: str = ""
+    name: str,
+    counts: Sequence[int],
+    case: Case,
+    errors: np.ndarray,
+    tolerance: float,
+    cause: str,
+    method: str = "",
 ) -> list[Comparison]:
     """Compare the force and torque of one case with the figure, relative to the published error at each count."""
     rows = []
@@ -148,14 +202,19 @@ def _against_figure(
         curve = facts.published_curve(f"convergence/{name}/{key(case)}/{quantity}")
         published = curve.values[np.searchsorted(curve.time, counts)]
         words = f"{method}{_WORDS[name]}: {words} error, {_words(case)}"
-        within, unit = tolerance + curve.reading / float(published.min()), "of the published error"
+        within = tolerance + curve.reading / float(published.min())
+        unit = "of the published error"
         rows.append((words, errors[:, i] / published, 1.0, within, unit, cause))
     return experiment.compare_all("published", rows)
 
 
-def _on_cell(counts: Sequence[int], errors: Mapping[Case, Errors]) -> dict[str, Any] | None:
+def _on_cell(
+    counts: Sequence[int], errors: Mapping[Case, Errors]
+) -> dict[str, Any] | None:
     """Return grids of the line with the centre of pressure in the middle of a cell, and their errors over the trend."""
-    force, all_counts, through = errors["LineGrad", "p0"]["cells_distributed"][:, 0], np.array(counts), []
+    force = errors["LineGrad", "p0"]["cells_distributed"][:, 0]
+    all_counts = np.array(counts)
+    through = []
     for count in counts:
         line = runs.patch("LineGrad", count)
         distance = np.abs(line.positions[:, 1] - line.centre_of_pressure()[1])
@@ -168,12 +227,16 @@ def _on_cell(counts: Sequence[int], errors: Mapping[Case, Errors]) -> dict[str, 
     return {"counts": all_counts[on].tolist(), "excess": float(np.median(excess))}
 
 
-def _of_every_shape(errors: Mapping[Case, Errors], radii: Mapping[str, np.ndarray]) -> dict[str, Any]:
+def _of_every_shape(
+    errors: Mapping[Case, Errors], radii: Mapping[str, np.ndarray]
+) -> dict[str, Any]:
     """Return what is said of disc and square; None without them."""
     if ("Square", "p0") not in errors:
         return {"disc": None, "square": None}
-    torque, square = errors["Circle", "p0"]["cells_distributed"][:, 1], errors["Square", "p0"]
-    mask, cut = np.abs(radii["mask"]), np.abs(radii["cut"])
+    torque = errors["Circle", "p0"]["cells_distributed"][:, 1]
+    square = errors["Square", "p0"]
+    mask = np.abs(radii["mask"])
+    cut = np.abs(radii["cut"])
     return {
         "disc": {
             "over_radius": float(np.median(torque / mask)),
@@ -190,10 +253,18 @@ def _of_every_shape(errors: Mapping[Case, Errors], radii: Mapping[str, np.ndarra
     }
 
 
-def _slope_table(slopes: Mapping[str, Mapping[str, Mapping[str, float]]], counts: Sequence[int]) -> experiment.Table:
-    cases = {_words(case): key(case) for case in runs.CASES if key(case) in slopes[runs.FAMILIES[0]]}
+def _slope_table(
+    slopes: Mapping[str, Mapping[str, Mapping[str, float]]], counts: Sequence[int]
+) -> experiment.Table:
+    cases = {
+        _words(case): key(case)
+        for case in runs.CASES
+        if key(case) in slopes[runs.FAMILIES[0]]
+    }
     columns = {
-        f"{_WORDS[family]}, {words}": lambda case, family=family, name=name: round(slopes[family][case][name], 2)
+        f"{_WORDS[family]}, {words}": lambda case, family=family, name=name: round(
+            slopes[family][case][name], 2
+        )
         for family in slopes
         for name, words in QUANTITIES.items()
     }
@@ -204,20 +275,30 @@ def _slope_table(slopes: Mapping[str, Mapping[str, Mapping[str, float]]], counts
 def _dataset(counts: Sequence[int], errors: Mapping[Case, Errors]) -> Any:
     """Return the relative errors over shape, parameters and count, one variable for each family and quantity."""
     columns = {
-        case: {f"{family}_{name}": each[family][:, i] for family in runs.FAMILIES for i, name in enumerate(QUANTITIES)}
+        case: {
+            f"{family}_{name}": each[family][:, i]
+            for family in runs.FAMILIES
+            for i, name in enumerate(QUANTITIES)
+        }
         for case, each in errors.items()
     }
     units = dict.fromkeys(next(iter(columns.values())), "1")
-    return experiment.dataset(columns, units, ("shape", "parameters"), ("count", np.array(counts), "1"))
+    return experiment.dataset(
+        columns, units, ("shape", "parameters"), ("count", np.array(counts), "1")
+    )
 
 
 _CELLS, _SEGMENTS = "cells along the width", "table segments of a quadrant"
 
 
-def _errors_over_counts(family: Family, counts: Sequence[int], errors: Mapping[Case, Errors]) -> PlotFigure:
+def _errors_over_counts(
+    family: Family, counts: Sequence[int], errors: Mapping[Case, Errors]
+) -> PlotFigure:
     """Draw relative errors of force and torque of one family, all shapes and parameters; the first with the profile."""
     with_profile = family == runs.FAMILIES[0]
-    figure, panels = looks.panels(10.0 if with_profile else 9.6, 4.2, 1, 3 if with_profile else 2)
+    figure, panels = looks.panels(
+        10.0 if with_profile else 9.6, 4.2, 1, 3 if with_profile else 2
+    )
     for i, (quantity, words) in enumerate(QUANTITIES.items()):
         axes = panels[i]
         for (shape, parameters), found in errors.items():
@@ -228,18 +309,34 @@ def _errors_over_counts(family: Family, counts: Sequence[int], errors: Mapping[C
             }
             axes.semilogy(counts, found[family][:, i], linewidth=1.3, **look)
             curve = f"convergence/{family}/{shape}/{parameters}/{quantity}"
-            looks.vertices(axes, curve, 1.0, "black", marker=".", ms=2.5, mfc="black", label="published")
-        axes.set(xlabel=_SEGMENTS if family == "segments" else _CELLS, ylabel=f"{words} error / largest {words} [-]")
+            looks.vertices(
+                axes,
+                curve,
+                1.0,
+                "black",
+                marker=".",
+                ms=2.5,
+                mfc="black",
+                label="published",
+            )
+        axes.set(
+            xlabel=_SEGMENTS if family == "segments" else _CELLS,
+            ylabel=f"{words} error / largest {words} [-]",
+        )
     if with_profile:
         _draw_profile(panels[2])
-    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))  # each label once
+    handles = dict(
+        zip(*reversed(panels[0].get_legend_handles_labels()), strict=True)
+    )  # each label once
     published = handles.pop("published")
     figure.legend([*handles.values(), published], [*handles, "published"], loc="outside lower center", ncols=4,
                   frameon=False, fontsize="small")  # fmt: skip
     return figure
 
 
-def _radius_errors(counts: Sequence[int], radii: Mapping[str, np.ndarray], torque: np.ndarray) -> PlotFigure:
+def _radius_errors(
+    counts: Sequence[int], radii: Mapping[str, np.ndarray], torque: np.ndarray
+) -> PlotFigure:
     """Draw the error of the contact radius of the disc, as a mask and cut by its rim, beside that of the torque."""
     figure, axes = looks.panels(6.4, 3.6)
     lines = (
@@ -250,15 +347,35 @@ def _radius_errors(counts: Sequence[int], radii: Mapping[str, np.ndarray], torqu
     for (values, look, label), colour in zip(lines, looks.OTHERS, strict=False):
         axes.semilogy(counts, values, look, color=colour, markersize=4, label=label)
     axes.set(xlabel=_CELLS, ylabel="relative error [-]")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small")
+    axes.legend(
+        loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small"
+    )
     return figure
 
 
 def _draw_profile(axes: Any) -> None:
     velocity = runs.profile()
-    rows = (("vx", "$v_x$ [cm/s]", 1e2), ("vy", "$v_y$ [cm/s]", 1e2), ("omega", "$\\omega$ [rad/s]", 1.0))
+    rows = (
+        ("vx", "$v_x$ [cm/s]", 1e2),
+        ("vy", "$v_y$ [cm/s]", 1e2),
+        ("omega", "$\\omega$ [rad/s]", 1.0),
+    )
     for i, (name, label, factor) in enumerate(rows):
-        axes.plot(velocity.times, factor * velocity.values[:, i], color=looks.OTHERS[i], label=label)
-        looks.vertices(axes, f"convergence/velocity/{name}", factor, "black", marker=".", mfc="black")
-    axes.set(xlabel="time [s]", ylabel="velocity of the centre of pressure", ylim=(-0.1, 2.1))
+        axes.plot(
+            velocity.times,
+            factor * velocity.values[:, i],
+            color=looks.OTHERS[i],
+            label=label,
+        )
+        looks.vertices(
+            axes,
+            f"convergence/velocity/{name}",
+            factor,
+            "black",
+            marker=".",
+            mfc="black",
+        )
+    axes.set(
+        xlabel="time [s]", ylabel="velocity of the centre of pressure", ylim=(-0.1, 2.1)
+    )
     axes.legend(loc="upper right", frameon=False, fontsize="small")

@@ -15,7 +15,12 @@ from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes import Scene
 from planarfriction.scenes.ready import GRAVITY
 from planarfriction_studies.experiments import experiment
-from planarfriction_studies.experiments.experiment import POSE, WRENCH, Arrays, Comparison
+from planarfriction_studies.experiments.experiment import (
+    POSE,
+    WRENCH,
+    Arrays,
+    Comparison,
+)
 from planarfriction_studies.experiments.runs import IN_WORDS, LAW, Kind, published_model
 
 TIGHT: dict[str, Any] = {"rtol": 1e-8, "atol": 3e-8}
@@ -31,7 +36,10 @@ DEFAULT_ALLOWANCE = {"m": 2e-6, "rad": 2e-5}
 FRICTION_CHANGE = 1e-3
 """Share by which friction is changed to see what that does."""
 
-MORE, LESS = f"{FRICTION_CHANGE:.1%} more friction", f"{FRICTION_CHANGE:.1%} less friction"
+MORE, LESS = (
+    f"{FRICTION_CHANGE:.1%} more friction",
+    f"{FRICTION_CHANGE:.1%} less friction",
+)
 
 OF_THE_FIGURE = (
     "The figure was made with LSODA at a relative tolerance of $10^{-6}$; the difference is the error of that run, as "
@@ -78,7 +86,9 @@ class Case:
         """Return the scene with the distributed ("d") or the reduced ("r") model."""
         model = published_model(kind, PUBLISHED_PATCHES[self.shape](cells=cells), law)
         load = scenes.in_hand_load(self.load, placement=self.placement)
-        return scenes.in_hand(model, normal_force=load, centre_of_mass=CENTRES_OF_MASS[self.placement])
+        return scenes.in_hand(
+            model, normal_force=load, centre_of_mass=CENTRES_OF_MASS[self.placement]
+        )
 
     def holding_load(self, x: float) -> float:
         """Return the least normal force of one finger [N] that holds the plate with its centre of mass at `x` [m], in
@@ -95,7 +105,9 @@ class Case:
 
 def with_friction(share: float) -> LuGre:
     """Return the published law with both friction coefficients times `1 + share`."""
-    return dataclasses.replace(LAW, mu_c=LAW.mu_c * (1.0 + share), mu_s=LAW.mu_s * (1.0 + share))
+    return dataclasses.replace(
+        LAW, mu_c=LAW.mu_c * (1.0 + share), mu_s=LAW.mu_s * (1.0 + share)
+    )
 
 
 CHANGED = {MORE: with_friction(FRICTION_CHANGE), LESS: with_friction(-FRICTION_CHANGE)}
@@ -123,7 +135,9 @@ def errors(run: Arrays, key: str) -> dict[str, float]:
     return {row.quantity: row.difference for row in rows}
 
 
-def compare_with_converged(run: Arrays, key: str, words: str, *, default: bool = False) -> list[Comparison]:
+def compare_with_converged(
+    run: Arrays, key: str, words: str, *, default: bool = False
+) -> list[Comparison]:
     """Compare a run with the converged solution `key`; of a run at default tolerances its motion only."""
     words = f"{words}, default tolerances, " if default else f"{words}, "
     rest = (DEFAULT_ALLOWANCE, OF_DEFAULTS) if default else (ALLOWANCE, OF_BOTH)
@@ -132,4 +146,6 @@ def compare_with_converged(run: Arrays, key: str, words: str, *, default: bool =
 
 def compare_with_published(run: Arrays, key: str, words: str) -> list[Comparison]:
     """Compare a run with the published curves `key`."""
-    return experiment.compare_columns("published", f"{words}, ", run, key, ALLOWANCE, OF_THE_FIGURE)
+    return experiment.compare_columns(
+        "published", f"{words}, ", run, key, ALLOWANCE, OF_THE_FIGURE
+    )

@@ -24,7 +24,9 @@ MATCHED = 28
 """Twists marked on both surfaces of a section."""
 
 
-def overview(surfaces: Mapping[str, LimitSurfaceCells], *, coarse: bool = False) -> PlotFigure:
+def overview(
+    surfaces: Mapping[str, LimitSurfaceCells], *, coarse: bool = False
+) -> PlotFigure:
     """Draw the six limit surfaces, with circles of the ellipsoid (there the unit sphere) around them."""
     figure = new_figure(10.0, 6.6)
     count = 10 if coarse else 48
@@ -40,7 +42,9 @@ def overview(surfaces: Mapping[str, LimitSurfaceCells], *, coarse: bool = False)
         axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.84)
         axes.tick_params(labelsize="x-small", pad=0)
         ticks: Any = {f"{name}ticks": [-1, 0, 1] for name in "xyz"}
-        axes.set(xlabel="$f_x$ [-]", ylabel="$f_y$ [-]", zlabel="$\\tau/r$ [-]", **ticks)
+        axes.set(
+            xlabel="$f_x$ [-]", ylabel="$f_y$ [-]", zlabel="$\\tau/r$ [-]", **ticks
+        )
         axes.zaxis.labelpad = -6
         _circles(axes)
         axes.set_title(IN_WORDS[name], fontsize="medium", y=0.95)
@@ -50,14 +54,22 @@ def overview(surfaces: Mapping[str, LimitSurfaceCells], *, coarse: bool = False)
 def _circles(axes: Any) -> None:
     """Draw the outline of the unit sphere, and the near halves of its equator and two meridians."""
     elevation, azimuth = np.radians([axes.elev, axes.azim])
-    towards = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    towards = np.array(
+        [
+            np.cos(elevation) * np.cos(azimuth),
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+        ]
+    )
     around = np.linspace(0.0, 2.0 * np.pi, 181)
     for axis in (2, 1, 0):
         ring = np.insert([np.cos(around), np.sin(around)], axis, 0.0, axis=0)
         near = np.where(towards @ ring > 0.0, ring, np.nan)
         axes.plot(*near, color=BESIDE, lw=0.9, zorder=10)
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    outline = np.outer(right, np.cos(around)) + np.outer(np.cross(towards, right), np.sin(around))
+    outline = np.outer(right, np.cos(around)) + np.outer(
+        np.cross(towards, right), np.sin(around)
+    )
     axes.plot(*outline, color=BESIDE, lw=1.3, zorder=10)
 
 
@@ -72,38 +84,66 @@ def correspondence(surfaces: Mapping[str, LimitSurfaceCells]) -> PlotFigure:
     return figure
 
 
-def _section(axes: Any, surface: LimitSurfaceCells, column: int, count: int = MATCHED) -> None:
+def _section(
+    axes: Any, surface: LimitSurfaceCells, column: int, count: int = MATCHED
+) -> None:
     """Return points (f, tau/r) of twists (v, r omega) with velocity along one axis, f the force along it."""
     ellipsoid = LimitSurfaceEllipsoid(surface.patch)
     fine = (_points_of(each, column, 1441) for each in (surface, ellipsoid))
-    for points, colour, name in zip(fine, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True):
+    for points, colour, name in zip(
+        fine, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True
+    ):
         axes.plot(*points, color=colour, lw=1.4, label=name)
-    marked = [_points_of(each, column, count, closed=False) for each in (surface, ellipsoid)]
+    marked = [
+        _points_of(each, column, count, closed=False) for each in (surface, ellipsoid)
+    ]
     for exact, beside in zip(*(points.T for points in marked), strict=True):
         axes.plot(*np.stack([exact, beside]).T, color=LINK, lw=0.8, zorder=1)
     axes.plot(*marked[0], ls="", marker="o", ms=3.8, color=SUM)
     axes.plot(*marked[1], ls="", marker="s", ms=3.4, color=BESIDE)
     axes.plot([], [], color=LINK, lw=0.8, label="same twist")
     force = ("$f_x$", "$f_y$")[column]
-    axes.set(xlabel=f"{force} [-]", ylabel="$\\tau/r$ [-]", aspect="equal", xlim=(-1.12, 1.12), ylim=(-1.12, 1.12))
+    axes.set(
+        xlabel=f"{force} [-]",
+        ylabel="$\\tau/r$ [-]",
+        aspect="equal",
+        xlim=(-1.12, 1.12),
+        ylim=(-1.12, 1.12),
+    )
     axes.set(xticks=[-1, -0.5, 0, 0.5, 1], yticks=[-1, -0.5, 0, 0.5, 1])
 
 
-def _points_of(surface: Any, column: int, count: int, *, closed: bool = True) -> np.ndarray:
+def _points_of(
+    surface: Any, column: int, count: int, *, closed: bool = True
+) -> np.ndarray:
     """Return force along axis `column` and torque over r, `[2, count]`, of twists at equal angles around a section."""
     angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=closed)
     azimuth = np.where(angle <= np.pi, 0.0, np.pi) + 0.5 * np.pi * column
-    points = scaled_samples(surface, np.where(angle <= np.pi, angle, 2.0 * np.pi - angle), azimuth)[1]
+    points = scaled_samples(
+        surface, np.where(angle <= np.pi, angle, 2.0 * np.pi - angle), azimuth
+    )[1]
     return points[:, [column, 2]].T
 
 
 def gradient_line(surface: LimitSurfaceCells, numbers: dict[str, Any]) -> PlotFigure:
     """Draw the line and its load, the force over the centre of rotation, and the section with the two spins marked."""
-    figure, (load, force, section) = looks.panels(10.0, 4.6, 1, 3, width_ratios=(0.55, 1.0, 1.25))
+    figure, (load, force, section) = looks.panels(
+        10.0, 4.6, 1, 3, width_ratios=(0.55, 1.0, 1.25)
+    )
     sides = surface, LimitSurfaceEllipsoid(surface.patch)
     centres = (
-        ("about the centre of pressure", numbers["cells"]["centre of pressure"], looks.OTHERS[1], "D"),
-        ("about the middle of the load", numbers["cells"]["middle cell"], looks.OTHERS[2], "o"),
+        (
+            "about the centre of pressure",
+            numbers["cells"]["centre of pressure"],
+            looks.OTHERS[1],
+            "D",
+        ),
+        (
+            "about the middle of the load",
+            numbers["cells"]["middle cell"],
+            looks.OTHERS[2],
+            "o",
+        ),
     )
     _load_panel(load, numbers, centres)
     _force_panel(force, sides, numbers, centres)
@@ -114,12 +154,18 @@ def gradient_line(surface: LimitSurfaceCells, numbers: dict[str, Any]) -> PlotFi
 
 def _load_panel(axes: Any, numbers: dict[str, Any], centres: Any) -> None:
     cell = 1e3 * numbers["cell"]
-    places, loads = 1e3 * np.array(numbers["places"]), np.array(numbers["loads"])
+    places = 1e3 * np.array(numbers["places"])
+    loads = np.array(numbers["loads"])
     axes.barh(places, loads, height=0.85 * cell, color="0.75")
     for _, y, colour, marker in centres:
         axes.axhline(1e3 * y, color=colour, lw=1.2)
         axes.plot([0.0], [1e3 * y], marker=marker, ms=7, color=colour, clip_on=False)
-    axes.set(xlabel="load of a cell [N]", ylabel="y [mm]", ylim=(-10.5, 10.5), xlim=(0.0, 0.1))
+    axes.set(
+        xlabel="load of a cell [N]",
+        ylabel="y [mm]",
+        ylim=(-10.5, 10.5),
+        xlim=(0.0, 0.1),
+    )
 
 
 def _force_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -> None:
@@ -133,18 +179,62 @@ def _force_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -
     for _, at, colour, marker in centres:
         axes.axhline(1e3 * at, color=colour, lw=0.8)
         for each in sides:
-            axes.plot(spin_about(each, at)[0], 1e3 * at, marker=marker, ms=5, color=colour, ls="")
-    axes.set(xlabel="$f_x$ [N]", ylabel="centre of rotation, y [mm]", ylim=(-10.5, 10.5), xlim=(-1.05, 1.05))
+            axes.plot(
+                spin_about(each, at)[0],
+                1e3 * at,
+                marker=marker,
+                ms=5,
+                color=colour,
+                ls="",
+            )
+    axes.set(
+        xlabel="$f_x$ [N]",
+        ylabel="centre of rotation, y [mm]",
+        ylim=(-10.5, 10.5),
+        xlim=(-1.05, 1.05),
+    )
 
 
 def _spin_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -> None:
     """Draw the upper half of the section, turned to positive torque: what balances the friction of a negative spin."""
-    for each, colour, name in zip(sides, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True):
+    for each, colour, name in zip(
+        sides, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True
+    ):
         axes.plot(*_points_of(each, 0, 2881), color=colour, lw=1.4, label=name)
-    axes.plot([], [], color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1], label="continuous pressure")
+    axes.plot(
+        [],
+        [],
+        color=looks.EXACT,
+        lw=1.0,
+        ls=LINE_STYLES[1],
+        label="continuous pressure",
+    )
     for name, y, colour, marker in centres:
-        points = [spin_about(each, y) / [1.0, 1.0, each.contact_radius] for each in sides]
-        axes.plot(*np.array(points)[:, [0, 2]].T, color=colour, lw=0.9, marker=marker, ms=5.5, label=f"spin {name}")
+        points = [
+            spin_about(each, y) / [1.0, 1.0, each.contact_radius] for each in sides
+        ]
+        axes.plot(
+            *np.array(points)[:, [0, 2]].T,
+            color=colour,
+            lw=0.9,
+            marker=marker,
+            ms=5.5,
+            label=f"spin {name}",
+        )
     torque = numbers["cells"]["torque"] / sides[0].contact_radius
-    axes.plot([0.0], [-torque], marker="*", ms=10, ls="", color=looks.EXACT, label="torque without force", zorder=1)
-    axes.set(xlabel="$f_x$ [-]", ylabel="$\\tau/r$ [-]", xlim=(-0.32, 0.32), ylim=(-1.01, -0.86))
+    axes.plot(
+        [0.0],
+        [-torque],
+        marker="*",
+        ms=10,
+        ls="",
+        color=looks.EXACT,
+        label="torque without force",
+        zorder=1,
+    )
+    axes.set(
+        xlabel="$f_x$ [-]",
+        ylabel="$\\tau/r$ [-]",
+        xlim=(-0.32, 0.32),
+        ylim=(-1.01, -0.86),
+    )

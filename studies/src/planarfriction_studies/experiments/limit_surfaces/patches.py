@@ -9,10 +9,18 @@ from typing import Any
 import numpy as np
 
 from planarfriction import geometry
-from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid, LimitSurfaceTablePublished
+from planarfriction.limit_surface import (
+    LimitSurfaceCells,
+    LimitSurfaceEllipsoid,
+    LimitSurfaceTablePublished,
+)
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction_studies.experiments import facts
-from planarfriction_studies.experiments.experiment import Comparison, Numbers, compare_all
+from planarfriction_studies.experiments.experiment import (
+    Comparison,
+    Numbers,
+    compare_all,
+)
 from planarfriction_studies.experiments.runs import CELLS, IN_WORDS, WIDTH
 
 _LENGTH = (6e-12, "m", "Printed to $10^{-11}$ m: rounding.")
@@ -48,10 +56,16 @@ def patch_numbers(patches: Mapping[str, ContactPatch]) -> dict[str, Numbers]:
 
 def patch_comparisons(ours: Mapping[str, Numbers]) -> list[Comparison]:
     """Compare each column of the table of patches over all its rows."""
-    published, rows = facts.published_table("patches"), []
+    published = facts.published_table("patches")
+    rows = []
     for column, rest in LAST_DIGIT.items():
-        found, expected = (np.array([each[name][column] for name in published]) for each in (ours, published))
-        rows.append((f"table of patches, {column.partition(' [')[0]}", found, expected, *rest))
+        found, expected = (
+            np.array([each[name][column] for name in published])
+            for each in (ours, published)
+        )
+        rows.append(
+            (f"table of patches, {column.partition(' [')[0]}", found, expected, *rest)
+        )
     return compare_all("published", rows)
 
 
@@ -88,17 +102,42 @@ LUMPED = (
 
 def _disc_rows(numbers: Numbers) -> list[_Row]:
     """Return `r = 2 R/3` and `<rho^2> = R^2/2`: of the mask with the radius of equal area, of a disc cut by its rim."""
-    disc, mask, rows = numbers["disc"], numbers["patches"]["Circle"], []
+    disc = numbers["disc"]
+    mask = numbers["patches"]["Circle"]
+    rows = []
     cell = disc["cell"]
     ragged = "Its cells stand in whole rows: the rim is ragged, and each cell's load stands at its middle."
     lumped = "Each cell's load stands at its middle: a cell's own second moment, $c^2/6$ for the width $c$, is missing."
     grid = disc["contact radius on the grid"], disc["second moment on the grid"]
     for name, radius, (first, second), causes in (
-        ("mask of 317 cells", disc["equal-area radius"], (mask[_RADIUS], mask[_MOMENT]), (ragged, ragged)),
+        (
+            "mask of 317 cells",
+            disc["equal-area radius"],
+            (mask[_RADIUS], mask[_MOMENT]),
+            (ragged, ragged),
+        ),
         ("disc cut by its rim", disc["radius"], grid, (LUMPED, lumped)),
     ):
-        rows.append((f"contact radius, {name}", first, 2.0 * radius / 3.0, cell**2 / (12.0 * first), "m", causes[0]))
-        rows.append((f"second moment, {name}", second, 0.5 * radius**2, cell**2 / 6.0, "m^2", causes[1]))
+        rows.append(
+            (
+                f"contact radius, {name}",
+                first,
+                2.0 * radius / 3.0,
+                cell**2 / (12.0 * first),
+                "m",
+                causes[0],
+            )
+        )
+        rows.append(
+            (
+                f"second moment, {name}",
+                second,
+                0.5 * radius**2,
+                cell**2 / 6.0,
+                "m^2",
+                causes[1],
+            )
+        )
     return rows
 
 
@@ -114,27 +153,50 @@ def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
         "Line": (CELLS**2 - 1) * cell**2 / 12.0,
         "LineGrad": (CELLS - 1) * (CELLS + 2) * cell**2 / 18.0,
     }
-    radii = {"Square": WIDTH * (math.sqrt(2.0) + math.asinh(1.0)) / 6.0, "Line": 0.25 * WIDTH}
+    radii = {
+        "Square": WIDTH * (math.sqrt(2.0) + math.asinh(1.0)) / 6.0,
+        "Line": 0.25 * WIDTH,
+    }
     rows: list[_Row] = [
-        (f"second moment, {IN_WORDS[name]}", patches[name][_MOMENT], value, 1e-17, "m^2", exact)
+        (
+            f"second moment, {IN_WORDS[name]}",
+            patches[name][_MOMENT],
+            value,
+            1e-17,
+            "m^2",
+            exact,
+        )
         for name, value in seconds.items()
     ]
     for name, value in radii.items():
-        found, words = patches[name][_RADIUS], f"contact radius, {IN_WORDS[name]}, without cells"
+        found = patches[name][_RADIUS]
+        words = f"contact radius, {IN_WORDS[name]}, without cells"
         rows.append((words, found, value, cell**2 / (12.0 * found), "m", LUMPED))
     return rows
 
 
 def _line_rows(numbers: Numbers) -> list[_Row]:
     """Return the largest distance of corresponding points: a whole line slides, the ellipsoid still sees a spin."""
-    cell, rows = WIDTH / CELLS, []
+    cell = WIDTH / CELLS
+    rows = []
     cause = "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
     for name in ("Line", "LineGrad"):
         row = numbers["patches"][name]
-        end = 0.5 * (CELLS - 1) * cell - row["centre of pressure y [m]"]  # the nearer one, at the heavy end
+        end = (
+            0.5 * (CELLS - 1) * cell - row["centre of pressure y [m]"]
+        )  # the nearer one, at the heavy end
         expected = math.sqrt(2.0 - 2.0 * end / math.hypot(end, row[_RADIUS]))
         words = f"ellipsoid, largest distance of corresponding points, {IN_WORDS[name]}"
-        rows.append((words, numbers["ellipsoid"][name]["points, max"], expected, 1e-5, "1", cause))
+        rows.append(
+            (
+                words,
+                numbers["ellipsoid"][name]["points, max"],
+                expected,
+                1e-5,
+                "1",
+                cause,
+            )
+        )
     return rows
 
 
@@ -156,7 +218,8 @@ def linear_line(length: float, floor: float = 0.0) -> dict[str, float]:
         lever = 2.0 * (place**3 / 6.0 + 0.5 * floor * place**2) / load + middle - place
         return below, lever
 
-    (below, radius), (_, torque) = beyond(middle), beyond(halves)
+    (below, radius) = beyond(middle)
+    (_, torque) = beyond(halves)
     return {
         "centre of pressure": middle - 0.5 * length,
         "equal halves": halves - 0.5 * length,
@@ -169,13 +232,17 @@ def linear_line(length: float, floor: float = 0.0) -> dict[str, float]:
 def spin_about(surface: Any, y: Any) -> np.ndarray:
     """Return wrenches `[..., 3]` [1, 1, m] at the centre of pressure of unit spins about points (0, y) [m]."""
     y = np.asarray(y)
-    return geometry.wrench_at(surface.wrench(np.stack([y, 0.0 * y, 0.0 * y + 1.0], -1)), surface.centre_of_pressure)
+    return geometry.wrench_at(
+        surface.wrench(np.stack([y, 0.0 * y, 0.0 * y + 1.0], -1)),
+        surface.centre_of_pressure,
+    )
 
 
 def gradient_numbers() -> Numbers:
     """Return the two spins of the line of 21 cells, of the ellipsoid, and of continuous lines; places along y [m]."""
     patch = PUBLISHED_PATCHES["LineGrad"]()
-    cells, ellipsoid = LimitSurfaceCells(patch), LimitSurfaceEllipsoid(patch)
+    cells = LimitSurfaceCells(patch)
+    ellipsoid = LimitSurfaceEllipsoid(patch)
     middle = float(patch.centre_of_pressure()[1])
     # the twist that belongs to a torque without a force, found by the library
     vx, _, omega = cells.twist([0.0, 0.0, -1.0])
@@ -215,11 +282,15 @@ def half_load_cell(cells: int) -> int:
 
 def gradient_comparisons(numbers: Numbers) -> list[Comparison]:
     """Compare the spins of the gradient line with their closed forms."""
-    ours, smooth, cell = numbers["cells"], numbers["continuous, as the cells"], numbers["cell"]
+    ours = numbers["cells"]
+    smooth = numbers["continuous, as the cells"]
+    cell = numbers["cell"]
     total = CELLS * (CELLS + 1) // 2
     k = half_load_cell(CELLS)
     beyond = total - k * (k + 1) // 2  # weights between that cell and the heavy end
-    above = sum(range(math.ceil((2 * CELLS + 1) / 3), CELLS + 1))  # the centre of pressure lies at (2 N + 1)/3
+    above = sum(
+        range(math.ceil((2 * CELLS + 1) / 3), CELLS + 1)
+    )  # the centre of pressure lies at (2 N + 1)/3
     lumped = cell**2 / (12.0 * ours["radius"])
     rounding = "Weights on both sides of {}: rounding."
     rows: list[tuple[str, float, float, float, str, str]] = [

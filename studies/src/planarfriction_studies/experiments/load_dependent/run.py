@@ -18,9 +18,21 @@ from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 from planarfriction.scenes import Scene
 from planarfriction.scenes.ready import FINE, IN_HAND_LOADS
 from planarfriction_studies.experiments import experiment, looks
-from planarfriction_studies.experiments.experiment import POSE, Arrays, Comparison, Result, Work, entry
+from planarfriction_studies.experiments.experiment import (
+    POSE,
+    Arrays,
+    Comparison,
+    Result,
+    Work,
+    entry,
+)
 from planarfriction_studies.experiments.in_hand import figures, runs
-from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, LESS, MORE, TIGHT
+from planarfriction_studies.experiments.in_hand.runs import (
+    FRICTION_CHANGE,
+    LESS,
+    MORE,
+    TIGHT,
+)
 from planarfriction_studies.experiments.runs import CELLS, LAW, WIDTH, simulated
 from planarfriction_studies.experiments.wording import report
 
@@ -39,7 +51,9 @@ PRESSURES = {1: "k = 2", 2: "k = 2 f_N"}
 DISTRIBUTED, REBUILT, RESCALED = "distributed", "reduced, rebuilt", "reduced, rescaled"
 KEPT, KEPT_LARGEST = "reduced, kept (mean load)", "reduced, kept (largest contact)"
 
-VARIANTS: dict[str, tuple[Literal["rebuild", "rescale", "keep"] | None, float | None]] = {
+VARIANTS: dict[
+    str, tuple[Literal["rebuild", "rescale", "keep"] | None, float | None]
+] = {
     DISTRIBUTED: (None, None),
     REBUILT: ("rebuild", None),
     RESCALED: ("rescale", LARGEST_CONTACT),
@@ -70,7 +84,8 @@ def soft_patch(pressure: int, *, cells: int = CELLS) -> ContactPatch:
 
 def profile_moment(k: float, power: int) -> float:
     """Return `int_0^1 s^power (1 - s^k)^(1/k) ds = B((power + 1)/k, 1 + 1/k)/k`."""
-    a, b = (power + 1.0) / k, 1.0 + 1.0 / k
+    a = (power + 1.0) / k
+    b = 1.0 + 1.0 / k
     return math.exp(math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)) / k
 
 
@@ -79,7 +94,12 @@ def round_moments(pressure: int, loads: np.ndarray) -> tuple[np.ndarray, np.ndar
     law = finger(pressure)
     radius = law.radius(loads)
     first, second = (
-        np.array([profile_moment(k, power) / profile_moment(k, 1) for k in law.exponent(loads).tolist()])
+        np.array(
+            [
+                profile_moment(k, power) / profile_moment(k, 1)
+                for k in law.exponent(loads).tolist()
+            ]
+        )
         for power in (2, 3)
     )
     return first * radius, second * radius**2
@@ -92,7 +112,11 @@ def soft_scene(pressure: int, variant: str, law: LuGre = LAW) -> Scene:
     if on_load_change is None:
         return scenes.in_hand(DistributedModel(patch, law))
     surface = LimitSurfaceTablePublished(patch, normal_force=load)
-    return scenes.in_hand(ReducedModelPublished(patch, law, surface=surface, on_load_change=on_load_change))
+    return scenes.in_hand(
+        ReducedModelPublished(
+            patch, law, surface=surface, on_load_change=on_load_change
+        )
+    )
 
 
 def run(work: Work) -> Result:
@@ -100,12 +124,24 @@ def run(work: Work) -> Result:
     pressures = (1,) if work.quick else (1, 2)
     found = _simulate_all(work, pressures)
     loads = np.unique(found[1, DISTRIBUTED]["normal_force"])
-    numbers = {PRESSURES[pressure]: _numbers(pressure, found, loads) for pressure in pressures}
-    stored = {(PRESSURES[p], variant): found[p, variant] for p in pressures for variant in VARIANTS}
+    numbers = {
+        PRESSURES[pressure]: _numbers(pressure, found, loads) for pressure in pressures
+    }
+    stored = {
+        (PRESSURES[p], variant): found[p, variant]
+        for p in pressures
+        for variant in VARIANTS
+    }
     time = "time", found[1, DISTRIBUTED]["time"], "s"
-    miss = {variant: runs.errors(found[1, variant], key) for variant, key in REFERENCES.items()}
+    miss = {
+        variant: runs.errors(found[1, variant], key)
+        for variant, key in REFERENCES.items()
+    }
     gap = {
-        words: [each["variants"][name]["distance at the end [m]"] for each in numbers.values()]
+        words: [
+            each["variants"][name]["distance at the end [m]"]
+            for each in numbers.values()
+        ]
         for words, name in (("rescaled", RESCALED), ("kept", KEPT))
     }
     return report(
@@ -114,7 +150,10 @@ def run(work: Work) -> Result:
         {"pressure laws": numbers, "tolerances": TIGHT},
         {
             "loads": len(loads),
-            "miss": {name: max(each[name] for each in miss.values()) for name in ("y", "theta")},
+            "miss": {
+                name: max(each[name] for each in miss.values())
+                for name in ("y", "theta")
+            },
             "rescaled_miss": max(miss[RESCALED][name] for name in ("x", "y")),
             "gap": gap,
             "change": FRICTION_CHANGE,
@@ -122,7 +161,11 @@ def run(work: Work) -> Result:
         },
         comparisons=_comparisons(pressures, found, loads),
         tables=[_table(numbers)],
-        data={"in_hand": experiment.dataset(stored, runs.STORED, ("pressure", "variant"), time)},
+        data={
+            "in_hand": experiment.dataset(
+                stored, runs.STORED, ("pressure", "variant"), time
+            )
+        },
     )
 
 
@@ -130,18 +173,27 @@ def _simulate_all(work: Work, pressures: tuple[int, ...]) -> Runs:
     computes = {}
     for pressure in pressures:
         for variant in VARIANTS:
-            computes[pressure, variant] = partial(simulated, soft_scene(pressure, variant), **TIGHT)
+            computes[pressure, variant] = partial(
+                simulated, soft_scene(pressure, variant), **TIGHT
+            )
         for variant in REFERENCES if pressure == 1 else ():
-            computes[pressure, f"{variant}, defaults"] = partial(simulated, soft_scene(pressure, variant))
+            computes[pressure, f"{variant}, defaults"] = partial(
+                simulated, soft_scene(pressure, variant)
+            )
         for words, law in runs.CHANGED.items():
-            computes[pressure, words] = partial(simulated, soft_scene(pressure, DISTRIBUTED, law), **FINE)
+            computes[pressure, words] = partial(
+                simulated, soft_scene(pressure, DISTRIBUTED, law), **FINE
+            )
     return work.pieces(computes, lambda key: f"load-dependent, law {key[0]}, {key[1]}")
 
 
 def _numbers(pressure: int, found: Runs, loads: np.ndarray) -> dict[str, Any]:
     base = found[pressure, DISTRIBUTED]
-    friction = [runs.end_distance(found[pressure, words], base) for words in (MORE, LESS)]
-    law, ends = finger(pressure), np.array([loads[0], loads[-1]])
+    friction = [
+        runs.end_distance(found[pressure, words], base) for words in (MORE, LESS)
+    ]
+    law = finger(pressure)
+    ends = np.array([loads[0], loads[-1]])
     variants = {}
     for variant in VARIANTS:
         distance = runs.distance(found[pressure, variant], base)
@@ -149,7 +201,9 @@ def _numbers(pressure: int, found: Runs, loads: np.ndarray) -> dict[str, Any]:
             "end": runs.end(found[pressure, variant]),
             "distance at the end [m]": float(distance[-1]),
             "largest distance [m]": float(distance.max()),
-            "distance as friction": FRICTION_CHANGE * float(distance[-1]) / (0.5 * sum(friction)),
+            "distance as friction": FRICTION_CHANGE
+            * float(distance[-1])
+            / (0.5 * sum(friction)),
         }
     return {
         "smallest and largest load [N]": ends.tolist(),
@@ -161,12 +215,16 @@ def _numbers(pressure: int, found: Runs, loads: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _comparisons(pressures: tuple[int, ...], found: Runs, loads: np.ndarray) -> list[Comparison]:
+def _comparisons(
+    pressures: tuple[int, ...], found: Runs, loads: np.ndarray
+) -> list[Comparison]:
     rows = []
     for variant, key in REFERENCES.items():
         words = f"{PRESSURES[1]}, {variant}"
         rows += runs.compare_with_converged(found[1, variant], key, words)
-        rows += runs.compare_with_converged(found[1, f"{variant}, defaults"], key, words, default=True)
+        rows += runs.compare_with_converged(
+            found[1, f"{variant}, defaults"], key, words, default=True
+        )
     for pressure in pressures:
         for cells in (CELLS, 5 * CELLS):
             rows += _compare_moments(pressure, cells, loads)
@@ -180,15 +238,20 @@ def _compare_moments(pressure: int, cells: int, loads: np.ndarray) -> list[Compa
         "Profiles are sampled at the centres of cells; a round rim on a grid errs by a share of $(c/R)^{1.5}$ for the "
         "width $c$ of cells, half of it for $r$, all of it for $\\langle\\rho^2\\rangle$, as an estimate."
     )
-    share, rows = 0.5 * (WIDTH / cells / finger(pressure).radius(loads)) ** 1.5, []
+    share = 0.5 * (WIDTH / cells / finger(pressure).radius(loads)) ** 1.5
+    rows = []
     measured = patch.contact_radius(loads), patch.second_moment(loads)
     kinds = (("r", 1.0, "m"), ("<rho^2>", 2.0, "m^2"))
-    for ours, theirs, (name, factor, unit) in zip(measured, round_moments(pressure, loads), kinds, strict=True):
+    for ours, theirs, (name, factor, unit) in zip(
+        measured, round_moments(pressure, loads), kinds, strict=True
+    ):
         tolerance = factor * share * theirs
         at = int((np.abs(ours - theirs) / tolerance).argmax())
         quantity = f"{PRESSURES[pressure]}, {cells} x {cells} cells, {name} over the load, the worst"
         within = float(tolerance[at])
-        worst = experiment.compare(quantity, [ours[at]], theirs[at], "closed form", within, unit, cause)
+        worst = experiment.compare(
+            quantity, [ours[at]], theirs[at], "closed form", within, unit, cause
+        )
         rows.append(dataclasses.replace(worst, samples=len(loads)))
     return rows
 
@@ -202,32 +265,50 @@ def _table(numbers: dict[str, Any]) -> experiment.Table:
         "largest [mm]": entry("largest distance [m]", scale=1e3),
         "as friction [%]": entry("distance as friction", scale=1e2),
     }
-    rows = {f"{law}, {variant}": row for law, each in numbers.items() for variant, row in each["variants"].items()}
+    rows = {
+        f"{law}, {variant}": row
+        for law, each in numbers.items()
+        for variant, row in each["variants"].items()
+    }
     note = (
         "Distances from the distributed model with the same pressure; as friction: the share that moves its end as "
         f"far. Largest contact: at {LARGEST_CONTACT:g} N."
     )
-    return experiment.table("Where the plate is after 2 s", rows, columns, "pressure, variant", note)
+    return experiment.table(
+        "Where the plate is after 2 s", rows, columns, "pressure, variant", note
+    )
 
 
-def _figures(pressures: tuple[int, ...], found: Runs, loads: np.ndarray) -> dict[str, PlotFigure]:
-    titles = {pressure: f"pressure law {pressure}: ${PRESSURES[pressure]}$" for pressure in pressures}
+def _figures(
+    pressures: tuple[int, ...], found: Runs, loads: np.ndarray
+) -> dict[str, PlotFigure]:
+    titles = {
+        pressure: f"pressure law {pressure}: ${PRESSURES[pressure]}$"
+        for pressure in pressures
+    }
     first, *reduced = VARIANTS
     styles: dict[str, Any] = {first: {"color": looks.DISTRIBUTED, "linewidth": 1.5}} | {
         variant: {"color": looks.REDUCED, "linestyle": style, "linewidth": 1.5}
         for variant, style in zip(reduced, LINE_STYLES, strict=True)
     }
-    shown = {title: {variant: found[pressure, variant] for variant in VARIANTS} for pressure, title in titles.items()}
+    shown = {
+        title: {variant: found[pressure, variant] for variant in VARIANTS}
+        for pressure, title in titles.items()
+    }
     apart = {
         title: {
-            name: (each["time"], runs.distance(each, panel[first])) for name, each in panel.items() if name != first
+            name: (each["time"], runs.distance(each, panel[first]))
+            for name, each in panel.items()
+            if name != first
         }
         for title, panel in shown.items()
     }
     return {
         "profiles": _profiles(titles, loads),
         "motion": figures.histories(shown, ("normal_force", *POSE), styles=styles),
-        "distance": figures.distances(apart, "distance from distributed [mm]", styles=styles),
+        "distance": figures.distances(
+            apart, "distance from distributed [mm]", styles=styles
+        ),
     }
 
 
@@ -237,19 +318,26 @@ def _profiles(titles: dict[int, str], loads: np.ndarray) -> PlotFigure:
     parts: Any = figure.subfigures(2, 1)
     row = parts[0].subplots(1, len(titles), sharey=True, squeeze=False)[0]
     for axes, (pressure, title) in zip(row, titles.items(), strict=True):
-        _draw_cuts(axes, soft_patch(pressure), (float(loads[0]), MEAN_LOAD, float(loads[-1])))
+        _draw_cuts(
+            axes, soft_patch(pressure), (float(loads[0]), MEAN_LOAD, float(loads[-1]))
+        )
         axes.set_title(title, fontsize="medium")
         axes.set_xlabel("$x$ [mm]")
         tidy(axes)
     row[0].set_ylabel("pressure [kPa]")
-    row[0].set_ylim(bottom=0.0)  # after all lines: it ends the scaling of the shared axis
+    row[0].set_ylim(
+        bottom=0.0
+    )  # after all lines: it ends the scaling of the shared axis
     row[0].legend(frameon=False, fontsize="small")
-    _draw_moments(parts[1].subplots(1, 2), titles, np.linspace(loads[0], loads[-1], 101))
+    _draw_moments(
+        parts[1].subplots(1, 2), titles, np.linspace(loads[0], loads[-1], 101)
+    )
     return figure
 
 
 def _draw_cuts(axes: Any, patch: ContactPatch, loads: tuple[float, ...]) -> None:
-    grid, law = patch.grid, patch.pressure
+    grid = patch.grid
+    law = patch.pressure
     assert grid is not None, "the cut needs a grid"
     middle = np.abs(patch.positions[:, 1]) < 0.1 * grid.cell_height
     x = patch.positions[middle, 0]
@@ -260,22 +348,45 @@ def _draw_cuts(axes: Any, patch: ContactPatch, loads: tuple[float, ...]) -> None
         pressure = 1e-3 * patch.pressure_values(load)[middle]
         relative = law.relative(fine, np.array(load))
         axes.stairs(pressure, 1e3 * edges, color=colour, linewidth=1.0, alpha=0.75)
-        axes.plot(1e3 * fine[:, 0], pressure[centre] * relative, color=colour, linewidth=1.4, label=f"{load:.2f} N")
+        axes.plot(
+            1e3 * fine[:, 0],
+            pressure[centre] * relative,
+            color=colour,
+            linewidth=1.4,
+            label=f"{load:.2f} N",
+        )
 
 
 def _draw_moments(panels: Any, titles: dict[int, str], loads: np.ndarray) -> None:
     """Draw r [mm] and <rho^2> [mm^2] over the load: closed forms as lines, those of the grid as markers."""
-    some, (radius, moment) = loads[::5], panels
-    for (pressure, title), colour, marker in zip(titles.items(), ("0.1", "0.6"), "os", strict=False):
-        patch, (r, second) = soft_patch(pressure), round_moments(pressure, loads)
-        dots = {"linestyle": "none", "marker": marker, "markersize": 3.5, "color": colour}
+    some = loads[::5]
+    (radius, moment) = panels
+    for (pressure, title), colour, marker in zip(
+        titles.items(), ("0.1", "0.6"), "os", strict=False
+    ):
+        patch = soft_patch(pressure)
+        (r, second) = round_moments(pressure, loads)
+        dots = {
+            "linestyle": "none",
+            "marker": marker,
+            "markersize": 3.5,
+            "color": colour,
+        }
         radius.plot(loads, 1e3 * r, color=colour, linewidth=1.3, label=f"$r$, {title}")
         radius.plot(some, 1e3 * np.asarray(patch.contact_radius(some)), **dots)
         moment.plot(loads, 1e6 * second, color=colour, linewidth=1.3, label=title)
         moment.plot(some, 1e6 * np.asarray(patch.second_moment(some)), **dots)
-    radius.plot(loads, 1e3 * finger(1).radius(loads), color="0.25", linestyle=LINE_STYLES[1], label="$R$, both laws")
+    radius.plot(
+        loads,
+        1e3 * finger(1).radius(loads),
+        color="0.25",
+        linestyle=LINE_STYLES[1],
+        label="$R$, both laws",
+    )
     radius.set(xlabel="normal force [N]", ylabel="radius [mm]", ylim=(0.0, None))
-    moment.set(xlabel="normal force [N]", ylabel="second moment [mm$^2$]", ylim=(0.0, None))
+    moment.set(
+        xlabel="normal force [N]", ylabel="second moment [mm$^2$]", ylim=(0.0, None)
+    )
     for axes in panels:
         axes.legend(frameon=False, fontsize="small", loc="best")
         tidy(axes)

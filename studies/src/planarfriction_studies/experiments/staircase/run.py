@@ -15,7 +15,15 @@ from planarfriction.scenes import Signal
 from planarfriction.scenes.ready import published_velocity
 from planarfriction.scenes.signal import sample_times
 from planarfriction_studies.experiments import experiment, facts, looks
-from planarfriction_studies.experiments.experiment import TWIST, WRENCH, Arrays, Comparison, Reference, Result, Work
+from planarfriction_studies.experiments.experiment import (
+    TWIST,
+    WRENCH,
+    Arrays,
+    Comparison,
+    Reference,
+    Result,
+    Work,
+)
 from planarfriction_studies.experiments.runs import WIDTH
 from planarfriction_studies.experiments.wording import report
 
@@ -50,12 +58,19 @@ def rod_wrench(twist: np.ndarray, half_length: float) -> np.ndarray:
     speeds = np.hypot(ends, vy)
     total = speeds.sum(axis=0)
     moving = np.where(total > 0.0, total, 1.0)
-    spinning, along = np.where(omega != 0.0, omega, 1.0), np.where(vy != 0.0, np.abs(vy), 1.0)
-    spread = np.where(vy != 0.0, np.arcsinh(ends[0] / along) - np.arcsinh(ends[1] / along), 0.0)
+    spinning = np.where(omega != 0.0, omega, 1.0)
+    along = np.where(vy != 0.0, np.abs(vy), 1.0)
+    spread = np.where(
+        vy != 0.0, np.arcsinh(ends[0] / along) - np.arcsinh(ends[1] / along), 0.0
+    )
     fx = -2.0 * vx / moving
-    fy = -np.where(omega != 0.0, vy * spread / (2.0 * half_length * spinning), 2.0 * vy / moving)
+    fy = -np.where(
+        omega != 0.0, vy * spread / (2.0 * half_length * spinning), 2.0 * vy / moving
+    )
     # the integral of y u/s over the rod, by parts: differences between the ends of vx s - (u s - vy^2 asinh)/2
-    difference = vx * (speeds[0] - speeds[1]) - 0.5 * (ends[0] * speeds[0] - ends[1] * speeds[1] - vy**2 * spread)
+    difference = vx * (speeds[0] - speeds[1]) - 0.5 * (
+        ends[0] * speeds[0] - ends[1] * speeds[1] - vy**2 * spread
+    )
     torque = difference / (2.0 * half_length * spinning**2)
     return np.stack([fx, fy, np.where(omega != 0.0, torque, 0.0)], -1)
 
@@ -76,7 +91,9 @@ def smoothed_wrench(twist: np.ndarray, patch: ContactPatch) -> np.ndarray:
     wrench = LimitSurfaceCells(patch).wrench(twist)
     for i in np.flatnonzero(twist[:, 2] > 0.0):
         vx, vy, omega = twist[i]
-        wrench[i] = -np.array(smoothed_spin_sum(corners, place, x, y, weights, -vy / omega, vx / omega))
+        wrench[i] = -np.array(
+            smoothed_spin_sum(corners, place, x, y, weights, -vy / omega, vx / omega)
+        )
     return wrench
 
 
@@ -87,24 +104,37 @@ def run(work: Work) -> Result:
     twist = profile(time)
     cells = (11, 21) if work.quick else (11, 21, 41, 81)
     every = {
-        count: work.piece(f"line, {count} cells", lambda count=count: _wrenches(twist, _line(count))) for count in cells
+        count: work.piece(
+            f"line, {count} cells", lambda count=count: _wrenches(twist, _line(count))
+        )
+        for count in cells
     }
-    found, errors = every[21], {count: _errors(twist, each) for count, each in every.items()}
+    found = every[21]
+    errors = {count: _errors(twist, each) for count, each in every.items()}
     steps = _steps(time, found["plain"][:, 0])
     numbers = _numbers(time, found, steps) | {
         "miss_if_labels_mean_the_state": _label_shifts(profile),
         "error_against_the_rod": {str(count): error for count, error in errors.items()},
     }
-    along, speeds = ("time", time[::5], "s"), experiment.with_units(twist[::5], TWIST)
-    wrenches = {(name,): experiment.columns_of(time[::5], wrench[::5], WRENCH) for name, wrench in found.items()}
+    along = ("time", time[::5], "s")
+    speeds = experiment.with_units(twist[::5], TWIST)
+    wrenches = {
+        (name,): experiment.columns_of(time[::5], wrench[::5], WRENCH)
+        for name, wrench in found.items()
+    }
     return report(
         "staircase",
-        {"staircase": _overview(time, found), "staircase_zoom": _zoom(time, found, numbers["edge"])},
+        {
+            "staircase": _overview(time, found),
+            "staircase_zoom": _zoom(time, found, numbers["edge"]),
+        },
         numbers,
         _orders(errors),
         comparisons=_comparisons(time, profile, found, steps),
         tables=(_error_table(errors),),
-        data={"line": experiment.dataset(wrenches, WRENCH, ("surface",), along, speeds)},
+        data={
+            "line": experiment.dataset(wrenches, WRENCH, ("surface",), along, speeds)
+        },
     )
 
 
@@ -114,7 +144,11 @@ def _line(cells: int = 21) -> ContactPatch:
 
 def _wrenches(twist: np.ndarray, patch: ContactPatch) -> Arrays:
     plain = LimitSurfaceCells(patch).wrench(twist)
-    return {"plain": plain, "bilinear": smoothed_wrench(twist, patch), "rod": rod_wrench(twist, 0.5 * WIDTH)}
+    return {
+        "plain": plain,
+        "bilinear": smoothed_wrench(twist, patch),
+        "rod": rod_wrench(twist, 0.5 * WIDTH),
+    }
 
 
 def _steps(time: np.ndarray, fx: np.ndarray) -> Arrays:
@@ -133,29 +167,44 @@ def _published_steps() -> tuple[np.ndarray, float]:
 
 def _label_shifts(profile: Any) -> dict[str, float]:
     """Compute the errors of plain fx and fy [N] at the published vertices if labels mean the sample before or after."""
-    surface, curves = LimitSurfaceCells(_line()), [facts.published_curve(f"staircase/plain/{name}") for name in WRENCH]
+    surface = LimitSurfaceCells(_line())
+    curves = [facts.published_curve(f"staircase/plain/{name}") for name in WRENCH]
     result = {}
     for words, shift in (("before", -SAMPLE_TIME), ("at", 0.0), ("after", SAMPLE_TIME)):
-        ours = [surface.wrench(profile(np.maximum(curve.time + shift, 0.0))) for curve in curves]
-        result[words] = max(float(np.abs(ours[i][:, i] - curves[i].values).max()) for i in (0, 1))
+        ours = [
+            surface.wrench(profile(np.maximum(curve.time + shift, 0.0)))
+            for curve in curves
+        ]
+        result[words] = max(
+            float(np.abs(ours[i][:, i] - curves[i].values).max()) for i in (0, 1)
+        )
     return result
 
 
 def _errors(twist: np.ndarray, found: Arrays) -> dict[str, list[float]]:
     """Return the largest and mean distance from the rod, tangential [N] and torque [N m], of both sums."""
-    moving, result = np.abs(twist).max(axis=1) > 0.0, {}
+    moving = np.abs(twist).max(axis=1) > 0.0
+    result = {}
     for name in ("plain", "bilinear"):
         miss = (found[name] - found["rod"])[moving]
-        force, torque = np.hypot(miss[:, 0], miss[:, 1]), np.abs(miss[:, 2])
-        result[name] = [float(value) for value in (force.max(), force.mean(), torque.max(), torque.mean())]
+        force = np.hypot(miss[:, 0], miss[:, 1])
+        torque = np.abs(miss[:, 2])
+        result[name] = [
+            float(value)
+            for value in (force.max(), force.mean(), torque.max(), torque.mean())
+        ]
     return result
 
 
 def _numbers(time: np.ndarray, found: Arrays, steps: Arrays) -> dict[str, Any]:
     spin = int(np.searchsorted(time, 0.7))  # any time of pure spin
     smoothed = found["bilinear"]
-    high = _largest_jump(time, smoothed[:, 0], np.flatnonzero((time > 0.9) & (time < 1.4)))
-    low = _largest_jump(time, smoothed[:, 1], np.flatnonzero((time > 3.4) & (time < 4.0)))
+    high = _largest_jump(
+        time, smoothed[:, 0], np.flatnonzero((time > 0.9) & (time < 1.4))
+    )
+    low = _largest_jump(
+        time, smoothed[:, 1], np.flatnonzero((time > 3.4) & (time < 4.0))
+    )
     inside = (time > SLIDE_RAMP[0] + 1e-3) & (time < high["time"] - 1e-3)
     return {
         "sample_time": SAMPLE_TIME,
@@ -170,26 +219,36 @@ def _numbers(time: np.ndarray, found: Arrays, steps: Arrays) -> dict[str, Any]:
         },
         "edge": {"high": high, "low": low},
         "kink_of_tau": {
-            name: float(np.abs(np.diff(found[name][inside, 2], 2)).max() / SAMPLE_TIME) for name in ("bilinear", "rod")
+            name: float(np.abs(np.diff(found[name][inside, 2], 2)).max() / SAMPLE_TIME)
+            for name in ("bilinear", "rod")
         },
     }
 
 
-def _largest_jump(time: np.ndarray, values: np.ndarray, part: np.ndarray) -> dict[str, float]:
+def _largest_jump(
+    time: np.ndarray, values: np.ndarray, part: np.ndarray
+) -> dict[str, float]:
     change = np.abs(np.diff(values[part]))
     at = int(change.argmax())
     return {"time": float(time[part[at]]), "jump": float(change[at])}
 
 
-def _comparisons(time: np.ndarray, profile: Signal, found: Arrays, steps: Arrays) -> list[Comparison]:
+def _comparisons(
+    time: np.ndarray, profile: Signal, found: Arrays, steps: Arrays
+) -> list[Comparison]:
     rows = []
     for name in ("plain", "bilinear"):
-        ours, words = experiment.columns_of(time, found[name], WRENCH), f"steady state of the line, {LINES[name][0]}, "
+        ours = experiment.columns_of(time, found[name], WRENCH)
+        words = f"steady state of the line, {LINES[name][0]}, "
         cause = "The same sum at the same samples: what is left is the error of reading the figure."
         curve = f"staircase/{name}"
-        rows += experiment.compare_columns("published", words, ours, curve, ALLOWANCE, cause, WRENCH)
+        rows += experiment.compare_columns(
+            "published", words, ours, curve, ALLOWANCE, cause, WRENCH
+        )
     cause = "The same profile, at each sample's own time: what is left is the error of reading the figure."
-    rows += experiment.compare_profile(profile, "convergence/velocity", TWIST, cause, dt=SAMPLE_TIME)
+    rows += experiment.compare_profile(
+        profile, "convergence/velocity", TWIST, cause, dt=SAMPLE_TIME
+    )
     return [*rows, *_plateaus(time, found), *_step_comparisons(steps)]
 
 
@@ -201,25 +260,61 @@ def _plateaus(time: np.ndarray, found: Arrays) -> list[Comparison]:
     printed = "The table gives the contact radius to $10^{-11}$ m: rounding."
     sums = "The plain sum over $N$ = 21 equal cells of width $c$ is $c\\,(N^2 - 1)/(4N)$: rounding."
     rows: tuple[tuple[str, float, Reference, float, str], ...] = (
-        ("plain", published["contact radius, plain sum [m]"], "published", 6e-12, printed),
-        ("bilinear", published["contact radius, as published [m]"], "published", 6e-12, printed),
+        (
+            "plain",
+            published["contact radius, plain sum [m]"],
+            "published",
+            6e-12,
+            printed,
+        ),
+        (
+            "bilinear",
+            published["contact radius, as published [m]"],
+            "published",
+            6e-12,
+            printed,
+        ),
         ("plain", cell * (21**2 - 1) / (4 * 21), "closed form", 1e-15, sums),
-        ("rod", 0.25 * WIDTH, "closed form", 1e-15, "A rod of half-length $a$ has $r = a/2$: rounding."),
+        (
+            "rod",
+            0.25 * WIDTH,
+            "closed form",
+            1e-15,
+            "A rod of half-length $a$ has $r = a/2$: rounding.",
+        ),
     )
     return [
-        experiment.compare(f"torque of a pure spin, {name}", found[name][spin, 2], -radius, of, within, "N m", cause)
+        experiment.compare(
+            f"torque of a pure spin, {name}",
+            found[name][spin, 2],
+            -radius,
+            of,
+            within,
+            "N m",
+            cause,
+        )
         for name, radius, of, within, cause in rows
     ]
 
 
 def _step_comparisons(steps: Arrays) -> list[Comparison]:
     """Compare the times and heights of the steps of plain fx."""
-    patch, (start, end, speed) = _line(), SLIDE_RAMP
+    patch = _line()
+    (start, end, speed) = SLIDE_RAMP
     upward = steps["time"] < end
     y = np.sort(patch.positions[:, 1])
-    crossings = start + (end - start) * y[y > -1e-9] / speed  # the centre of rotation is at y = vx/omega
+    crossings = (
+        start + (end - start) * y[y > -1e-9] / speed
+    )  # the centre of rotation is at y = vx/omega
     # first and last the centre of rotation leaves and meets the middle cell
-    heights = np.where(np.isin(np.arange(len(steps["height"])), [0, len(steps["height"]) - 1]), 1.0, 2.0) / patch.cells
+    heights = (
+        np.where(
+            np.isin(np.arange(len(steps["height"])), [0, len(steps["height"]) - 1]),
+            1.0,
+            2.0,
+        )
+        / patch.cells
+    )
     return [
         experiment.compare(
             "last sample before each step of plain fx", steps["time"], _published_steps()[0], "published",
@@ -243,17 +338,37 @@ def _orders(errors: dict[int, dict[str, list[float]]]) -> dict[str, Any]:
     """Return the fewest and most cells, and powers of their number with which largest and mean error in force fall."""
     few, *_, many = errors
     ratio = {
-        name: np.log(np.array(errors[few][name]) / errors[many][name]) / np.log(few / many) for name in errors[few]
+        name: np.log(np.array(errors[few][name]) / errors[many][name])
+        / np.log(few / many)
+        for name in errors[few]
     }
-    return {"few": few, "many": many, "order": {name: values[:2].tolist() for name, values in ratio.items()}}
+    return {
+        "few": few,
+        "many": many,
+        "order": {name: values[:2].tolist() for name, values in ratio.items()},
+    }
 
 
 def _error_table(errors: dict[int, dict[str, list[float]]]) -> experiment.Table:
     """Return the largest and mean errors of both sums against the rod, by the number of cells."""
-    rows = {f"{count}, {name}": values for count, error in errors.items() for name, values in error.items()}
-    headings = {"force, max [N]": 1.0, "force, mean [N]": 1.0, "torque, max [N mm]": 1e3, "torque, mean [N mm]": 1e3}
-    columns = {heading: experiment.entry(i, scale=scale) for i, (heading, scale) in enumerate(headings.items())}
-    return experiment.table("Distance from the exact rod along the profile", rows, columns, "cells, sum")
+    rows = {
+        f"{count}, {name}": values
+        for count, error in errors.items()
+        for name, values in error.items()
+    }
+    headings = {
+        "force, max [N]": 1.0,
+        "force, mean [N]": 1.0,
+        "torque, max [N mm]": 1e3,
+        "torque, mean [N mm]": 1e3,
+    }
+    columns = {
+        heading: experiment.entry(i, scale=scale)
+        for i, (heading, scale) in enumerate(headings.items())
+    }
+    return experiment.table(
+        "Distance from the exact rod along the profile", rows, columns, "cells, sum"
+    )
 
 
 def _overview(time: np.ndarray, found: Arrays) -> PlotFigure:
@@ -266,14 +381,21 @@ def _overview(time: np.ndarray, found: Arrays) -> PlotFigure:
     return figure
 
 
-def _zoom(time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]) -> PlotFigure:
+def _zoom(
+    time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]
+) -> PlotFigure:
     """Draw the first steps of fx and of the torque; where the smoothing ends, at the times that `edge` holds."""
     figure, panels = looks.panels(9.6, 6.4, 2, 2)
-    high, low = edge["high"]["time"], edge["low"]["time"]
+    high = edge["high"]["time"]
+    low = edge["low"]["time"]
     parts = (
         ("fx", (0.79, 0.97), "first steps, force"),
         ("tau", (0.79, 0.97), "first steps, torque"),
-        ("fx", (high - 0.045, high + 0.03), "centre of rotation leaves at the high edge"),
+        (
+            "fx",
+            (high - 0.045, high + 0.03),
+            "centre of rotation leaves at the high edge",
+        ),
         ("fy", (low - 0.06, low + 0.04), "centre of rotation leaves at the low edge"),
     )
     for axes, (name, limits, title) in zip(panels.flat, parts, strict=True):
@@ -285,13 +407,34 @@ def _zoom(time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]) ->
 
 
 def _draw(
-    axes: Any, time: np.ndarray, found: Arrays, column: str, limits: tuple[float, float], size: float = 4.0
+    axes: Any,
+    time: np.ndarray,
+    found: Arrays,
+    column: str,
+    limits: tuple[float, float],
+    size: float = 4.0,
 ) -> None:
     label, factor = looks.AXES[column]
-    part, index = (time >= limits[0]) & (time <= limits[1]), list(WRENCH).index(column)
+    part = (time >= limits[0]) & (time <= limits[1])
+    index = list(WRENCH).index(column)
     for name, (words, line, width, colour) in LINES.items():
-        axes.plot(time[part], factor * found[name][part, index], ls=line, lw=width, color=colour, label=words)
+        axes.plot(
+            time[part],
+            factor * found[name][part, index],
+            ls=line,
+            lw=width,
+            color=colour,
+            label=words,
+        )
     for name, marker in (("plain", "o"), ("bilinear", "s")):
         look = {"ms": size, "mew": 0.9, "label": f"published, {name}"}
-        looks.vertices(axes, f"staircase/{name}/{column}", factor, LINES[name][-1], limits, marker, **look)
+        looks.vertices(
+            axes,
+            f"staircase/{name}/{column}",
+            factor,
+            LINES[name][-1],
+            limits,
+            marker,
+            **look,
+        )
     axes.set(ylabel=label, xlim=limits)

@@ -13,9 +13,23 @@ import numpy as np
 
 from planarfriction.plots.style import PlotFigure
 from planarfriction_studies.experiments import experiment, facts, looks
-from planarfriction_studies.experiments.experiment import UNITS, Arrays, Comparison, Result, Table, Work, entry
+from planarfriction_studies.experiments.experiment import (
+    UNITS,
+    Arrays,
+    Comparison,
+    Result,
+    Table,
+    Work,
+    entry,
+)
 from planarfriction_studies.experiments.timing import runs
-from planarfriction_studies.experiments.timing.runs import BREAKAWAY, CIRCLE, QUICK_WINDOW, ROWS, Problem
+from planarfriction_studies.experiments.timing.runs import (
+    BREAKAWAY,
+    CIRCLE,
+    QUICK_WINDOW,
+    ROWS,
+    Problem,
+)
 from planarfriction_studies.experiments.wording import power, report, short
 
 KINDS = ("distributed", "reduced")
@@ -50,7 +64,10 @@ def run(work: Work) -> Result:
     repeats = 1 if work.quick else runs.MOST_REPEATS
     times = {
         row: {
-            kind: work.piece(f"timing, {row}, {kind}, whole run", partial(runs.whole_runs, scene, repeats))
+            kind: work.piece(
+                f"timing, {row}, {kind}, whole run",
+                partial(runs.whole_runs, scene, repeats),
+            )
             for kind, scene in scenes.items()
         }
         for row, scenes in ROWS.items()
@@ -59,10 +76,14 @@ def run(work: Work) -> Result:
     problems = runs.problems(work)
     references = {problem: runs.reference(problem, work) for problem in problems}
     solved = {problem: runs.work_precision(problem, work) for problem in problems}
-    points = {problem: _points(solved[problem], references[problem]) for problem in problems}
+    points = {
+        problem: _points(solved[problem], references[problem]) for problem in problems
+    }
     agreements = [c for p in problems for c in _agreements(p, solved[p], references[p])]
     rows = {row: _row_numbers(times[row], baselines.get(row, {})) for row in ROWS}
-    cost = {kind: each["solver"] / each["trials"] for kind, each in times[CIRCLE].items()}
+    cost = {
+        kind: each["solver"] / each["trials"] for kind, each in times[CIRCLE].items()
+    }
     numbers = {
         "machine": _machine(),
         "table": rows,
@@ -74,17 +95,28 @@ def run(work: Work) -> Result:
         {"timing_work_precision": _figure(points)},
         numbers,
         {
-            "rebuilding": _ratio(*(times[row]["reduced"]["time"] for row in ("k = 2 f_N", "k = 2"))),
+            "rebuilding": _ratio(
+                *(times[row]["reduced"]["time"] for row in ("k = 2 f_N", "k = 2"))
+            ),
             "published": facts.published_table("timing"),
             "circle": CIRCLE,
             "published_step": PUBLISHED_STEP_RATIO,
             "quick": work.quick,
-            "precision": [_precision(problem, each) for problem, each in points.items()],
+            "precision": [
+                _precision(problem, each) for problem, each in points.items()
+            ],
             "agreed": max(each.difference for each in agreements if each.unit == "m"),
         },
-        comparisons=agreements + [c for p in problems for c in _against_converged(p, references[p])],
-        tables=[_published_table(rows), *(_points_table(problem, points[problem]) for problem in problems)],
-        data={f"work_precision_{problem.kind}": _dataset(points[problem]) for problem in problems},
+        comparisons=agreements
+        + [c for p in problems for c in _against_converged(p, references[p])],
+        tables=[
+            _published_table(rows),
+            *(_points_table(problem, points[problem]) for problem in problems),
+        ],
+        data={
+            f"work_precision_{problem.kind}": _dataset(points[problem])
+            for problem in problems
+        },
     )
 
 
@@ -103,17 +135,27 @@ def _machine() -> dict[str, Any]:
 def _baselines(work: Work) -> dict[str, dict[str, Arrays]]:
     """Time LSODA beside ours, by row and kind; the distributed model over a window unless all is wanted."""
     spans: dict[str, tuple[float, float]]
-    spans = {"distributed": (0.0, 2.0) if work.full else BREAKAWAY, "reduced": (0.0, 2.0)}
+    spans = {
+        "distributed": (0.0, 2.0) if work.full else BREAKAWAY,
+        "reduced": (0.0, 2.0),
+    }
     spans = dict.fromkeys(KINDS, QUICK_WINDOW) if work.quick else spans
 
     def beside(row: str, kind: str) -> Arrays:
         label = f"timing, {row}, {kind}, LSODA as published, {spans[kind][0]:g} to {spans[kind][1]:g} s"
-        return work.piece(label, partial(runs.beside_lsoda, ROWS[row][kind], *spans[kind]))
+        return work.piece(
+            label, partial(runs.beside_lsoda, ROWS[row][kind], *spans[kind])
+        )
 
-    return {row: {kind: beside(row, kind) for kind in KINDS} for row in ([CIRCLE] if work.quick else ROWS)}
+    return {
+        row: {kind: beside(row, kind) for kind in KINDS}
+        for row in ([CIRCLE] if work.quick else ROWS)
+    }
 
 
-def _points(solved: Mapping[tuple[str, float], Arrays], reference: np.ndarray) -> Points:
+def _points(
+    solved: Mapping[tuple[str, float], Arrays], reference: np.ndarray
+) -> Points:
     points: Points = {}
     for (solver, tolerance), found in solved.items():
         entry = {
@@ -126,12 +168,21 @@ def _points(solved: Mapping[tuple[str, float], Arrays], reference: np.ndarray) -
     return points
 
 
-def _row_numbers(row: Mapping[str, Arrays], baselines: Mapping[str, Arrays]) -> dict[str, Any]:
-    numbers: dict[str, Any] = {f"{kind} [s]": _spread(row[kind]["time"]) for kind in KINDS}
+def _row_numbers(
+    row: Mapping[str, Arrays], baselines: Mapping[str, Arrays]
+) -> dict[str, Any]:
+    numbers: dict[str, Any] = {
+        f"{kind} [s]": _spread(row[kind]["time"]) for kind in KINDS
+    }
     numbers["ratio"] = _ratio(row["distributed"]["time"], row["reduced"]["time"])
-    numbers |= {f"{kind}, LSODA over ours": _ratio(each["lsoda"], each["ours"]) for kind, each in baselines.items()}
+    numbers |= {
+        f"{kind}, LSODA over ours": _ratio(each["lsoda"], each["ours"])
+        for kind, each in baselines.items()
+    }
     numbers |= {f"{kind}, solver [s]": _spread(row[kind]["solver"]) for kind in KINDS}
-    return numbers | {f"{kind}, LSODA [s]": _spread(each["lsoda"]) for kind, each in baselines.items()}
+    return numbers | {
+        f"{kind}, LSODA [s]": _spread(each["lsoda"]) for kind, each in baselines.items()
+    }
 
 
 def _spread(times: np.ndarray) -> dict[str, float]:
@@ -162,21 +213,38 @@ def _agreements(
             ("angle", runs.angle_error(poses, reference), angle, "rad"),
         ):
             words = f"{problem.name}: {what}, RODAS4 beside {solver}"
-            found.append(Comparison(words, "converged", difference, tolerance, unit, len(poses), cause))
+            found.append(
+                Comparison(
+                    words, "converged", difference, tolerance, unit, len(poses), cause
+                )
+            )
     return found
 
 
 def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparison]:
     """Compare our reference with the converged solution, at the times they share."""
-    solution, times = facts.converged(CONVERGED[problem.kind]), problem.window.ends
+    solution = facts.converged(CONVERGED[problem.kind])
+    times = problem.window.ends
     index = np.abs(solution["time"][:, None] - times).argmin(axis=0)
     shared = np.abs(solution["time"][index] - times) < 1e-9
-    cause = "Two solutions of the same equations at tight tolerances, by different methods."
+    cause = (
+        "Two solutions of the same equations at tight tolerances, by different methods."
+    )
     rows = []
     for i, (name, allowance) in enumerate(CONVERGED_ALLOWANCE.items()):
-        values, words = solution[name], f"{problem.name}: {name} of the reference"
+        values = solution[name]
+        words = f"{problem.name}: {name} of the reference"
         tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(values))
-        rows.append((words, reference[shared, i], values[index[shared]], tolerance, UNITS[name], cause))
+        rows.append(
+            (
+                words,
+                reference[shared, i],
+                values[index[shared]],
+                tolerance,
+                UNITS[name],
+                cause,
+            )
+        )
     return experiment.compare_all("converged", rows)
 
 
@@ -184,7 +252,9 @@ def _precision(problem: Problem, points: Points) -> dict[str, Any]:
     """Return the time of each solver to the same error, and the solvers that do not reach it."""
     level = LEVELS[problem.kind]
     times = {
-        solver: runs.cheapest([(each["error"], [each[name] for name in TIMES]) for each in entries], level)
+        solver: runs.cheapest(
+            [(each["error"], [each[name] for name in TIMES]) for each in entries], level
+        )
         for solver, entries in points.items()
     }
     both = [times.get(solver) for solver in ("LSODA", "RODAS4")]
@@ -192,7 +262,11 @@ def _precision(problem: Problem, points: Points) -> dict[str, Any]:
         "name": problem.name,
         "level": level,
         "lsoda": both[0][0] / both[1][0] if both[0] and both[1] else None,
-        "reached": {solver: _spread(np.array(each)) for solver, each in times.items() if each is not None},
+        "reached": {
+            solver: _spread(np.array(each))
+            for solver, each in times.items()
+            if each is not None
+        },
         "missed": [solver for solver, each in times.items() if each is None],
     }
 
@@ -201,11 +275,28 @@ def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
     figure, (panels,) = looks.panels(9.6, 4.2, 1, len(points), squeeze=False)
     for axes, (problem, solvers) in zip(panels, points.items(), strict=True):
         for i, (solver, entries) in enumerate(solvers.items()):
-            errors, times, first, third = (np.array([entry[name] for entry in entries]) for name in ("error", *TIMES))
-            bars = {"yerr": [times - first, third - times], "capsize": 2.5, "elinewidth": 1.0}
-            look = {"color": looks.OTHERS[i], "markersize": 5, "linewidth": 1.3, "label": solver}
+            errors, times, first, third = (
+                np.array([entry[name] for entry in entries])
+                for name in ("error", *TIMES)
+            )
+            bars = {
+                "yerr": [times - first, third - times],
+                "capsize": 2.5,
+                "elinewidth": 1.0,
+            }
+            look = {
+                "color": looks.OTHERS[i],
+                "markersize": 5,
+                "linewidth": 1.3,
+                "label": solver,
+            }
             axes.errorbar(errors, times, fmt="osD^"[i] + "-", **bars, **look)
-        axes.set(xscale="log", yscale="log", xlabel="largest position error [m]", ylabel="wall time [s]")
+        axes.set(
+            xscale="log",
+            yscale="log",
+            xlabel="largest position error [m]",
+            ylabel="wall time [s]",
+        )
         axes.set_title(problem.name, fontsize="medium")
     looks.legend(figure, panels[0], 4, "lower")
     return figure
@@ -215,11 +306,16 @@ def _published_table(rows: Mapping[str, Mapping[str, Any]]) -> Table:
     def ours(row: Any, name: str) -> str:
         return _shown(row[0][name]) if name in row[0] else "not run"
 
-    columns: dict[str, Any] = {f"{kind} [s]": partial(ours, name=f"{kind} [s]") for kind in KINDS}
+    columns: dict[str, Any] = {
+        f"{kind} [s]": partial(ours, name=f"{kind} [s]") for kind in KINDS
+    }
     columns |= {"factor": partial(ours, name="ratio")}
     columns |= {f"{kind}, published [s]": entry(1, f"{kind} [s]") for kind in KINDS}
     columns |= {"factor, published": entry(1, "ratio")}
-    columns |= {f"{kind}, LSODA here over ours": partial(ours, name=f"{kind}, LSODA over ours") for kind in KINDS}
+    columns |= {
+        f"{kind}, LSODA here over ours": partial(ours, name=f"{kind}, LSODA over ours")
+        for kind in KINDS
+    }
     note = (
         "Ours: all of `simulate`, default tolerances. LSODA: time in the solver, without tables, over the whole run "
         f"or, where that takes minutes, {BREAKAWAY[0]:g} to {BREAKAWAY[1]:g} s, where the plate breaks away (a quick "
@@ -228,21 +324,35 @@ def _published_table(rows: Mapping[str, Mapping[str, Any]]) -> Table:
     )
     published = facts.published_table("timing")
     return experiment.table(
-        "In-hand run of 2 s", {row: (rows[row], published[row]) for row in published}, columns, "contact", note
+        "In-hand run of 2 s",
+        {row: (rows[row], published[row]) for row in published},
+        columns,
+        "contact",
+        note,
     )
 
 
 def _points_table(problem: Problem, points: Points) -> Table:
-    rows = {f"{solver}, {entry['tolerance']:.0e}": entry for solver, entries in points.items() for entry in entries}
+    rows = {
+        f"{solver}, {entry['tolerance']:.0e}": entry
+        for solver, entries in points.items()
+        for entry in entries
+    }
     columns = {
         "position error [m]": lambda entry: f"{entry['error']:.1e}",
-        "time [ms]": lambda entry: _shown(_spread(np.array([1e3 * entry[name] for name in TIMES]))),
+        "time [ms]": lambda entry: _shown(
+            _spread(np.array([1e3 * entry[name] for name in TIMES]))
+        ),
         "evaluations": lambda entry: int(entry["evaluations"]),
         "runs": lambda entry: int(entry["repeats"]),
     }
     note = f"{problem.window.states} states. Absolute tolerance: {runs.ATOL_PER_RTOL:g} times the relative one."
     return experiment.table(
-        f"Work against precision, {problem.name}", rows, columns, "solver, relative tolerance", note
+        f"Work against precision, {problem.name}",
+        rows,
+        columns,
+        "solver, relative tolerance",
+        note,
     )
 
 
@@ -259,6 +369,9 @@ def _dataset(points: Points) -> Any:
     entries = [(solver, entry) for solver, found in points.items() for entry in found]
     units = {"tolerance": "1", "error": "m", "time": "s", "evaluations": "1"}
     variables = {
-        name: ("run", np.array([entry[name] for _, entry in entries]), {"units": unit}) for name, unit in units.items()
+        name: ("run", np.array([entry[name] for _, entry in entries]), {"units": unit})
+        for name, unit in units.items()
     }
-    return xr.Dataset(variables, coords={"solver": ("run", [solver for solver, _ in entries])})
+    return xr.Dataset(
+        variables, coords={"solver": ("run", [solver for solver, _ in entries])}
+    )

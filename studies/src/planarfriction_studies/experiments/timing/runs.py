@@ -13,8 +13,17 @@ import numpy as np
 from planarfriction.scenes import Scene, in_hand, simulate
 from planarfriction.solvers import RODAS3, RODAS4
 from planarfriction_studies.bench.baselines import LSODA, Poses, Window
-from planarfriction_studies.experiments.experiment import Arrays, Work, median_and_quartiles
-from planarfriction_studies.experiments.load_dependent.run import DISTRIBUTED, REBUILT, RESCALED, soft_scene
+from planarfriction_studies.experiments.experiment import (
+    Arrays,
+    Work,
+    median_and_quartiles,
+)
+from planarfriction_studies.experiments.load_dependent.run import (
+    DISTRIBUTED,
+    REBUILT,
+    RESCALED,
+    soft_scene,
+)
 from planarfriction_studies.experiments.runs import published_model
 
 ATOL_PER_RTOL = 30.0
@@ -76,27 +85,43 @@ def problems(work: Work) -> list[Problem]:
     if work.quick:
         tolerances = {"RODAS4": (1e-6,), "LSODA": (1e-6,)}
         with_radau = {**tolerances, "Radau": (1e-6,)}
-        return [Problem("reduced", QUICK_WINDOW, with_radau), Problem("distributed", QUICK_WINDOW, tolerances)]
-    several = dict.fromkeys(STRUCTURED, (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)) | {"LSODA": (1e-4, 1e-6, 1e-8)}
-    reduced, distributed = ((1e-4, 1e-6, 1e-8),) * 2 if work.full else ((1e-4, 1e-6), ())
+        return [
+            Problem("reduced", QUICK_WINDOW, with_radau),
+            Problem("distributed", QUICK_WINDOW, tolerances),
+        ]
+    several = dict.fromkeys(STRUCTURED, (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)) | {
+        "LSODA": (1e-4, 1e-6, 1e-8)
+    }
+    reduced, distributed = (
+        ((1e-4, 1e-6, 1e-8),) * 2 if work.full else ((1e-4, 1e-6), ())
+    )
     return [
         Problem("reduced", (0.0, 2.0), {**several, "Radau": reduced}),
-        Problem("distributed", BREAKAWAY, several | ({"Radau": distributed} if distributed else {})),
+        Problem(
+            "distributed",
+            BREAKAWAY,
+            several | ({"Radau": distributed} if distributed else {}),
+        ),
     ]
 
 
 def solve(problem: Problem, solver: str, tolerance: float) -> Poses:
     """Solve one run; absolute tolerances are the same share of the natural scales for all solvers."""
-    window, atol = problem.window, ATOL_PER_RTOL * tolerance
+    window = problem.window
+    atol = ATOL_PER_RTOL * tolerance
     if solver in STRUCTURED:
         return window.ours(rtol=tolerance, atol=atol, method=STRUCTURED[solver])[0]
-    return window.general(method=solver, rtol=tolerance, atol=atol * window.packed.state_scale)
+    return window.general(
+        method=solver, rtol=tolerance, atol=atol * window.packed.state_scale
+    )
 
 
 def reference(problem: Problem, work: Work) -> np.ndarray:
     """Return poses at the ends of the window's pieces, [S, 3], by RODAS4 at a tight tolerance."""
     label = f"timing, {problem.name}, reference"
-    return work.piece(label, lambda: {"poses": solve(problem, "RODAS4", REFERENCE).poses})["poses"]
+    return work.piece(
+        label, lambda: {"poses": solve(problem, "RODAS4", REFERENCE).poses}
+    )["poses"]
 
 
 def work_precision(problem: Problem, work: Work) -> dict[tuple[str, float], Arrays]:
@@ -106,7 +131,9 @@ def work_precision(problem: Problem, work: Work) -> dict[tuple[str, float], Arra
         for tolerance in tolerances:
             label = f"timing, {problem.name}, {solver} at {tolerance:.0e}"
             action = functools.partial(solve, problem, solver, tolerance)
-            compute = functools.partial(_repeated, action, 1 if work.quick else MOST_REPEATS)
+            compute = functools.partial(
+                _repeated, action, 1 if work.quick else MOST_REPEATS
+            )
             found[solver, tolerance] = work.piece(label, compute)
     return found
 
@@ -127,7 +154,9 @@ def _repeated(action: Callable[[], Poses], repeats: int) -> dict[str, Any]:
 def whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
     """Time `simulate` at default tolerances, tables included: `time`, `solver` [s] (median, quartiles), `trials`."""
     simulate(scene(), t_end=0.02)  # compiles
-    totals, solver, trials = [], [], 0
+    totals = []
+    solver = []
+    trials = 0
     while sum(totals) < ENOUGH and len(totals) < repeats:
         fresh = scene()
         begin = time.perf_counter()
@@ -135,14 +164,23 @@ def whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
         totals.append(time.perf_counter() - begin - run.compile_time)
         solver.append(run.wall_time)
         trials = run.steps + run.rejections
-    return {"time": median_and_quartiles(totals), "solver": median_and_quartiles(solver), "trials": trials}
+    return {
+        "time": median_and_quartiles(totals),
+        "solver": median_and_quartiles(solver),
+        "trials": trials,
+    }
 
 
-def beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[str, Any]:
+def beside_lsoda(
+    scene: Callable[[], Scene], begin: float, end: float
+) -> dict[str, Any]:
     """Time `lsoda` as published and `ours` at default tolerances over a window [s] (median, quartiles)."""
     fresh = scene()
     window = Window.of(fresh, begin, end)
-    ours = [window.ours(rtol=fresh.rtol, atol=fresh.atol)[0].wall_time for _ in range(MOST_REPEATS)]
+    ours = [
+        window.ours(rtol=fresh.rtol, atol=fresh.atol)[0].wall_time
+        for _ in range(MOST_REPEATS)
+    ]
     lsoda = _repeated(lambda: window.general(**LSODA), MOST_REPEATS)["time"]
     return {"lsoda": lsoda, "ours": median_and_quartiles(ours)}
 
@@ -157,6 +195,8 @@ def angle_error(poses: np.ndarray, reference: np.ndarray) -> float:
     return float(np.abs(poses - reference)[:, 2].max())
 
 
-def cheapest(points: Sequence[tuple[float, list[float]]], error: float) -> list[float] | None:
+def cheapest(
+    points: Sequence[tuple[float, list[float]]], error: float
+) -> list[float] | None:
     """Return the shortest times (median first) among points (error, times) at least as good as `error`, or None."""
     return min((times for found, times in points if found <= error), default=None)

@@ -26,7 +26,14 @@ MODELS = {"corrected": "r", "ellipsoid": "e"}
 
 UNITS = {"ft": "N", "tau": "N m"}
 WORDS = {"ft": "tangential force", "tau": "torque"}
-COLUMNS: tuple[str, ...] = ("whisker low", "first quartile", "median", "third quartile", "whisker high", "maximum")
+COLUMNS: tuple[str, ...] = (
+    "whisker low",
+    "first quartile",
+    "median",
+    "third quartile",
+    "whisker high",
+    "maximum",
+)
 PUBLISHED_SHAPES = ("Circle", "Square", "Line", "NonConvex1")
 SAMPLES = 500
 
@@ -56,13 +63,21 @@ def statistics(values: np.ndarray, method: str = "linear") -> dict[str, float]:
     """Return numbers of a box plot (`COLUMNS`) of the errors `values`; `method` is that of `numpy.percentile`."""
     first, median, third = np.percentile(values, [25, 50, 75], method=method)  # pyright: ignore[reportCallIssue, reportArgumentType]
     reach = 1.5 * (third - first)
-    low, high = values[values >= first - reach].min(), values[values <= third + reach].max()
-    return dict(zip(COLUMNS, map(float, (low, first, median, third, high, values.max())), strict=True))
+    low = values[values >= first - reach].min()
+    high = values[values <= third + reach].max()
+    return dict(
+        zip(
+            COLUMNS,
+            map(float, (low, first, median, third, high, values.max())),
+            strict=True,
+        )
+    )
 
 
 def slack(values: np.ndarray, samples: int = WRONG_SAMPLES) -> dict[str, float]:
     """Compute the largest move of each statistic if `samples` are wrong: to its neighbours in the sorted errors."""
-    ordered, box = np.sort(values), statistics(values)
+    ordered = np.sort(values)
+    box = statistics(values)
     rank = np.arange(len(ordered))
     result = {}
     for name, value in box.items():
@@ -76,7 +91,11 @@ def slack(values: np.ndarray, samples: int = WRONG_SAMPLES) -> dict[str, float]:
 def guard_effect(shape: str) -> dict[str, float]:
     """Compute the friction that the guard adds to a steady slide [N] and spin [N m] at 1 N: `sigma_0 GUARD/2`."""
     force = 0.5 * runs.LAW.sigma_0 * GUARD
-    return {"N": force, "N m": force * LimitSurfaceTablePublished(PUBLISHED_PATCHES[shape]()).contact_radius}
+    return {
+        "N": force,
+        "N m": force
+        * LimitSurfaceTablePublished(PUBLISHED_PATCHES[shape]()).contact_radius,
+    }
 
 
 def solver_error(curve: str) -> float:
@@ -90,13 +109,30 @@ def comparisons(every: dict[str, Errors]) -> list[Comparison]:
     for shape, each in every.items():
         for quantity, models in each.items() if shape in PUBLISHED_SHAPES else ():
             for model, values in models.items():
-                ours, freedom = statistics(values), slack(values)
+                ours = statistics(values)
+                freedom = slack(values)
                 for (reference, of), cause in _CAUSES.items():
-                    box = reference_box(reference, shape, quantity, model) if of == model else {}
+                    box = (
+                        reference_box(reference, shape, quantity, model)
+                        if of == model
+                        else {}
+                    )
                     for column, theirs in box.items():
                         words = f"error of the {WORDS[quantity]}, {runs.IN_WORDS[shape]}, {model}, {column}"
-                        within = _tolerance(reference, shape, quantity, model, column, freedom[column])
-                        rows.append(compare(words, ours[column], theirs, reference, within, UNITS[quantity], cause))
+                        within = _tolerance(
+                            reference, shape, quantity, model, column, freedom[column]
+                        )
+                        rows.append(
+                            compare(
+                                words,
+                                ours[column],
+                                theirs,
+                                reference,
+                                within,
+                                UNITS[quantity],
+                                cause,
+                            )
+                        )
     return rows
 
 
@@ -106,11 +142,22 @@ def reference_box(
     """Return a published or converged box, by `COLUMNS`; without the maximum where it is published."""
     if reference == "published":
         return facts.published_table("box")[f"{quantity}/{shape}/{model}"]
-    return dict(zip(COLUMNS, facts.converged(f"box/{quantity}/{shape}")[model].tolist(), strict=True))
+    return dict(
+        zip(
+            COLUMNS,
+            facts.converged(f"box/{quantity}/{shape}")[model].tolist(),
+            strict=True,
+        )
+    )
 
 
 def _tolerance(
-    reference: Literal["published", "converged"], shape: str, quantity: str, model: str, column: str, slack: float
+    reference: Literal["published", "converged"],
+    shape: str,
+    quantity: str,
+    model: str,
+    column: str,
+    slack: float,
 ) -> float:
     unit = UNITS[quantity]
     if model == "corrected" and reference == "converged":
@@ -124,14 +171,26 @@ def _tolerance(
 
 
 _CAUSES: dict[tuple[Literal["published", "converged"], str], str] = {
-    ("published", "corrected"): "The figure's solver misses the first samples of the spin-up and the changes of "
+    (
+        "published",
+        "corrected",
+    ): "The figure's solver misses the first samples of the spin-up and the changes of "
     "velocity by more than the rest, so that a quartile or whisker may come from a neighbouring sample.",
-    ("converged", "corrected"): "The same statistics of the same equations, solved twice: what is left is the error "
+    (
+        "converged",
+        "corrected",
+    ): "The same statistics of the same equations, solved twice: what is left is the error "
     "of both solvers.",
-    ("published", "ellipsoid"): "The program behind the published ellipsoid adds $10^{-10}$ m to $|z|$ where it takes "
+    (
+        "published",
+        "ellipsoid",
+    ): "The program behind the published ellipsoid adds $10^{-10}$ m to $|z|$ where it takes "
     r"an angle ($5 \times 10^{-5}$ more friction), and its solver misses two samples of the spin-up, so that a "
     "quartile may come from a neighbouring one.",
-    ("converged", "ellipsoid"): "The reference has the published program's guard of $10^{-10}$ m and its loose solver "
+    (
+        "converged",
+        "ellipsoid",
+    ): "The reference has the published program's guard of $10^{-10}$ m and its loose solver "
     r"in the ellipsoid's rows: with both put in, the torques are met to $4 \times 10^{-8}$ N m, the maximum of the "
     "square included.",
 }
@@ -150,5 +209,8 @@ def convention_misses(every: dict[str, Errors]) -> dict[str, float]:
         theirs = reference_box("converged", shape, "ft", "corrected")
         for words, box in conventions.items():
             found = box(every[shape]["ft"]["corrected"])
-            misses[words] = max(misses[words], *(abs(found[column] - theirs[column]) for column in COLUMNS[1:4]))
+            misses[words] = max(
+                misses[words],
+                *(abs(found[column] - theirs[column]) for column in COLUMNS[1:4]),
+            )
     return misses

@@ -11,7 +11,15 @@ from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots.style import LINE_STYLES, PlotFigure
 from planarfriction.scenes.ready import driven, published_velocity
 from planarfriction_studies.experiments import experiment, facts, looks, runs
-from planarfriction_studies.experiments.experiment import TWIST, WRENCH, Arrays, Comparison, Result, Work, entry
+from planarfriction_studies.experiments.experiment import (
+    TWIST,
+    WRENCH,
+    Arrays,
+    Comparison,
+    Result,
+    Work,
+    entry,
+)
 from planarfriction_studies.experiments.velocity_driven import boxes
 from planarfriction_studies.experiments.wording import report
 
@@ -48,8 +56,13 @@ def drive(shape: str) -> Arrays:
     patch = PUBLISHED_PATCHES[shape]()
     result = {}
     for kind in ("d", "r", "e"):
-        columns = runs.simulated(driven(runs.published_model(kind, patch)), rtol=RTOL, atol=ATOL)
-        result |= {"time": columns["time"], kind: runs.at_centre_of_pressure(columns, patch)}
+        columns = runs.simulated(
+            driven(runs.published_model(kind, patch)), rtol=RTOL, atol=ATOL
+        )
+        result |= {
+            "time": columns["time"],
+            kind: runs.at_centre_of_pressure(columns, patch),
+        }
     return result
 
 
@@ -67,7 +80,9 @@ def run(work: Work) -> Result:
         _template_values(numbers),
         comparisons=[
             *_curve_comparisons(found),
-            *experiment.compare_profile(published_velocity(), "driven/velocity", TWIST, _READING),
+            *experiment.compare_profile(
+                published_velocity(), "driven/velocity", TWIST, _READING
+            ),
             _guard_comparison(found["Circle"]),
             *boxes.comparisons(errors),
         ],
@@ -90,42 +105,71 @@ def _curve_comparisons(found: dict[str, Arrays]) -> list[Comparison]:
         "The figure's solver (relative tolerance $10^{-6}$, absolute $10^{-8}$ m, when a bristle bends by $10^{-6}$ "
         "m): it is as far from the converged solution where the velocity changes."
     )
-    twice = "The same equations, solved twice: what is left is the error of both solvers."
+    twice = (
+        "The same equations, solved twice: what is left is the error of both solvers."
+    )
     rows = []
     for shape, wrenches in found.items():
         for kind, model in runs.NAMES.items():
-            for (component, unit), values in zip(WRENCH.items(), wrenches[kind].T, strict=True):
-                ours, quantity = (wrenches["time"], values), f"{runs.IN_WORDS[shape]}, {model}"
+            for (component, unit), values in zip(
+                WRENCH.items(), wrenches[kind].T, strict=True
+            ):
+                ours = (wrenches["time"], values)
+                quantity = f"{runs.IN_WORDS[shape]}, {model}"
                 for ending in PUBLISHED.get((shape, kind), ()):
-                    name, words = f"driven/{shape}/{kind}{ending}/{component}", f"{quantity}{ending}, {component}"
+                    name = f"driven/{shape}/{kind}{ending}/{component}"
+                    words = f"{quantity}{ending}, {component}"
                     if kind == "e":
                         rows += _ellipsoid_comparisons(words, *ours, name, shape, unit)
                     else:  # known errors are kept to three digits
-                        allowance = boxes.OWN[unit] + 5e-3 * (facts.published_curve(name).deviation or 0.0)
-                        rows.append(experiment.compare_curve(words, *ours, name, allowance, solver))
+                        allowance = boxes.OWN[unit] + 5e-3 * (
+                            facts.published_curve(name).deviation or 0.0
+                        )
+                        rows.append(
+                            experiment.compare_curve(
+                                words, *ours, name, allowance, solver
+                            )
+                        )
                 if kind in "dr" and shape in CONVERGED:
-                    name, words = f"driven/{shape}/{kind}/{component}", f"{quantity}, {component}"
-                    rows.append(experiment.compare_converged(words, *ours, name, boxes.OWN[unit], twice))
+                    name = f"driven/{shape}/{kind}/{component}"
+                    words = f"{quantity}, {component}"
+                    rows.append(
+                        experiment.compare_converged(
+                            words, *ours, name, boxes.OWN[unit], twice
+                        )
+                    )
     return rows
 
 
 def _ellipsoid_comparisons(
-    quantity: str, time: np.ndarray, values: np.ndarray, name: str, shape: str, unit: str
+    quantity: str,
+    time: np.ndarray,
+    values: np.ndarray,
+    name: str,
+    shape: str,
+    unit: str,
 ) -> list[Comparison]:
     """Compare a curve of the ellipsoid, whose own solver error is not known; of the torque, the spin-up apart."""
     guard = boxes.OWN[unit] + boxes.guard_effect(shape)[unit]
-    allowance = guard + (facts.published_curve(name.replace("/e/", "/r/")).deviation or 0.0)
+    allowance = guard + (
+        facts.published_curve(name.replace("/e/", "/r/")).deviation or 0.0
+    )
     if unit == "N":
-        return [experiment.compare_curve(quantity, time, values, name, allowance, _GUARDED)]
+        return [
+            experiment.compare_curve(quantity, time, values, name, allowance, _GUARDED)
+        ]
     spin_up = (
         "The figure's solver misses the first samples of the spin-up, by as much as in the figure of the table model, "
         "which is the same there: with its tolerances and the guard of $10^{-10}$ m put in, the curve is met to "
         "$10^{-9}$ N m."
     )
-    early, curve = time < SPIN_UP, facts.published_curve(name)
+    early = time < SPIN_UP
+    curve = facts.published_curve(name)
     late = curve.time > SPIN_UP
-    ours, theirs = values[np.rint(curve.time[late] / 0.01).astype(int)], curve.values[late]
-    words, within = f"{quantity}, after it", guard + boxes.solver_error("d/tau") + curve.reading
+    ours = values[np.rint(curve.time[late] / 0.01).astype(int)]
+    theirs = curve.values[late]
+    words = f"{quantity}, after it"
+    within = guard + boxes.solver_error("d/tau") + curve.reading
     first = f"{quantity}, spin-up", time[early], values[early], name, allowance, spin_up
     return [
         experiment.compare_curve(*first),
@@ -142,20 +186,34 @@ def _guard_comparison(disc: Arrays) -> Comparison:
         "that length."
     )
     explained = boxes.guard_effect("Circle")["N"]
-    return experiment.compare(words, _guard_surplus(disc), explained, "closed form", boxes.OWN["N"], "N", cause)
+    return experiment.compare(
+        words,
+        _guard_surplus(disc),
+        explained,
+        "closed form",
+        boxes.OWN["N"],
+        "N",
+        cause,
+    )
 
 
 def _guard_surplus(disc: Arrays) -> float:
     curve = facts.published_curve("driven/Circle/e/fy")
-    steady = int(np.flatnonzero((curve.time > PURE_SLIDE[0]) & (curve.time < PURE_SLIDE[1]))[0])
+    steady = int(
+        np.flatnonzero((curve.time > PURE_SLIDE[0]) & (curve.time < PURE_SLIDE[1]))[0]
+    )
     ours = disc["e"][int(np.rint(curve.time[steady] / 0.01)), 1]
     return float(ours - curve.values[steady])
 
 
-def _numbers(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[str, Any]:
+def _numbers(
+    found: dict[str, Arrays], errors: dict[str, boxes.Errors]
+) -> dict[str, Any]:
     statistics = {
         shape: {
-            quantity: {model: _statistics(shape, values) for model, values in models.items()}
+            quantity: {
+                model: _statistics(shape, values) for model, values in models.items()
+            }
             for quantity, models in each.items()
         }
         for shape, each in errors.items()
@@ -189,18 +247,30 @@ def _centre_of_rotation(shape: str, sample: int) -> dict[str, float] | None:
     cells = patch.positions[patch.weights() > 0.0] - patch.centre_of_pressure()
     centre = np.array([-vy, vx]) / omega
     nearest = np.hypot(*(cells - centre).T).min()
-    return {"from the centre of pressure": float(np.hypot(*centre)), "from the nearest cell": float(nearest)}
+    return {
+        "from the centre of pressure": float(np.hypot(*centre)),
+        "from the nearest cell": float(nearest),
+    }
 
 
 def _template_values(numbers: dict[str, Any]) -> dict[str, Any]:
     """Return the values that the template names."""
     errors = numbers["errors"]
     tables = {shape: each["ft"]["corrected"] for shape, each in errors.items()}
-    worst = max(tables, key=lambda shape: tables[shape]["maximum"] / tables[shape]["whisker high"])
-    boxes_of_all = [box for each in errors.values() for models in each.values() for box in models.values()]
+    worst = max(
+        tables,
+        key=lambda shape: tables[shape]["maximum"] / tables[shape]["whisker high"],
+    )
+    boxes_of_all = [
+        box
+        for each in errors.values()
+        for models in each.values()
+        for box in models.values()
+    ]
     return {
         "factors": [
-            each["ft"]["ellipsoid"]["third quartile"] / each["ft"]["corrected"]["third quartile"]
+            each["ft"]["ellipsoid"]["third quartile"]
+            / each["ft"]["corrected"]["third quartile"]
             for each in errors.values()
         ],
         "worst": tables[worst] | {"shape": runs.IN_WORDS[worst]},
@@ -211,7 +281,9 @@ def _template_values(numbers: dict[str, Any]) -> dict[str, Any]:
 def _error_table(numbers: dict[str, Any]) -> experiment.Table:
     """Return errors of both reduced models against the distributed one."""
     rows = {
-        f"{runs.IN_WORDS[shape]}, {words}": {name: each[model] for name, each in quantities.items()}
+        f"{runs.IN_WORDS[shape]}, {words}": {
+            name: each[model] for name, each in quantities.items()
+        }
         for shape, quantities in numbers["errors"].items()
         for model, words in MODELS.items()
     }
@@ -220,7 +292,9 @@ def _error_table(numbers: dict[str, Any]) -> experiment.Table:
         for quantity, words, unit in (("ft", "force", "mN"), ("tau", "torque", "N mm"))
         for column in ("median", "third quartile", "whisker high", "maximum")
     }
-    return experiment.table("Errors against the distributed model, at 1 N", rows, columns, "shape, model")
+    return experiment.table(
+        "Errors against the distributed model, at 1 N", rows, columns, "shape, model"
+    )
 
 
 def _dataset(found: dict[str, Arrays]) -> Any:
@@ -232,26 +306,45 @@ def _dataset(found: dict[str, Arrays]) -> Any:
     }
     # a sampled wrench belongs to the velocity of the step just ended
     speeds = experiment.with_units(published_velocity().left(time), TWIST)
-    return experiment.dataset(wrenches, WRENCH, ("shape", "model"), ("time", time, "s"), speeds)
+    return experiment.dataset(
+        wrenches, WRENCH, ("shape", "model"), ("time", time, "s"), speeds
+    )
 
 
 LOOKS: dict[str, dict[str, Any]] = {
-    kind: {"ls": LINE_STYLES[style], "lw": width, "alpha": opacity, "color": looks.OF_MODEL[kind]}
-    for kind, style, width, opacity in (("d", 0, 2.6, 0.45), ("r", 1, 1.3, 1.0), ("e", 2, 1.5, 1.0))
+    kind: {
+        "ls": LINE_STYLES[style],
+        "lw": width,
+        "alpha": opacity,
+        "color": looks.OF_MODEL[kind],
+    }
+    for kind, style, width, opacity in (
+        ("d", 0, 2.6, 0.45),
+        ("r", 1, 1.3, 1.0),
+        ("e", 2, 1.5, 1.0),
+    )
 }
 """Letter of a model -> how its line looks: the distributed model broad and pale below the others."""
 
 MARKERS = {"d": "o", "r": "s", "e": "^"}
 """Letter of a model -> marker of its published curves."""
 
-SPEEDS = (("vx", "$v_x$ [mm/s]", 1e3), ("vy", "$v_y$ [mm/s]", 1e3), ("omega", "$\\omega$ [rad/s]", 1.0))
+SPEEDS = (
+    ("vx", "$v_x$ [mm/s]", 1e3),
+    ("vy", "$v_y$ [mm/s]", 1e3),
+    ("omega", "$\\omega$ [rad/s]", 1.0),
+)
 
 
-def _figures(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[str, PlotFigure]:
+def _figures(
+    found: dict[str, Arrays], errors: dict[str, boxes.Errors]
+) -> dict[str, PlotFigure]:
     result = {"velocity_profile": _profile(found["Circle"])}
     for shape, kind in (("Circle", "r"), ("Circle", "e"), ("NonConvex1", "r")):
         endings = {"d": ", beside the ellipsoid" if kind == "e" else "", kind: ""}
-        result[f"driven_{shape.lower()}_{kind}"] = _page({shape: found[shape]}, f"d{kind}", 3.4, endings)
+        result[f"driven_{shape.lower()}_{kind}"] = _page(
+            {shape: found[shape]}, f"d{kind}", 3.4, endings
+        )
     others = {shape: found[shape] for shape in found if shape not in QUICK_SHAPES}
     if others:
         result["driven_other_shapes"] = _page(others, "dre", 2.1 * len(others) + 0.7)
@@ -262,41 +355,62 @@ def _profile(disc: Arrays) -> PlotFigure:
     """Draw the velocity profile [mm/s, rad/s], and the wrench of the distributed model of the disc [N, N mm]."""
     figure, (above, below) = looks.panels(9.6, 4.6, 2, 3, sharex=True)
     time = np.arange(0.0, 5.0, 0.001)
-    for axes, (name, label, factor), values in zip(above, SPEEDS, published_velocity()(time).T, strict=True):
+    for axes, (name, label, factor), values in zip(
+        above, SPEEDS, published_velocity()(time).T, strict=True
+    ):
         axes.plot(time, factor * values, color="0.15", lw=1.4)
         looks.vertices(axes, f"driven/velocity/{name}", factor, "0.15")
         axes.set_ylabel(label)
     for axes, name, values in zip(below, WRENCH, disc["d"].T, strict=True):
         label, factor = looks.AXES[name]
         axes.plot(disc["time"], factor * values, color=looks.DISTRIBUTED, lw=1.4)
-        looks.vertices(axes, f"driven/Circle/d, alone/{name}", factor, looks.DISTRIBUTED)
+        looks.vertices(
+            axes, f"driven/Circle/d, alone/{name}", factor, looks.DISTRIBUTED
+        )
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, 5.0))
     return figure
 
 
-def _page(found: dict[str, Arrays], kinds: str, height: float, endings: dict[str, str] | None = None) -> PlotFigure:
+def _page(
+    found: dict[str, Arrays],
+    kinds: str,
+    height: float,
+    endings: dict[str, str] | None = None,
+) -> PlotFigure:
     """Draw forces [N] and torque [N mm] of some models, a row for each shape.
 
     Published curves are those of the models in `endings`, which hold the ends of their names.
     """
-    figure, panels = looks.panels(9.6, height, len(found), 3, sharex=True, squeeze=False)
+    figure, panels = looks.panels(
+        9.6, height, len(found), 3, sharex=True, squeeze=False
+    )
     endings = endings or {}
     for row, (shape, wrenches) in zip(panels, found.items(), strict=True):
         row[0].set_title(runs.IN_WORDS[shape], fontsize="medium", loc="left")
         for column, (axes, name) in enumerate(zip(row, WRENCH, strict=True)):
             label, factor = looks.AXES[name]
             for kind in kinds:
-                axes.plot(wrenches["time"], factor * wrenches[kind][:, column], **LOOKS[kind])
+                axes.plot(
+                    wrenches["time"], factor * wrenches[kind][:, column], **LOOKS[kind]
+                )
             for kind, ending in endings.items():
                 curve = f"driven/{shape}/{kind}{ending}/{name}"
-                looks.vertices(axes, curve, factor, looks.OF_MODEL[kind], marker=MARKERS[kind])
+                looks.vertices(
+                    axes, curve, factor, looks.OF_MODEL[kind], marker=MARKERS[kind]
+                )
             axes.set(xlim=(0.0, 5.0), ylabel=label)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     figure.align_ylabels(panels)
     key = [looks.line_key(runs.NAMES[kind], **LOOKS[kind]) for kind in kinds]
     for kind in endings:
-        marks = {"marker": MARKERS[kind], "mec": looks.OF_MODEL[kind], "ls": "", "ms": 4, "mfc": "white"}
+        marks = {
+            "marker": MARKERS[kind],
+            "mec": looks.OF_MODEL[kind],
+            "ls": "",
+            "ms": 4,
+            "mfc": "white",
+        }
         key.append(looks.line_key(f"{runs.NAMES[kind]}, published", **marks))
     looks.legend(figure, key, 4 if endings else 3, fontsize=9)
     return figure
@@ -304,19 +418,37 @@ def _page(found: dict[str, Arrays], kinds: str, height: float, endings: dict[str
 
 def _box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
     """Draw errors of force [N] and torque [N mm] of all shapes, ours filled, the published boxes open beside them."""
-    colours, table = {"corrected": looks.REDUCED, "ellipsoid": looks.ELLIPSOID}, facts.published_table("box")
+    colours = {"corrected": looks.REDUCED, "ellipsoid": looks.ELLIPSOID}
+    table = facts.published_table("box")
     figure, panels = looks.box_panels([runs.IN_WORDS[shape] for shape in every], 7.4)
-    rows = (("ft", "error of the force [N]", 1.0, 1e-5), ("tau", "error of the torque [N mm]", 1e3, 1e-4))
+    rows = (
+        ("ft", "error of the force [N]", 1.0, 1e-5),
+        ("tau", "error of the torque [N mm]", 1e3, 1e-4),
+    )
     for axes, (quantity, label, factor, linear) in zip(panels, rows, strict=True):
         axes.set_yscale("symlog", linthresh=linear, linscale=0.5)
         for place, (shape, each) in enumerate(every.items()):
-            for offset, (model, values) in zip((-0.28, 0.12), each[quantity].items(), strict=True):
+            for offset, (model, values) in zip(
+                (-0.28, 0.12), each[quantity].items(), strict=True
+            ):
                 ours = factor * np.array(list(boxes.statistics(values).values()))
                 looks.box(axes, place + offset, ours, colours[model], 0.14)
                 if published := table.get(f"{quantity}/{shape}/{model}"):
                     theirs = [factor * published[name] for name in boxes.COLUMNS[:5]]
-                    looks.box(axes, place + offset + 0.16, theirs, colours[model], 0.14, filled=False)
+                    looks.box(
+                        axes,
+                        place + offset + 0.16,
+                        theirs,
+                        colours[model],
+                        0.14,
+                        filled=False,
+                    )
         axes.set(ylim=(0.0, None), ylabel=label)
     named = {MODELS[model]: colour for model, colour in colours.items()}
-    looks.box_legend(figure, named, 5, {f"{words}, published": colour for words, colour in named.items()})
+    looks.box_legend(
+        figure,
+        named,
+        5,
+        {f"{words}, published": colour for words, colour in named.items()},
+    )
     return figure

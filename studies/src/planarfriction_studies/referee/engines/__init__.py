@@ -62,11 +62,15 @@ def installed(left_out: list[str]) -> Iterator[Engine]:
             yield from importlib.import_module(f"{__name__}.{module}").ENGINES
 
 
-def lacks(case: Case, *, anisotropy: bool = False, stribeck: bool = False) -> str | None:
+def lacks(
+    case: Case, *, anisotropy: bool = False, stribeck: bool = False
+) -> str | None:
     """Return what a case needs beyond Coulomb's law, unless the engine has it."""
     if not stribeck and any(contact.mu_s is not None for contact in case.contacts):
         return "no Stribeck curve"
-    if not anisotropy and any(contact.mu[0] != contact.mu[1] for contact in case.contacts):
+    if not anisotropy and any(
+        contact.mu[0] != contact.mu[1] for contact in case.contacts
+    ):
         return "no anisotropic friction"
     return None
 

@@ -35,7 +35,9 @@ class Drake:
 
     def cannot(self, case: Case) -> str | None:
         """Return what Drake has no words for: Coulomb's law alone, but patches have more."""
-        return lacks(case, anisotropy=self.kind is not None, stribeck=self.kind is not None)
+        return lacks(
+            case, anisotropy=self.kind is not None, stribeck=self.kind is not None
+        )
 
     def build(self, case: Case, dt: float) -> DrakeWorld:
         """Build a discrete plant."""
@@ -51,9 +53,16 @@ class DrakeWorld:
         from pydrake.systems.analysis import Simulator
         from pydrake.systems.framework import DiagramBuilder
 
-        logging.getLogger("drake").setLevel(logging.ERROR)  # half spaces do not touch deformable bodies
-        self.case, self.dt, self.now = case, dt, 0
-        alone = all(len(body.shapes) == 1 and body.shapes[0].kind not in ROUND for body in case.bodies)
+        logging.getLogger("drake").setLevel(
+            logging.ERROR
+        )  # half spaces do not touch deformable bodies
+        self.case = case
+        self.dt = dt
+        self.now = 0
+        alone = all(
+            len(body.shapes) == 1 and body.shapes[0].kind not in ROUND
+            for body in case.bodies
+        )
         contact = engine.contact if engine.kind is None or alone else "hydroelastic"
         builder = DiagramBuilder()
         config = MultibodyPlantConfig(
@@ -70,9 +79,14 @@ class DrakeWorld:
         _keep_apart(scene_graph, case)
         for body in case.moving:
             if body.joint == "free":
-                plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName(body.name), RigidTransform(body.position))
+                plant.SetDefaultFloatingBaseBodyPose(
+                    plant.GetBodyByName(body.name), RigidTransform(body.position)
+                )
         self.forces = builder.AddSystem(_forces(plant.num_velocities()))
-        builder.Connect(self.forces.get_output_port(), plant.get_applied_generalized_force_input_port())
+        builder.Connect(
+            self.forces.get_output_port(),
+            plant.get_applied_generalized_force_input_port(),
+        )
         if engine.kind is not None:
             from planarfriction.adapters.drake import Friction, prepare
 
@@ -80,7 +94,9 @@ class DrakeWorld:
             prepare(plant, scene_graph, own)
             Friction.AddToBuilder(builder, plant, scene_graph, own)
         self.simulator = Simulator(builder.Build())
-        self.context = plant.GetMyMutableContextFromRoot(self.simulator.get_mutable_context())
+        self.context = plant.GetMyMutableContextFromRoot(
+            self.simulator.get_mutable_context()
+        )
         self.bodies = [plant.GetBodyByName(body.name) for body in case.moving]
 
     def _frames(self) -> None:
@@ -90,18 +106,27 @@ class DrakeWorld:
 
         for i, contact in enumerate(self.case.contacts):
             body = self.plant.GetBodyByName(self.case.shapes[contact.pair[1]][0].name)
-            self.plant.AddFrame(FixedOffsetFrame(f"patch {i}", body.body_frame(), RigidTransform(np.array(contact.at))))
+            self.plant.AddFrame(
+                FixedOffsetFrame(
+                    f"patch {i}",
+                    body.body_frame(),
+                    RigidTransform(np.array(contact.at)),
+                )
+            )
 
     def _patches(self, kind: str, contact: str) -> list[Any]:
         """Return the patches: between bodies, whose feet belong to them, or between single surfaces."""
         from planarfriction.adapters.drake import PatchContact
 
         names = {
-            name: body.name if contact == "point" else f"{name} solid" for name, (body, _) in self.case.shapes.items()
+            name: body.name if contact == "point" else f"{name} solid"
+            for name, (body, _) in self.case.shapes.items()
         }
         return [
             PatchContact(
-                patches.model(each, kind), frame=f"patch {i}", geometries=tuple(names[one] for one in each.pair)
+                patches.model(each, kind),
+                frame=f"patch {i}",
+                geometries=tuple(names[one] for one in each.pair),
             )
             for i, each in enumerate(self.case.contacts)
         ]
@@ -109,12 +134,19 @@ class DrakeWorld:
     def step(self, wrenches: np.ndarray) -> None:
         """Make a step; forces on free bodies act at their origins, those on pads along their slides."""
         values = np.zeros(len(self.forces.values))  # pyright: ignore
-        for body, own, wrench in zip(self.case.moving, self.bodies, wrenches, strict=True):
+        for body, own, wrench in zip(
+            self.case.moving, self.bodies, wrenches, strict=True
+        ):
             if body.joint == "slide":
-                values[self.plant.GetJointByName(body.name).velocity_start()] = wrench[2]
+                values[self.plant.GetJointByName(body.name).velocity_start()] = wrench[
+                    2
+                ]
                 continue
-            rotation = self.plant.EvalBodyPoseInWorld(self.context, own).rotation().matrix()
-            lever, at = rotation @ np.array(body.centre_of_mass), own.floating_velocities_start_in_v()
+            rotation = (
+                self.plant.EvalBodyPoseInWorld(self.context, own).rotation().matrix()
+            )
+            lever = rotation @ np.array(body.centre_of_mass)
+            at = own.floating_velocities_start_in_v()
             values[at : at + 3] = wrench[3:] + np.cross(lever, wrench[:3])
             values[at + 3 : at + 6] = wrench[:3]
         self.forces.values = values  # pyright: ignore
@@ -123,17 +155,29 @@ class DrakeWorld:
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions and rotations."""
-        found = [self.plant.EvalBodyPoseInWorld(self.context, body) for body in self.bodies]
-        return np.array([x.translation() for x in found]), np.array([x.rotation().matrix() for x in found])
+        found = [
+            self.plant.EvalBodyPoseInWorld(self.context, body) for body in self.bodies
+        ]
+        return np.array([x.translation() for x in found]), np.array(
+            [x.rotation().matrix() for x in found]
+        )
 
     def throw(self, body: int, velocity: np.ndarray) -> None:
         """Set the velocity of a body, which Drake wants at its origin."""
         from pydrake.multibody.math import SpatialVelocity
 
-        rotation = self.plant.EvalBodyPoseInWorld(self.context, self.bodies[body]).rotation().matrix()
+        rotation = (
+            self.plant.EvalBodyPoseInWorld(self.context, self.bodies[body])
+            .rotation()
+            .matrix()
+        )
         lever = rotation @ np.array(self.case.moving[body].centre_of_mass)
-        own = SpatialVelocity(velocity[3:], velocity[:3] - np.cross(velocity[3:], lever))
-        self.plant.SetFreeBodySpatialVelocity(context=self.context, body=self.bodies[body], V_JpJc=own)
+        own = SpatialVelocity(
+            velocity[3:], velocity[:3] - np.cross(velocity[3:], lever)
+        )
+        self.plant.SetFreeBodySpatialVelocity(
+            context=self.context, body=self.bodies[body], V_JpJc=own
+        )
 
 
 def _forces(size: int) -> Any:
@@ -144,7 +188,7 @@ def _forces(size: int) -> Any:
         def __init__(self) -> None:
             super().__init__()
             self.values = np.zeros(size)
-            write = lambda _, output: output.SetFromVector(self.values)  # noqa: E731
+            write = lambda _, output: output.SetFromVector(self.values)
             self.DeclareVectorOutputPort("forces", size, write, {self.time_ticket()})
 
     return Forces()
@@ -154,27 +198,48 @@ def _add(plant: Any, case: Case, body: Body, contact: str) -> None:
     """Add a body with its shapes."""
     from pydrake.geometry import Box, Sphere
     from pydrake.math import RigidTransform
-    from pydrake.multibody.tree import FixedOffsetFrame, PrismaticJoint, RotationalInertia, SpatialInertia
+    from pydrake.multibody.tree import (
+        FixedOffsetFrame,
+        PrismaticJoint,
+        RotationalInertia,
+        SpatialInertia,
+    )
 
-    place, fixed = RigidTransform(np.array(body.position)), body.joint == "fixed"
+    place = RigidTransform(np.array(body.position))
+    fixed = body.joint == "fixed"
     inertia = RotationalInertia(*(np.ones(3) if fixed else body.moments))
-    centre, mass = np.array(body.centre_of_mass), 1.0 if fixed else body.mass
-    own = plant.AddRigidBody(body.name, SpatialInertia.MakeFromCentralInertia(mass, centre, inertia))
+    centre = np.array(body.centre_of_mass)
+    mass = 1.0 if fixed else body.mass
+    own = plant.AddRigidBody(
+        body.name, SpatialInertia.MakeFromCentralInertia(mass, centre, inertia)
+    )
     if fixed:
         plant.WeldFrames(plant.world_frame(), own.body_frame(), place)
     elif body.joint == "slide":
-        frame = plant.AddFrame(FixedOffsetFrame(f"{body.name} at", plant.world_frame(), place))
-        plant.AddJoint(PrismaticJoint(body.name, frame, own.body_frame(), np.array([0.0, 0.0, 1.0])))
+        frame = plant.AddFrame(
+            FixedOffsetFrame(f"{body.name} at", plant.world_frame(), place)
+        )
+        plant.AddJoint(
+            PrismaticJoint(
+                body.name, frame, own.body_frame(), np.array([0.0, 0.0, 1.0])
+            )
+        )
     for shape in body.shapes:
         material = _material(case, shape.name, contact, rigid=fixed)
         points = feet(case, shape) if contact == "point" else ()
-        solid, pose = _geometry(shape, SHRUNK if len(points) else 0.0), RigidTransform(_rotation(shape), shape.position)
+        solid = _geometry(shape, SHRUNK if len(points) else 0.0)
+        pose = RigidTransform(_rotation(shape), shape.position)
         if shape.kind == "plane" and contact == "point":
-            solid, pose = Box(FLOOR, FLOOR, 1.0), RigidTransform([0.0, 0.0, -0.5])
-        plant.RegisterCollisionGeometry(own, pose, solid, f"{shape.name} solid", material)
+            solid = Box(FLOOR, FLOOR, 1.0)
+            pose = RigidTransform([0.0, 0.0, -0.5])
+        plant.RegisterCollisionGeometry(
+            own, pose, solid, f"{shape.name} solid", material
+        )
         for i, point in enumerate(points):
             name = f"{shape.name} foot {i}"
-            plant.RegisterCollisionGeometry(own, RigidTransform(point), Sphere(RADIUS), name, material)
+            plant.RegisterCollisionGeometry(
+                own, RigidTransform(point), Sphere(RADIUS), name, material
+            )
 
 
 def _rotation(shape: Shape) -> Any:
@@ -194,7 +259,11 @@ def _geometry(shape: Shape, shrunk: float) -> Any:
     if shape.kind == "sphere":
         return Sphere(*shape.size)
     radius, length = shape.size
-    return Capsule(radius, length) if shape.kind == "capsule" else Cylinder(radius, length - 2.0 * shrunk)
+    return (
+        Capsule(radius, length)
+        if shape.kind == "capsule"
+        else Cylinder(radius, length - 2.0 * shrunk)
+    )
 
 
 def _material(case: Case, shape: str, contact: str, *, rigid: bool) -> Any:
@@ -207,7 +276,9 @@ def _material(case: Case, shape: str, contact: str, *, rigid: bool) -> Any:
         mu = 1.0 if rigid else mu / (2.0 - mu)
     properties = geometry.ProximityProperties()
     friction = CoulombFriction(mu, mu)
-    geometry.AddContactMaterial(dissipation=5.0, point_stiffness=1e4, friction=friction, properties=properties)
+    geometry.AddContactMaterial(
+        dissipation=5.0, point_stiffness=1e4, friction=friction, properties=properties
+    )
     if contact == "hydroelastic" and rigid:
         geometry.AddRigidHydroelasticProperties(1.0, properties)
     elif contact == "hydroelastic":
@@ -222,9 +293,15 @@ def _keep_apart(scene_graph: Any, case: Case) -> None:
     inspector = scene_graph.model_inspector()
     ids: dict[str, list[Any]] = {name: [] for name in case.shapes}
     for found in inspector.GetAllGeometryIds(Role.kProximity):
-        ids[inspector.GetName(found).split("::")[-1].rsplit(" solid", 1)[0].rsplit(" foot ", 1)[0]].append(found)
+        ids[
+            inspector.GetName(found)
+            .split("::")[-1]
+            .rsplit(" solid", 1)[0]
+            .rsplit(" foot ", 1)[0]
+        ].append(found)
     pairs = {frozenset(contact.pair) for contact in case.contacts}
-    names, apart = list(ids), CollisionFilterDeclaration()
+    names = list(ids)
+    apart = CollisionFilterDeclaration()
     for i, one in enumerate(names):
         for other in names[i + 1 :]:
             if frozenset((one, other)) not in pairs:

@@ -31,12 +31,16 @@ class MjxWorld(MujocoWorld):
         from mujoco import mjx
 
         super().__init__(case, m)
-        model, self.data, step = mjx.put_model(m), mjx.put_data(m, self.d), mjx.step
+        model = mjx.put_model(m)
+        self.data = mjx.put_data(m, self.d)
+        step = mjx.step
         if patches:
             from planarfriction.adapters.mjx import Friction
 
             step = Friction(m, patches).step
-        self._stepped = jax.jit(lambda data, forces: step(model, data.replace(xfrc_applied=forces)))
+        self._stepped = jax.jit(
+            lambda data, forces: step(model, data.replace(xfrc_applied=forces))
+        )
 
     def step(self, wrenches: np.ndarray) -> None:
         """Make a step."""

@@ -51,7 +51,9 @@ class Mujoco:
 
         spec = mujoco.MjSpec.from_string(text)
         own = [
-            PatchContact(patches.model(contact, self.kind), site=f"patch {i}", geoms=contact.pair)
+            PatchContact(
+                patches.model(contact, self.kind), site=f"patch {i}", geoms=contact.pair
+            )
             for i, contact in enumerate(case.contacts)
         ]
         prepare(spec, own)
@@ -64,8 +66,14 @@ class MujocoWorld:
     def __init__(self, case: Case, m: Any, friction: Any = None) -> None:
         import mujoco
 
-        self.m, self.d, self.case = m, mujoco.MjData(m), case
-        self._step = (lambda: mujoco.mj_step(m, self.d)) if friction is None else (lambda: friction.step(self.d))
+        self.m = m
+        self.d = mujoco.MjData(m)
+        self.case = case
+        self._step = (
+            (lambda: mujoco.mj_step(m, self.d))
+            if friction is None
+            else (lambda: friction.step(self.d))
+        )
         self.bodies = [m.body(body.name).id for body in case.moving]
         mujoco.mj_forward(m, self.d)
 
@@ -79,7 +87,9 @@ class MujocoWorld:
         import mujoco
 
         mujoco.mj_kinematics(self.m, self.d)
-        return self.d.xpos[self.bodies].copy(), self.d.xmat[self.bodies].reshape(-1, 3, 3).copy()
+        return self.d.xpos[self.bodies].copy(), self.d.xmat[self.bodies].reshape(
+            -1, 3, 3
+        ).copy()
 
     def throw(self, body: int, velocity: np.ndarray) -> None:
         """Set the velocity of the body's origin, and the angular velocity in its own axes."""
@@ -94,7 +104,11 @@ ELLIPTIC = 'cone="elliptic" impratio="10"'
 """Options of MuJoCo that its documentation advises against slip."""
 
 NOSLIP = f'{ELLIPTIC} noslip_iterations="10"'
-STIFF = 'cone="elliptic" impratio="100" noslip_iterations="10"', 'condim="3" solref="0.004 1"', "implicitfast"
+STIFF = (
+    'cone="elliptic" impratio="100" noslip_iterations="10"',
+    'condim="3" solref="0.004 1"',
+    "implicitfast",
+)
 """Options, attributes of pairs and integrator of the stiffest contacts."""
 
 ENGINES = [

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from planarfriction_studies.referee.case import Case
-from planarfriction_studies.referee.engines.mujoco import ELLIPTIC, NOSLIP, STIFF, Mujoco, MujocoWorld
+from planarfriction_studies.referee.engines.mujoco import (
+    ELLIPTIC,
+    NOSLIP,
+    STIFF,
+    Mujoco,
+    MujocoWorld,
+)
 
 ROOM = 400
 """Room for the contacts and for the constraints of a case."""
@@ -37,7 +43,8 @@ class MujocoWarpWorld(MujocoWorld):
         warp.config.log_level = logging.ERROR  # it reports what it compiles
         super().__init__(case, m)
         with warp.ScopedDevice("cpu"):
-            model, data = mujoco_warp.put_model(m), mujoco_warp.put_data(m, self.d, nconmax=ROOM, njmax=ROOM)
+            model = mujoco_warp.put_model(m)
+            data = mujoco_warp.put_data(m, self.d, nconmax=ROOM, njmax=ROOM)
             self.data, self._step = data, lambda: mujoco_warp.step(model, data)
             if patches:
                 from planarfriction.adapters.mujoco_warp import Friction

@@ -39,27 +39,49 @@ class Newton:
 
         warp.config.log_level = logging.ERROR  # it reports what it compiles
         model, numbers = self._model(case)
-        return NewtonWorld(case, model, numbers, getattr(newton.solvers, self.solver)(model, **self.options), dt)
+        return NewtonWorld(
+            case,
+            model,
+            numbers,
+            getattr(newton.solvers, self.solver)(model, **self.options),
+            dt,
+        )
 
     def _friction(self, case: Case, body: Body) -> float:
         own = {shape.name for shape in body.shapes}
         mu = next(each.mu[0] for each in case.contacts if own & set(each.pair))
         fixed, factor, power = self.mixing
-        return mu if uniform(case) else fixed if body.joint == "fixed" else factor * mu**power
+        return (
+            mu
+            if uniform(case)
+            else fixed
+            if body.joint == "fixed"
+            else factor * mu**power
+        )
 
     def _model(self, case: Case) -> tuple[Any, list[int]]:
         """Return a model in which listed pairs alone collide, and the numbers of the bodies that move."""
         import newton
 
-        builder, shapes, numbers = newton.ModelBuilder(), {}, []
+        builder = newton.ModelBuilder()
+        shapes = {}
+        numbers = []
         newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
         for body in case.bodies:
-            material = newton.ModelBuilder.ShapeConfig(mu=self._friction(case, body), density=0.0)
+            material = newton.ModelBuilder.ShapeConfig(
+                mu=self._friction(case, body), density=0.0
+            )
             number = _add(builder, body)
             numbers += [number] if number >= 0 else []
             for shape in body.shapes:
-                place = np.array(shape.position) + (0.0 if number >= 0 else np.array(body.position))
-                options = {"body": number, "xform": (tuple(place.tolist()), _turned(shape)), "cfg": material}
+                place = np.array(shape.position) + (
+                    0.0 if number >= 0 else np.array(body.position)
+                )
+                options = {
+                    "body": number,
+                    "xform": (tuple(place.tolist()), _turned(shape)),
+                    "cfg": material,
+                }
                 add = getattr(builder, f"add_shape_{shape.kind}")
                 shapes[shape.name] = add(**options, **_sizes(shape))
         touching = {frozenset(contact.pair) for contact in case.contacts}
@@ -83,7 +105,9 @@ def _add(builder: Any, body: Body) -> int:
     if body.joint == "free":
         return builder.add_body(**options)
     number = builder.add_link(**options)
-    joint = builder.add_joint_prismatic(-1, number, parent_xform=options["xform"], axis=(0.0, 0.0, 1.0))
+    joint = builder.add_joint_prismatic(
+        -1, number, parent_xform=options["xform"], axis=(0.0, 0.0, 1.0)
+    )
     builder.add_articulation([joint])
     return number
 
@@ -94,7 +118,9 @@ def _sizes(shape: Shape) -> dict[str, Any]:
         return {"plane": None, "width": 0.0, "length": 0.0}
     if shape.kind == "box":
         return dict(zip(("hx", "hy", "hz"), shape.half.tolist(), strict=True))
-    return {"radius": shape.size[0]} | ({"half_height": 0.5 * shape.size[1]} if len(shape.size) > 1 else {})
+    return {"radius": shape.size[0]} | (
+        {"half_height": 0.5 * shape.size[1]} if len(shape.size) > 1 else {}
+    )
 
 
 def _turned(shape: Shape) -> tuple[float, ...]:
@@ -105,11 +131,19 @@ def _turned(shape: Shape) -> tuple[float, ...]:
 class NewtonWorld:
     """A case in Newton."""
 
-    def __init__(self, case: Case, model: Any, bodies: list[int], solver: Any, dt: float) -> None:
+    def __init__(
+        self, case: Case, model: Any, bodies: list[int], solver: Any, dt: float
+    ) -> None:
         import newton
 
-        self.case, self.bodies, self._model, self._solver, self._dt = case, bodies, model, solver, dt
-        self._now, self._next, self._control = model.state(), model.state(), model.control()
+        self.case = case
+        self.bodies = bodies
+        self._model = model
+        self._solver = solver
+        self._dt = dt
+        self._now = model.state()
+        self._next = model.state()
+        self._control = model.control()
         self._collisions = newton.CollisionPipeline(model)
         self._contacts = self._collisions.contacts()
 
@@ -119,14 +153,19 @@ class NewtonWorld:
         forces[self.bodies] = wrenches
         self._now.body_f.assign(forces)
         self._collisions.collide(self._now, self._contacts)
-        self._solver.step(self._now, self._next, self._control, self._contacts, self._dt)
+        self._solver.step(
+            self._now, self._next, self._control, self._contacts, self._dt
+        )
         self._now, self._next = self._next, self._now
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions of the bodies' origins, and rotations."""
         found = self._now.body_q.numpy()[self.bodies].astype(float)
-        (x, y, z, w), one = found[:, 3:].T, np.eye(3)
-        cross = np.array([[0.0 * x, -z, y], [z, 0.0 * x, -x], [-y, x, 0.0 * x]]).transpose(2, 0, 1)
+        (x, y, z, w) = found[:, 3:].T
+        one = np.eye(3)
+        cross = np.array(
+            [[0.0 * x, -z, y], [z, 0.0 * x, -x], [-y, x, 0.0 * x]]
+        ).transpose(2, 0, 1)
         return found[:, :3], one + 2.0 * w[:, None, None] * cross + 2.0 * cross @ cross
 
     def throw(self, body: int, velocity: np.ndarray) -> None:

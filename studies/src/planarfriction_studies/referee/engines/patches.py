@@ -32,7 +32,13 @@ def model(contact: Contact, kind: str) -> FrictionModel:
         patch = patch.with_friction_metric(friction_metric(0.0, 1.0, across / along))
     mu_s = along if contact.mu_s is None else contact.mu_s
     law = LuGre(
-        mu_c=along, mu_s=mu_s, v_s=contact.v_s, sigma_0=SIGMA_0, sigma_1=SIGMA_1, sigma_2=0.0, elasto_plastic=0.9
+        mu_c=along,
+        mu_s=mu_s,
+        v_s=contact.v_s,
+        sigma_0=SIGMA_0,
+        sigma_1=SIGMA_1,
+        sigma_2=0.0,
+        elasto_plastic=0.9,
     )
     return MODELS[kind](patch, law)
 
@@ -58,9 +64,16 @@ def feet(case: Case, shape: Shape) -> np.ndarray:
             continue
         if len(contact.patch) == 1:
             angles = 2.0 * math.pi * np.arange(_RIM) / _RIM
-            around = (contact.patch[0] - RADIUS) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+            around = (contact.patch[0] - RADIUS) * np.stack(
+                [np.cos(angles), np.sin(angles)], axis=1
+            )
         else:
-            around = np.maximum(0.5 * np.array(contact.patch) - RADIUS, 0.0) * [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+            around = np.maximum(0.5 * np.array(contact.patch) - RADIUS, 0.0) * [
+                (-1, -1),
+                (1, -1),
+                (1, 1),
+                (-1, 1),
+            ]
         inside = math.copysign(RADIUS, shape.position[2] - contact.at[2])
         lifted = np.column_stack([around, np.full(len(around), inside)])
         points.append(np.array(contact.at) + lifted)

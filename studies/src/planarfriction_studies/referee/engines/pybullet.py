@@ -37,11 +37,16 @@ class Client:
     def __init__(self) -> None:
         import pybullet
 
-        self._module, self._number = pybullet, pybullet.connect(pybullet.DIRECT)  # pyright: ignore[reportAttributeAccessIssue]
+        self._module = pybullet
+        self._number = pybullet.connect(pybullet.DIRECT)  # pyright: ignore[reportAttributeAccessIssue]
 
     def __getattr__(self, name: str) -> Any:
         found = getattr(self._module, name)
-        return functools.partial(found, physicsClientId=self._number) if callable(found) else found
+        return (
+            functools.partial(found, physicsClientId=self._number)
+            if callable(found)
+            else found
+        )
 
     def __del__(self) -> None:
         self.disconnect()
@@ -51,16 +56,23 @@ class BulletWorld:
     """A case in PyBullet; its poses are those of centres of mass."""
 
     def __init__(self, case: Case, dt: float, parameters: dict[str, Any]) -> None:
-        self.case, self.client = case, Client()
+        self.case = case
+        self.client = Client()
         client = self.client
         client.setGravity(*case.gravity)
         client.setTimeStep(dt)
         client.setPhysicsEngineParameter(**parameters)
-        self.shapes = {shape.name: self._add(body) for body in case.bodies for shape in body.shapes[:1]}
+        self.shapes = {
+            shape.name: self._add(body)
+            for body in case.bodies
+            for shape in body.shapes[:1]
+        }
         of = {body.name: self.shapes[body.shapes[0].name] for body in case.bodies}
         self.bodies = [of[body.name] for body in case.moving]
         own = {name: of[body.name][0] for name, (body, _) in case.shapes.items()}
-        touching = {frozenset(own[name] for name in contact.pair) for contact in case.contacts}
+        touching = {
+            frozenset(own[name] for name in contact.pair) for contact in case.contacts
+        }
         places = [(body, link) for body, link in of.values()]
         for i, (one, link) in enumerate(places):
             for other, other_link in places[i + 1 :]:
@@ -69,8 +81,13 @@ class BulletWorld:
 
     def _add(self, body: Body) -> tuple[int, int]:
         """Add a body; return its number and that of its link, which is on a slide or the base itself."""
-        client, mass = self.client, body.mass
-        kinds = {"plane": client.GEOM_PLANE, "box": client.GEOM_BOX, "cylinder": client.GEOM_CYLINDER}
+        client = self.client
+        mass = body.mass
+        kinds = {
+            "plane": client.GEOM_PLANE,
+            "box": client.GEOM_BOX,
+            "cylinder": client.GEOM_CYLINDER,
+        }
         kinds |= {"capsule": client.GEOM_CAPSULE, "sphere": client.GEOM_SPHERE}
         if body.shapes[0].kind == "plane":
             found = client.createCollisionShape(client.GEOM_PLANE)
@@ -94,11 +111,22 @@ class BulletWorld:
             link = 0
         else:
             middle = (np.array(body.position) + inertial).tolist()
-            number = client.createMultiBody(mass, found, basePosition=middle, baseInertialFramePosition=inertial)
+            number = client.createMultiBody(
+                mass, found, basePosition=middle, baseInertialFramePosition=inertial
+            )
             link = -1
-        moments = {} if body.joint == "fixed" else {"localInertiaDiagonal": body.moments.tolist()}
+        moments = (
+            {}
+            if body.joint == "fixed"
+            else {"localInertiaDiagonal": body.moments.tolist()}
+        )
         client.changeDynamics(
-            number, link, lateralFriction=self._friction(body), linearDamping=0.0, angularDamping=0.0, **moments
+            number,
+            link,
+            lateralFriction=self._friction(body),
+            linearDamping=0.0,
+            angularDamping=0.0,
+            **moments,
         )
         return number, link
 
@@ -110,27 +138,45 @@ class BulletWorld:
 
     def step(self, wrenches: np.ndarray) -> None:
         """Make a step; forces are forgotten after it."""
-        for (body, link), wrench, (place, _) in zip(self.bodies, wrenches, self._centres(), strict=True):
-            self.client.applyExternalForce(body, link, wrench[:3].tolist(), list(place), self.client.WORLD_FRAME)
-            self.client.applyExternalTorque(body, link, wrench[3:].tolist(), self.client.WORLD_FRAME)
+        for (body, link), wrench, (place, _) in zip(
+            self.bodies, wrenches, self._centres(), strict=True
+        ):
+            self.client.applyExternalForce(
+                body, link, wrench[:3].tolist(), list(place), self.client.WORLD_FRAME
+            )
+            self.client.applyExternalTorque(
+                body, link, wrench[3:].tolist(), self.client.WORLD_FRAME
+            )
         self.client.stepSimulation()
 
     def _centres(self) -> list[tuple[Any, Any]]:
         return [
-            self.client.getBasePositionAndOrientation(body) if link < 0 else self.client.getLinkState(body, link)[:2]
+            self.client.getBasePositionAndOrientation(body)
+            if link < 0
+            else self.client.getLinkState(body, link)[:2]
             for body, link in self.bodies
         ]
 
     def poses(self) -> tuple[np.ndarray, np.ndarray]:
         """Return positions of the bodies' origins, and rotations."""
         centres = self._centres()
-        rotations = [np.reshape(self.client.getMatrixFromQuaternion(turn), (3, 3)) for _, turn in centres]
-        levers = [turn @ np.array(body.centre_of_mass) for turn, body in zip(rotations, self.case.moving, strict=True)]
-        return np.array([place for place, _ in centres]) - np.array(levers), np.array(rotations)
+        rotations = [
+            np.reshape(self.client.getMatrixFromQuaternion(turn), (3, 3))
+            for _, turn in centres
+        ]
+        levers = [
+            turn @ np.array(body.centre_of_mass)
+            for turn, body in zip(rotations, self.case.moving, strict=True)
+        ]
+        return np.array([place for place, _ in centres]) - np.array(levers), np.array(
+            rotations
+        )
 
     def throw(self, body: int, velocity: np.ndarray) -> None:
         """Set the velocity of the centre of mass."""
-        self.client.resetBaseVelocity(self.bodies[body][0], velocity[:3].tolist(), velocity[3:].tolist())
+        self.client.resetBaseVelocity(
+            self.bodies[body][0], velocity[:3].tolist(), velocity[3:].tolist()
+        )
 
 
 def _numbers(shape: Shape) -> dict[str, Any]:
