@@ -19,9 +19,8 @@ _load, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         words = f"module 'planarfriction' has no attribute {name!r}"
-        raise AttributeError(
-            words, name=name, obj=sys.modules[__name__]
-        )  # Python then asks "Did you mean ...?"
+        # Python then asks "Did you mean ...?".
+        raise AttributeError(words, name=name, obj=sys.modules[__name__])
     globals()[name] = _load(name)
     return globals()[name]
 

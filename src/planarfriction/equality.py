@@ -184,9 +184,8 @@ def equal(one: Any, other: Any) -> bool:
         )
     try:
         found = one == other
-        return bool(
-            found.all() if hasattr(found, "all") else found
-        )  # tensors and data frames
+        # Tensors and data frames.
+        return bool(found.all() if hasattr(found, "all") else found)
     except Exception:  # parts of a user's own: what cannot be compared is not equal
         return False
 

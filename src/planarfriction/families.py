@@ -51,9 +51,10 @@ class Family(Mapping[str, Any]):
 
     def choose(self, name: str) -> Any:
         """Return the class or function of a member. Raises `InvalidValueError` with all names if there is none."""
+        # Brings NumPy with it, which names alone do not need.
         from planarfriction import (
             validation,
-        )  # brings NumPy with it, which names alone do not need
+        )
 
         return self[validation.choice(self.what, name, self)]
 

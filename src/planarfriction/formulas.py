@@ -109,9 +109,8 @@ def bristle_decay(
 
 def decay_at(xp: Any, alpha: Any, along: Any, speed: Any, grip: Any, law: Any) -> Any:
     """`bristle_decay` at a known `alpha`."""
-    closing = xp.maximum(
-        speed + along, 0.0
-    )  # rounding below zero would let a long step grow without bound
+    # Rounding below zero would let a long step grow without bound.
+    closing = xp.maximum(speed + along, 0.0)
     return (
         xp.where(
             law.elasto_plastic > 0.0, 0.5 * alpha * closing, speed + law.creep_speed
@@ -173,8 +172,15 @@ def cap(xp: Any, deflection: Any, largest: Any) -> Any:
 
 # ---------------------------------------------------------------------- small discs
 
-DISC_A, DISC_B, DISC_C = 1.41004444 - 12.0 / 7.0, 1.41004444, 2.28646589
-"""Coefficients of the mean speed of a disc, fitted to its elliptic integral (see `disc_friction`)."""
+DISC_A = 1.41004444 - 12.0 / 7.0
+"""Coefficient a of the mean speed of a disc, fitted to its elliptic integral (see
+`disc_friction`)."""
+
+DISC_B = 1.41004444
+"""Coefficient b of the mean speed of a disc."""
+
+DISC_C = 2.28646589
+"""Coefficient c of the mean speed of a disc."""
 
 UNEVEN = 1.2
 """Unevenness of the bristles inside a disc [-]: 1 for a rigid field, more takes off a small delay of slip."""

@@ -46,7 +46,8 @@ LONGEST_NAME = 100
 DEEPEST = 16
 """Axes of an array, and levels of lists in lists that one may be given as; NumPy broadcasts no more than 32."""
 
-_FLOAT, _FINITE = np.dtype(float), np.finfo(float).max
+_FLOAT = np.dtype(float)
+_FINITE = np.finfo(float).max
 _PLAIN = frozenset({float, int, np.float64, np.float32, np.int64, np.int32})
 _OF_KIND = {
     "b": " and no truth value",

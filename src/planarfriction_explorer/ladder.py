@@ -76,9 +76,8 @@ def climb(state: State) -> Iterator[Rung]:
                 t_end=T_END,
             )
             scene = dataclasses.replace(scene, save_every=T_END / 200)
-            runs = [
-                simulate(scene) for _ in range(REPEATS)
-            ]  # the first may compile, others may be disturbed
+            # The first may compile, others may be disturbed.
+            runs = [simulate(scene) for _ in range(REPEATS)]
         except FrictionError as error:
             yield Rung(name, 0, float("nan"), float("nan"), str(error))
             continue

@@ -126,9 +126,8 @@ class Paced:
         self.asked: Any = pn.widgets.IntInput(value=0, visible=False)
         self.drawn: Any = pn.widgets.IntInput(value=0, visible=False)
         self.asked.jscallback(value=_ANSWER, args={"drawn": self.drawn})
-        this = weakref.proxy(
-            self
-        )  # as `drawn` is kept with the script as long as `asked` lives
+        # As `drawn` is kept with the script as long as `asked` lives.
+        this = weakref.proxy(self)
         self.drawn.param.watch(lambda _: this._answered(), "value")
 
     def ask(self) -> None:

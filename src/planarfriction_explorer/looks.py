@@ -77,9 +77,8 @@ p {margin: 8px 0 0}
 
 def wrong(words: str) -> str:
     """Return the style of a field whose value is refused, with the reason below it."""
-    reason = json.dumps(
-        words, ensure_ascii=False
-    )  # quotes and backslashes are escaped as in CSS
+    # Quotes and backslashes are escaped as in CSS.
+    reason = json.dumps(words, ensure_ascii=False)
     return f"""input, select {{border-color: #C0392B !important; background-color: #FBE3E0 !important}}
 .bk-input-group::after {{content: {reason}; color: #C0392B; font-size: 12px;
   white-space: normal; width: 0; min-width: 100%}}"""

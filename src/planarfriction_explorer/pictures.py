@@ -22,11 +22,17 @@ MM = 1e3
 ARROWS = 11
 """Most arrows of the slip field along a side."""
 
-POLAR, AZIMUTH = 37, 73
-"""Points of the mesh of a limit surface: from pole to pole, and around."""
+POLAR = 37
+"""Points of the mesh of a limit surface from pole to pole."""
 
-RAYS, LEAST = 121, 1e-9
-"""Points of a section; friction, as a share of mu_c f_N, below which its direction is only rounding."""
+AZIMUTH = 73
+"""Points of the mesh of a limit surface, around."""
+
+RAYS = 121
+"""Points of a section."""
+
+LEAST = 1e-9
+"""Friction, as a share of `mu_c f_N`, below which its direction is only rounding."""
 
 REACH = 0.4
 """Length of the arrow of a force of mu_c f_N, as a share of the width of the map."""

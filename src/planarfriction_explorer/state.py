@@ -82,9 +82,8 @@ class State(Checked):
             return None
         x = 0.0 - vy / omega
         y = vx / omega
-        return (
-            (x, y) if math.isfinite(1e3 * x) and math.isfinite(1e3 * y) else None
-        )  # in mm too
+        # In mm too.
+        return (x, y) if math.isfinite(1e3 * x) and math.isfinite(1e3 * y) else None
 
 
 def law_parameters(law: Any) -> dict[str, float | None]:
@@ -237,9 +236,8 @@ def answer(state: State) -> Answer:
         [steady_wrench(state) / mu_c, surface.wrench(twist), ellipsoid.wrench(twist)]
     )
     points = geometry.wrench_at(units, surface.centre_of_pressure) / scale
-    friction, of_surface, of_ellipsoid = (
-        mu_c * state.normal_force * units
-    )  # last: 0 under a load near 5e-324 N
+    # Last: 0 under a load near 5e-324 N.
+    friction, of_surface, of_ellipsoid = mu_c * state.normal_force * units
     angle = 0.0
     if units[1].any():
         both = np.stack([twist, ellipsoid.twist(units[1])])

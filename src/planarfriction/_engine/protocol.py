@@ -49,8 +49,11 @@ class Seen(NamedTuple):
 _SEEN = Layout(Seen, twist=3, factor=1, place=3, axes=2, covered=1)
 
 
-SEEN, SEEN_SIZE = _SEEN.offsets, _SEEN.size
-"""Places of `Seen` (see `memory.arrays_at`), and its size in words."""
+SEEN = _SEEN.offsets
+"""Places of `Seen` (see `memory.arrays_at`)."""
+
+SEEN_SIZE = _SEEN.size
+"""Size of `Seen` in words."""
 
 
 class ModelFunctions(NamedTuple):

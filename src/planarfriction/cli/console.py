@@ -108,9 +108,8 @@ def print_table(
         numbers = number > 0 and any(
             character.isdigit() for row in rows for character in row[number][:2]
         )
-        name = number == 0 and not any(
-            " " in row[0] for row in rows
-        )  # stays in one piece
+        # Stays in one piece.
+        name = number == 0 and not any(" " in row[0] for row in rows)
         table.add_column(
             heading,
             justify="right" if numbers else "left",

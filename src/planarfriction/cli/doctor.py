@@ -23,8 +23,11 @@ if TYPE_CHECKING:
 FEATURES = ("sse4.2", "avx", "avx2", "fma", "avx512f", "neon", "sve")
 """Features of processors on which the speed of compiled loops depends, by LLVM's names."""
 
-_CALLS, _ROUNDS = 200, 25
-"""Calls of a step in a round, and rounds whose median is shown."""
+_CALLS = 200
+"""Calls of a step in a round."""
+
+_ROUNDS = 25
+"""Rounds whose median is shown."""
 
 
 class Check(NamedTuple):

@@ -19,11 +19,17 @@ from planarfriction.writing import write_text
 HTML = ".html"
 """A picture to be turned with the mouse."""
 
-FINER, MOST_FINER = 3, 12_000
-"""Refinement whose errors stand beside those of a patch, and the number of cells up to which that takes a second."""
+FINER = 3
+"""Refinement whose errors stand beside those of a patch."""
 
-POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
-"""Samples of the direction sphere in the CSV: every five degrees."""
+MOST_FINER = 12_000
+"""Number of cells up to which the refinement takes a second."""
+
+POLAR_SAMPLES = 37
+"""Samples from pole to pole of the direction sphere in the CSV: every five degrees."""
+
+AZIMUTH_SAMPLES = 72
+"""Samples around the direction sphere in the CSV: every five degrees."""
 
 
 def choose_patch(
@@ -55,9 +61,8 @@ def show(
     if csv is not None:
         check_kind(csv)
     shown = SURFACES[surface](patch)
-    centre = (
-        np.round(1e3 * shown.centre_of_pressure, 9) + 0.0
-    )  # no -0 and no rounding errors of symmetric patches
+    # No -0 and no rounding errors of symmetric patches.
+    centre = np.round(1e3 * shown.centre_of_pressure, 9) + 0.0
     rows = [
         ["loaded cells", f"{patch.cells}"],
         ["centre of pressure [mm]", f"{centre[0]:.4g}, {centre[1]:.4g}"],

@@ -73,9 +73,8 @@ def _shapes(width: float) -> dict[str, Callable[[], pf.ContactPatch]]:
     """Return the shapes that their width alone describes, by name."""
     makers = {}
     for name, make in SHAPES.items():
-        parameters = list(
-            inspect.signature(make).parameters.values()
-        )  # none, in a shape of one's own
+        # None, in a shape of one's own.
+        parameters = list(inspect.signature(make).parameters.values())
         if any(each.default is each.empty for each in parameters[1:]):
             continue
         if parameters and parameters[0].name in _PER_WIDTH:

@@ -27,14 +27,22 @@ from planarfriction.solvers.structured import start_of
 RTOL = 1e-9
 """Default relative tolerance of a motion whose derivatives are wanted [-]."""
 
-SHARE, POWER = 0.1, 2.0 / 3.0
-"""Accuracy of each step of the derivatives, relative and in natural scales: a share of a power of `rtol`."""
+SHARE = 0.1
+"""Factor of the accuracy of each step of the derivatives, `SHARE rtol^POWER`, relative
+and in natural scales."""
+
+POWER = 2.0 / 3.0
+"""Power of `rtol` in the accuracy of each step of the derivatives."""
 
 NUMBERS = 4e6
 """Numbers of the states that a part of the path holds, and as many of their rates: 64 MB together."""
 
-LEAST_NODES, MOST_NODES = 16, 4096
-"""Least number of ends of steps that a part of the path holds, and most where all parts stay in memory."""
+LEAST_NODES = 16
+"""Least number of ends of steps that a part of the path holds."""
+
+MOST_NODES = 4096
+"""Largest number of ends of steps in a part of the path when all parts stay in
+memory."""
 
 ALLOWANCE = 20_000
 """Steps of the adjoint that a gradient may take besides `adjoint.PER_STEP` for each of the motion: half a second."""

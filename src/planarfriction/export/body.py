@@ -15,8 +15,11 @@ from planarfriction.export.c_values import Array, Fixed, Record, Scalar
 from planarfriction.export.loops import Loops
 from planarfriction.models.base import lever_of
 
-_STEP, _SLOPES = Fixed(0), Fixed(1)
-"""Stand in place of the addresses of a patch's functions."""
+_STEP = Fixed(0)
+"""Stands in place of the address of a patch's step."""
+
+_SLOPES = Fixed(1)
+"""Stands in place of the address of a patch's step with its slopes."""
 
 _FUNCTIONS = {_STEP: "step_patch", _SLOPES: "slope_patch"}
 
@@ -41,9 +44,8 @@ def body_of(model: Any, precision: str, patches: int) -> dict[str, Any]:
     p = Record("p", record)
     loops = Loops(writer, {record: "search_t"})
     loops.replaced[coupling_steps.step_patch] = lambda given: _FUNCTIONS[given[2]]
-    loops.replaced[coupling_steps.write_load_slopes] = lambda _: (
-        "(void)"
-    )  # the load is given
+    # The load is given.
+    loops.replaced[coupling_steps.write_load_slopes] = lambda _: "(void)"
     loops.add(
         coupling.find,
         (
@@ -55,9 +57,8 @@ def body_of(model: Any, precision: str, patches: int) -> dict[str, Any]:
         ),
     )
     functions = re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
-    functions = re.sub(
-        r"\b(\w+_of_vectors)\b", r"\1_in_double", functions
-    )  # others are in the other precision
+    # Others are in the other precision.
+    functions = re.sub(r"\b(\w+_of_vectors)\b", r"\1_in_double", functions)
     return {
         "fields": [
             f"{name}[{count}]"

@@ -83,9 +83,8 @@ def slip_of(patch: ContactPatch, writer: Writer) -> Slip | None:
         )
         return (*twist, s.angle)
 
-    duals = surface._table.duals.reshape(3, -1).T.astype(
-        np.float32
-    )  # rough: Newton's method goes on from there
+    # Rough: Newton's method goes on from there.
+    duals = surface._table.duals.reshape(3, -1).T.astype(np.float32)
     tables = {"normals": data, "duals": np.unique(duals, axis=0)}
     twist = ["twist[0]", "twist[1]", "twist[2]", "*angle"]
     outputs = {

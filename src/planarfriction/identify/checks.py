@@ -16,28 +16,41 @@ from planarfriction.identify.slides import MassProperties, Slide, window_twists
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.patch import ContactPatch
 
-FAST, STRONG = 0.2, 0.2
-"""Shares of the usual largest speed and wrench from which a sample counts as sliding under load: bristles that load or
-turn are slower, and less than that is noise."""
+FAST = 0.2
+"""Share of the usual largest speed from which a sample counts as sliding: bristles that
+load or turn are slower, and less than that is noise."""
 
-LEAST, MOST = 20, 120
-"""Least number of sliding samples that a check needs, and most that it takes, evenly chosen."""
+STRONG = 0.2
+"""Share of the usual largest wrench from which a sample counts as under load."""
 
-MOST_CELLS, FEW_DISCS = 500, 100
-"""Number of cells of a patch above which a check uses discs, and number of these."""
+LEAST = 20
+"""Least number of sliding samples that a check needs."""
+
+MOST = 120
+"""Largest number of sliding samples that a check takes, evenly chosen."""
+
+MOST_CELLS = 500
+"""Number of cells of a patch above which a check uses discs."""
+
+FEW_DISCS = 100
+"""Number of discs that a check uses in place of many cells."""
 
 AGAINST = 0.7
 """Largest share of the work with which friction may drive the motion: bristles give some work back."""
 
-MISREAD, BETTER = 5.0, 0.4
-"""Median angle between the wrench and that of sliding friction [deg] from which a log may have been misread, and share
-to which another reading must lower it to be named: no reading lowers noise."""
+MISREAD = 5.0
+"""Median angle between the wrench and that of sliding friction [deg] from which a log
+may have been misread."""
 
-NEAR, FAR = (
-    np.geomspace(1.0 / 3.0, 3.0, 9),
-    np.concatenate([np.geomspace(1e-4, 0.25, 28), np.geomspace(4.0, 1e4, 28)]),
-)
-"""Factors on the size of the patch, which is estimated, that count as the same patch, and as another one."""
+BETTER = 0.4
+"""Share to which another reading must lower that angle to be named: no reading lowers
+noise."""
+
+NEAR = np.geomspace(1.0 / 3.0, 3.0, 9)
+"""Factors on the estimated size of a patch that count as the same patch."""
+
+FAR = np.concatenate([np.geomspace(1e-4, 0.25, 28), np.geomspace(4.0, 1e4, 28)])
+"""Factors on the estimated size of a patch that count as another one."""
 
 LEVERS = {
     1e-3: "the patch in mm",
@@ -53,28 +66,57 @@ SAME_LEVER = 2.0
 HIGH = 4.0
 """Friction over load above which one of both has another unit or another scale."""
 
-TRAVEL, SLOW, SPEEDY = 0.1, 0.2, 10.0
-"""Displacement between two samples, as a share of the contact radius, and time [s] that are long for slow sampling;
-speed [m/s] that is more likely one in mm/s."""
+TRAVEL = 0.1
+"""Displacement between two samples that is long for slow sampling, as a share of the
+contact radius."""
 
-LEAST_MOUNTED, LEAST_TURN = np.radians(20.0), 0.5
-"""Angle between the axes of force and motion [rad] that no anisotropy and no calibration explains; turn of the contact
-[rad] below which axes of the world and of the contact are the same."""
+SLOW = 0.2
+"""Time between two samples that is long [s]."""
+
+SPEEDY = 10.0
+"""Speed [m/s] that is more likely one in mm/s."""
+
+LEAST_MOUNTED = np.radians(20.0)
+"""Angle between the axes of force and motion [rad] that no anisotropy and no
+calibration explains."""
+
+LEAST_TURN = 0.5
+"""Turn of the contact [rad] below which axes of the world and of the contact are the
+same."""
 
 
 LOW = 1e-4
 """Friction over load of a slide below which its times are too large: the least of solids is some 1e-3."""
 
-VARIES, STEADIER, SURE, FEW = 0.1, 0.3, 0.3, 4
-"""Spread of the logarithm of friction in slides from which angles may be misread (measured slides: 0.07), share to
-which degrees must lower it, and spread and number of values from which on no other cause is left."""
+VARIES = 0.1
+"""Spread of the logarithm of friction in slides from which angles may be misread;
+measured slides have 0.07."""
 
-USUAL, HALF = 1.0, 0.5
-"""Friction over load of a slide above which angles may be misread, if it is below this share of it in degrees."""
+STEADIER = 0.3
+"""Share to which degrees must lower the spread of friction in slides."""
 
-STILL, SLOWED, JUMP = 2, 0.1, 2.0
-"""Number of steps without motion that show a frozen tracker, their speed over that behind the jump that ends them, and
-speed of the jump over the same."""
+SURE = 0.3
+"""Spread of the logarithm of friction from which on no other cause is left than misread
+angles."""
+
+FEW = 4
+"""Number of slides from which on their spread is judged."""
+
+USUAL = 1.0
+"""Friction over load of a slide above which angles may be misread."""
+
+HALF = 0.5
+"""Share of a slide's friction that it must stay below once its angles are read as
+degrees."""
+
+STILL = 2
+"""Number of steps without motion that show a frozen tracker."""
+
+SLOWED = 0.1
+"""Speed of these steps over that behind the jump that ends them."""
+
+JUMP = 2.0
+"""Speed of the jump over that behind it."""
 
 
 class Finding(NamedTuple):

@@ -84,9 +84,8 @@ def find_columns(
             raise FileError(
                 f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them"
             )
-        nearest = min(
-            contacts, key=lacks.__getitem__, default=""
-        )  # the message names what it lacks
+        # The message names what it lacks.
+        nearest = min(contacts, key=lacks.__getitem__, default="")
         contact = (
             nearest
             if nearest and lacks[nearest] < len(_missing(named, "", with_load))

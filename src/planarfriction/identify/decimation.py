@@ -21,14 +21,19 @@ from planarfriction.identify.rig import LONGEST, jitter
 WINDOW = 200
 """Least number of samples of a window."""
 
-GROWTH, LEVELS = 1.03, 600
-"""Ratio of the distances from a window at which steps before it begin, and number of these distances: they span a
-factor of 5e7, the last one a part of the deflection of a bristle. Wrenches in a window are then off by 3e-4 of
-the largest at most (by 2e-2 with a ratio of 1.15)."""
+GROWTH = 1.03
+"""Ratio of the distances from a window at which steps before it begin: wrenches in a
+window are then off by 3e-4 of the largest at most (by 2e-2 with a ratio of 1.15)."""
 
-LEAST_SPEED, NOISE = 1e-3, 3.0
-"""Speed below which windows count as alike, as a share of the largest speed, and in standard deviations of its noise;
-below the latter nothing moves."""
+LEVELS = 600
+"""Number of these distances: they span a factor of 5e7, the last one a part of the
+deflection of a bristle."""
+
+LEAST_SPEED = 1e-3
+"""Speed below which windows count as alike, as a share of the largest speed."""
+
+NOISE = 3.0
+"""Standard deviations of the noise of a speed below which nothing moves."""
 
 TINY = np.finfo(float).tiny
 

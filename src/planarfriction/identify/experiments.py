@@ -46,12 +46,17 @@ NOISE = 0.01
 REFINE = 4
 """Steps between two samples."""
 
-KNOWN, FAINT = 0.5, 1e-14
-"""Standard error over the value above which a parameter counts as unknown, and share of the largest information below
-which rounding decides."""
+KNOWN = 0.5
+"""Standard error over the value above which a parameter counts as unknown."""
 
-SAMPLES, LOADS = (100, 100_000), 20
-"""Fewest samples that show a motion, and most samples and most loads of a plan."""
+FAINT = 1e-14
+"""Share of the largest information below which rounding decides."""
+
+SAMPLES = (100, 100_000)
+"""Fewest samples that show a motion, and most samples of a plan."""
+
+LOADS = 20
+"""Largest number of loads of a plan."""
 
 SINES = (2.3, 1.7, 3.1)
 """Frequencies of vx, vy and omega [Hz]: no two periods meet again soon."""
@@ -59,9 +64,15 @@ SINES = (2.3, 1.7, 3.1)
 SLOWEST = 1e-3
 """Speed at the begin of a slide over its largest speed."""
 
-STROKE, SLOW, PER_PERIOD = 3.0, 1.0, 25.0
-"""Amplitude of reversals over the displacement at which bristles break away, `mu_s/sigma_0`; frequency of the slow ones
-[Hz], and samples of a period of the quickest."""
+STROKE = 3.0
+"""Amplitude of reversals over the displacement at which bristles break away,
+`mu_s/sigma_0`."""
+
+SLOW = 1.0
+"""Frequency of slow reversals [Hz]."""
+
+PER_PERIOD = 25.0
+"""Samples of a period of the quickest reversals."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -435,9 +446,8 @@ def _twists(
     """Return the twists `[T, 3]` of the motions by name."""
     share = time / time[-1]
     zero = np.zeros_like(time)
-    grown = SLOWEST ** (1.0 - share) - SLOWEST * (
-        1.0 - share
-    )  # from 0, soon by the same factor in the same time
+    # From 0, soon by the same factor in the same time.
+    grown = SLOWEST ** (1.0 - share) - SLOWEST * (1.0 - share)
     sines = [np.sin(2.0 * np.pi * hertz * time) for hertz in SINES]
     swept = (0.03 + 0.97 * share**2) * np.array(sines)
 

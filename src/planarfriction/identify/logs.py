@@ -37,12 +37,19 @@ AT_ONCE = 50_000
 TWO_LOADS = 1.2
 """Ratio of loads above which logs show if the stiffness grows with the load."""
 
-TURN, QUARTER = 2.0 * np.pi, 0.5 * np.pi
-"""One turn, and largest step of an angle, or change of its step, between two samples that shows the turns [rad]."""
+TURN = 2.0 * np.pi
+"""One turn [rad]."""
 
-ROUNDED, NEIGHBOURS = 1e-3, 3
-"""Excess of the range of a wrapped angle over one turn that is put down to rounding [turns], and number of steps on
-either side with which a step is compared."""
+QUARTER = 0.5 * np.pi
+"""Largest step of an angle, or change of its step, between two samples that shows the
+turns [rad]."""
+
+ROUNDED = 1e-3
+"""Excess of the range of a wrapped angle over one turn that is put down to rounding
+[turns]."""
+
+NEIGHBOURS = 3
+"""Number of steps on either side with which a step is compared."""
 
 
 @dataclass(frozen=True, eq=False)

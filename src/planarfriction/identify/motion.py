@@ -59,8 +59,11 @@ DRY = LuGre(
 
 CHANNELS = (("x", "m"), ("y", "m"), ("theta", "rad"))
 
-FIRST_NOISE, LEAST_NOISE = 1e-3, 1e-9
-"""Noise of positions in the first fit [m] (of angles over the contact radius), least noise of a channel [m, rad]."""
+FIRST_NOISE = 1e-3
+"""Noise of positions in the first fit [m], of angles over the contact radius."""
+
+LEAST_NOISE = 1e-9
+"""Least noise of a channel [m, rad]."""
 
 CHANGE = 0.01
 """Step of difference quotients as a share of a parameter (at least of its start).

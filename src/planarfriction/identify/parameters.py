@@ -76,13 +76,20 @@ USUAL = (
 )
 """Parameters that `identify_lugre` estimates by default."""
 
-STIFFNESS, RADIUS, SECOND_MOMENT = (
-    PARAMETERS.index(each) for each in ("sigma_0", "contact_radius", "second_moment")
-)
-"""Places of the stiffness and of the numbers of the shape in the vector of a model."""
+STIFFNESS = PARAMETERS.index("sigma_0")
+"""Place of the stiffness in the vector of a model."""
 
-PRIOR, SHAPE_PRIOR = 3.0, 1.0
-"""Standard deviations a priori of logarithms (a factor of 20), of that of the Stribeck exponent and `mu_s/mu_c - 1`."""
+RADIUS = PARAMETERS.index("contact_radius")
+"""Place of the contact radius in the vector of a model."""
+
+SECOND_MOMENT = PARAMETERS.index("second_moment")
+"""Place of the second moment in the vector of a model."""
+
+PRIOR = 3.0
+"""Standard deviation a priori of logarithms, a factor of 20."""
+
+SHAPE_PRIOR = 1.0
+"""Standard deviation a priori of the Stribeck exponent and of `mu_s/mu_c - 1`."""
 
 CONSTANT = 0.1
 """Share by which the load of a log may stray from its mean if the patch changes with the load."""

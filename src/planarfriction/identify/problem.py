@@ -40,17 +40,21 @@ NEARBY = 0.03
 """Change of the values, as a share, up to which derivatives are kept: it moves no estimate by more than this share of
 its standard error, as they decide on the way to the minimum, and meet residuals of noise there."""
 
-SOFT, SPOILED, FEW = 3.0, 6.0, 0.1
-"""Residuals over the noise at which "soft_l1" passes from their squares to their sizes, and above which they are no
-noise, and share of such ones up to which a robust fit ends without them."""
+SOFT = 3.0
+"""Residual over the noise at which "soft_l1" passes from squares to sizes."""
+
+SPOILED = 6.0
+"""Residual over the noise above which it is no noise."""
+
+FEW = 0.1
+"""Share of spoiled residuals up to which a robust fit ends without them."""
 
 
 def softened(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return residuals whose squares are the loss "soft_l1" at a scale of `SOFT`, `[M]`, and their derivatives."""
     root = np.sqrt(1.0 + (residual / SOFT) ** 2)
-    factor = np.sqrt(
-        2.0 / (1.0 + root)
-    )  # no difference of like numbers at small residuals
+    # No difference of like numbers at small residuals.
+    factor = np.sqrt(2.0 / (1.0 + root))
     return residual * factor, 1.0 / (root * factor)
 
 

@@ -26,8 +26,11 @@ NUMBERS = tuple(name for name in PARAMETERS if name in LAW)
 WIDTH = 80
 """Columns of a table."""
 
-CORRELATED, PAIRS = 0.5, 5
-"""Correlation from which on a pair of estimates is printed, and the largest number of such pairs."""
+CORRELATED = 0.5
+"""Correlation from which on a pair of estimates is printed."""
+
+PAIRS = 5
+"""Largest number of pairs that are printed."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -21,35 +21,62 @@ GROUPS = ("delay", "bias", "load", "twist")
 
 CHANNELS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
 
-DELAY, LONGEST = 0.01, 0.05
-"""Standard deviation of the delay a priori, and the longest delay that is tried [s]."""
+DELAY = 0.01
+"""Standard deviation of the delay a priori [s]."""
 
-BIAS, ZERO_DRIFT, LEAST_FORCE = 0.1, 0.05, 1e-3
-"""Standard deviations of the zeros and of their drift a priori, as shares of the largest value of the channel, and
-least value that a force channel counts as, as a share of the largest force."""
+LONGEST = 0.05
+"""Longest delay that is tried [s]."""
 
-SCALE, DRIFT = 0.005, (0.05, 0.02, 0.02)
-"""Standard deviations of the scale of a calibrated load cell [-], and of its drift by degree [-]; the first of these is
-half of the change over the log."""
+BIAS = 0.1
+"""Standard deviation of the zeros a priori, as a share of the largest value of the
+channel."""
+
+ZERO_DRIFT = 0.05
+"""Standard deviation of the drift of the zeros a priori, as a share of the largest
+value of the channel."""
+
+LEAST_FORCE = 1e-3
+"""Least value that a force channel counts as, as a share of the largest force."""
+
+SCALE = 0.005
+"""Standard deviation of the scale of a calibrated load cell [-]."""
+
+DRIFT = (0.05, 0.02, 0.02)
+"""Standard deviations of the drift of a scale by degree [-]; the first is half of the
+change over the log."""
 
 EDGE = 1.5
 """Half the range of a load cell's drift over the standard deviation of its scale: it is unknown when it was right."""
 
-ORDER, SIZE = 3, float(np.sqrt(20.0))
-"""Order of the differences that give the noise (motions at a tenth of the sampling rate leave 2 % of themselves), and
-standard deviation of these differences of unit noise: 1 + 9 + 9 + 1 under the root."""
+ORDER = 3
+"""Order of the differences that give the noise: motions at a tenth of the sampling rate
+leave 2 % of themselves."""
+
+SIZE = float(np.sqrt(20.0))
+"""Standard deviation of these differences of unit noise: 1 + 9 + 9 + 1 under the
+root."""
 
 MEDIAN = 1.4826
 """Standard deviation of a normal distribution over its median absolute value."""
 
-CLIP, CLIP_VARIANCE, CLIPPED = 3.0, 0.9733, 5
-"""Sigmas beyond which a difference is left out, variance of a unit normal distribution cut there, and rounds."""
+CLIP = 3.0
+"""Sigmas beyond which a difference is left out."""
+
+CLIP_VARIANCE = 0.9733
+"""Variance of a unit normal distribution that is cut at `CLIP`."""
+
+CLIPPED = 5
+"""Rounds of leaving differences out."""
 
 LEAST_NOISE = 1e-3
 """Least noise of a sensor, as a share of the largest force or torque."""
 
-QUIET, LEAST_TO_SMOOTH = 1e-3, 50
-"""Noise of a twist, as a share of its root mean square, and number of samples, below which it is not smoothed."""
+QUIET = 1e-3
+"""Noise of a twist, as a share of its root mean square, below which it is not
+smoothed."""
+
+LEAST_TO_SMOOTH = 50
+"""Number of samples below which a twist is not smoothed."""
 
 SMOOTHNESS = 10.0 ** np.arange(0.0, 10.0, 0.25)
 """Weights of the third differences among which a smooth twist is chosen."""

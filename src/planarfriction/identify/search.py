@@ -19,15 +19,25 @@ from planarfriction.identify.uncertainty import Fit, Uncertainty, covariance_of
 from planarfriction.identify.verdicts import VAGUE
 from planarfriction.laws import LuGre
 
-ROUGH, FINE = 0.1, 1e-3
-"""Changes of the cost (half a sum of squares) below which a search ends, for rough starts and in the end: 0.001 is a
-change of an estimate by 0.04 standard errors."""
+ROUGH = 0.1
+"""Change of the cost, half a sum of squares, below which the search from a rough start
+ends."""
 
-ROUNDS, STEADY = 6, 0.02
-"""Most rounds of noise and finer steps, and largest change of the noise, as a share, for which it is settled."""
+FINE = 1e-3
+"""Change of the cost below which a search ends: a change of an estimate by 0.04
+standard errors."""
 
-MOST_EVALUATIONS, SAME_COST = 100, 1e-3
-"""Most evaluations of one start, and largest difference of costs, as a share, of starts that found one minimum."""
+ROUNDS = 6
+"""Most rounds of noise and finer steps."""
+
+STEADY = 0.02
+"""Largest change of the noise, as a share, for which it is settled."""
+
+MOST_EVALUATIONS = 100
+"""Most evaluations of one start."""
+
+SAME_COST = 1e-3
+"""Largest difference of costs, as a share, of starts that found one minimum."""
 
 TOUCHING = 1e-9
 """Distance from a bound, over the size of a coordinate above 1, at which a search has ended on it."""
@@ -35,8 +45,11 @@ TOUCHING = 1e-9
 IN_CACHE = 256
 """Number of rows that are reduced at a time: a triangle of triangles takes a third of the time."""
 
-SPEEDS, STIFFNESSES = 6, 7
-"""Size of the grid of Stribeck speeds and stiffnesses from which a search starts."""
+SPEEDS = 6
+"""Number of Stribeck speeds from which a search starts."""
+
+STIFFNESSES = 7
+"""Number of stiffnesses from which a search starts."""
 
 SCATTER = 0.7
 """Standard deviation of the logarithms of starts around a given one."""
@@ -342,15 +355,24 @@ def _scattered(
     return np.where(positive, values * factor, values)
 
 
-REACH, NEAR, TRIES = 2.0, 0.8, 3
-"""Standard errors at which the cost is looked at, share of the rise it should have there from which on no further
-value is tried, and most values that are tried on a side."""
+REACH = 2.0
+"""Standard errors at which the cost is looked at."""
+
+NEAR = 0.8
+"""Share of the rise that the cost should have there from which on no further value is
+tried."""
+
+TRIES = 3
+"""Most values that are tried on a side."""
 
 SURE = 0.02
 """Standard error, as a share of the estimate, below which a ridge looks straight."""
 
-STIFF, SETTLED = 1e4, 0.02
-"""Weight of a value that is held, over its share off, and change of the cost at which a search ends."""
+STIFF = 1e4
+"""Weight of a value that is held, over its share off."""
+
+SETTLED = 0.02
+"""Change of the cost at which a search with a held value ends."""
 
 
 def stretches(fit: Fit, u: Uncertainty) -> np.ndarray:

@@ -23,8 +23,11 @@ CHANGE = 1e-6
 LEAST_CHANGE = 1e-3
 """Least size [m] of which `CHANGE` is a share: a centre may lie at zero."""
 
-CELLS, DISCS = 400, 200
-"""Number of cells above which discs stand for a patch, and number of these: on smooth motions about points inside they
+CELLS = 400
+"""Number of cells above which discs stand for a patch."""
+
+DISCS = 200
+"""Number of discs that stand for many cells: on smooth motions about points inside they
 are off by up to 0.4 % of the friction (0.1 % rms), and take as long as 400 points."""
 
 STEADY_STEPS = 400
@@ -207,9 +210,8 @@ class Prediction:
         else:
             twists = Akima1DInterpolator(log.time, twist)(grid)
         loads = np.interp(grid, log.time, log.normal_force)
-        order = np.repeat(
-            np.arange(self.steps + 1), 2
-        )  # 0, 0, 1, 1, 2, 2, ..., steps, steps
+        # 0, 0, 1, 1, 2, 2, ..., steps, steps.
+        order = np.repeat(np.arange(self.steps + 1), 2)
         order = order[2:] if log.held else order[1:-1]
         self._first = STEADY_STEPS - 1 if begins == "steady" else 0
         order = np.pad(order, (self._first + 1, 0))

@@ -29,14 +29,23 @@ CHANGES = np.array([2e-3, 2e-3, 2e-2])
 WINDOW = 8
 """Number of samples of a window whose poses give a speed."""
 
-GROWS, NOISE = 0.1, 6.0
-"""Growth of the speed, as a share of the largest and over the sigma of its noise, beyond which a body was pushed."""
+GROWS = 0.1
+"""Growth of the speed, as a share of the largest, beyond which a body was pushed."""
 
-FREE, LONG = 0.2, 0.25
-"""Deceleration, as a share of the usual one, and duration, as a share of the motion, of a body without friction."""
+NOISE = 6.0
+"""Growth of the speed over the sigma of its noise beyond which a body was pushed."""
 
-MODEST, FAR = 2.5, 6.0
-"""Error of a slide over that of the median slide from which it counts less, and beyond which it does not count."""
+FREE = 0.2
+"""Deceleration of a body without friction, as a share of the usual one."""
+
+LONG = 0.25
+"""Duration of a motion without friction, as a share of the whole."""
+
+MODEST = 2.5
+"""Error of a slide over that of the median slide from which it counts less."""
+
+FAR = 6.0
+"""Error of a slide over that of the median slide beyond which it does not count."""
 
 STRONG = 0.7
 """Standard errors by which one slide alone moves an estimate if it is to be named: it makes half of the variance."""

@@ -21,22 +21,34 @@ EXCESS = 1.25
 CHANCE = 4.0
 """Standard deviations of the reduced chi-square, for independent residuals, that are put down to chance."""
 
-STRAIN, HELD_OUT = 3.0, 2.0
-"""Standard deviations a priori of a disturbance of the rig, and errors on held-out parts over those that the noise
-explains, above which a fit is rejected."""
+STRAIN = 3.0
+"""Standard deviations a priori of a disturbance of the rig above which a fit is
+rejected."""
 
-BLOCKS, FOLDS = 20, 5
-"""Number of blocks that each log is cut into, every fifth of which is held out in turn."""
+HELD_OUT = 2.0
+"""Errors on held-out parts, over those that the noise explains, above which a fit is
+rejected."""
 
-LONGEST, DRAWS = 0.1, 24
-"""Longest lag over which residuals may be correlated, as a share of the log; number of drawn errors of the twists."""
+BLOCKS = 20
+"""Number of blocks that each log is cut into."""
+
+FOLDS = 5
+"""Number of parts of a log, each of which is held out in turn: every fifth block."""
+
+LONGEST = 0.1
+"""Longest lag over which residuals may be correlated, as a share of the log."""
+
+DRAWS = 24
+"""Number of drawn errors of the twists."""
 
 ALLOWANCE = 1.1
 """Factor on all standard errors for what linear ones leave out: curvature, steps, and the error of the noise itself."""
 
-HUGE, RIDGE = 1e200, 1e-10
-"""Variance that stands for an infinite one during a change of coordinates, and share of the largest curvature that
-holds parameters on which no sample depends."""
+HUGE = 1e200
+"""Variance that stands for an infinite one during a change of coordinates."""
+
+RIDGE = 1e-10
+"""Share of the largest curvature that holds parameters on which no sample depends."""
 
 NEAR = 4.0
 """Mean square of the residuals over that of the noise up to which a rough fit is near the data: steps are coarse."""

@@ -22,9 +22,13 @@ from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Fit, Pull, Unc
 TWO_SIDED = 1.96
 """Standard errors on either side of the estimate that hold 95 % of a normal distribution."""
 
-VAGUE, WELL = 0.3, 0.02
-"""Standard errors, as shares of the estimate, above which a parameter that must be > 0 counts as unknown, and below
-which it does not matter what an estimate is correlated with."""
+VAGUE = 0.3
+"""Standard error, as a share of the estimate, above which a parameter that must be > 0
+counts as unknown."""
+
+WELL = 0.02
+"""Standard error, as a share of the estimate, below which its correlations do not
+matter."""
 
 TOGETHER = 0.98
 """Correlation above which two parameters cannot be separated."""
@@ -35,20 +39,28 @@ UNSEEN = 1.0
 OF_TORQUE = ("contact_radius", "centre_x", "centre_y", *SOFT_FINGER)
 """Parameters that change the force only if the contact spins while it slides."""
 
-GAP, NARROW = 3.0, 10.0
-"""Ratio of sliding speeds without a sample between them that counts as a gap, and ratio of the fastest to the slowest
-sliding (but for 2 % at either end) below which no Stribeck curve shows."""
+GAP = 3.0
+"""Ratio of sliding speeds without a sample between them that counts as a gap."""
 
-NO_SPIN, ONE_LOAD = 0.02, 1.05
-"""Share of the sliding speed that comes from spin below which there is none, and ratio of the largest and the smallest
-load below which there is one load only."""
+NARROW = 10.0
+"""Ratio of the fastest to the slowest sliding, but for 2 % at either end, below which
+no Stribeck curve shows."""
+
+NO_SPIN = 0.02
+"""Share of the sliding speed that comes from spin below which there is none."""
+
+ONE_LOAD = 1.05
+"""Ratio of the largest to the smallest load below which there is one load only."""
 
 SLIPPED = 12.0
 """Growth of the cost (half the sum of squares) without slip below which the data hold none: 5 standard errors."""
 
-LEANING, MOVED = 2.0, 2.0
-"""Standard deviations a priori of a disturbance above which a fit leans on it, and standard errors by which a held
-parameter that the residuals deny may move an estimate."""
+LEANING = 2.0
+"""Standard deviations a priori of a disturbance above which a fit leans on it."""
+
+MOVED = 2.0
+"""Standard errors by which a held parameter that the residuals deny may move an
+estimate."""
 
 SAME = 1.001
 """Ratio of mu_s to mu_c below which they are the same."""

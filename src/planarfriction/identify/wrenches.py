@@ -52,16 +52,25 @@ from planarfriction.patch.metric import refuse_anisotropy
 START_MU_S = 1.2
 """Static coefficient that a search starts with by default: above `mu_c`, free to move."""
 
-USUAL_EVALUATIONS, PATIENCE, SOON = 60, 120.0, 20.0
-"""Number of evaluations of a search, the time [s] that "auto" has for one of its models, and that from which on a model
-that was chosen takes windows of its logs."""
+USUAL_EVALUATIONS = 60
+"""Number of evaluations of a search."""
+
+PATIENCE = 120.0
+"""Time [s] that "auto" has for one of its models."""
+
+SOON = 20.0
+"""Time [s] from which on a model that was chosen takes windows of its logs."""
 
 LEAD = next(iter(SIMULATORS))
 """Name of the quickest model, which finds where the others begin."""
 
-WORSE, EXPLAINED = 2.0, 1.2
-"""Ratio of the costs of two kinds of bristles above which other models do without the worse one; and mean square of the
-residuals over the noise above which they do so only if that one is near the data: the quickest model may be wrong."""
+WORSE = 2.0
+"""Ratio of the costs of two kinds of bristles above which other models do without the
+worse one."""
+
+EXPLAINED = 1.2
+"""Mean square of the residuals over the noise above which they do so only if that kind
+is near the data: the quickest model may be wrong."""
 
 USUAL_BRISTLES = ElastoPlastic(0.9)
 """Bristles that "auto" compares with plain ones."""

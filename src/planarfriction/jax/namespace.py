@@ -139,17 +139,15 @@ def _real(name: str, value: Any, like: Any = None) -> jax.Array:
         else:
             checked = validation.numbers(name, value)
             if isinstance(value, (int, float)) and not isinstance(value, np.generic):
-                value = float(
-                    checked
-                )  # a plain number takes the precision of what it meets
+                # A plain number takes the precision of what it meets.
+                value = float(checked)
             elif (
                 isinstance(value, (np.ndarray, np.generic))
                 and value.dtype.char in "efd"
                 and value.dtype.isnative
             ):
-                value = np.asarray(
-                    value
-                )  # plain, which a masked array is not even if it masks nothing
+                # Plain, which a masked array is not even if it masks nothing.
+                value = np.asarray(value)
             else:
                 value = jnp.asarray(checked, float)
     array = jnp.asarray(value)

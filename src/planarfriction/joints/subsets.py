@@ -207,10 +207,11 @@ def _best(
 
 
 def _names(terms: Sequence[str]) -> set[str]:
+    # An asymmetric level is the offset.
     return {
         *COLUMNS[:4],
         *(name for term in terms for name in TERMS[term]),
-    }  # an asymmetric level is the offset
+    }
 
 
 def _solve(sums: np.ndarray, columns: list[int], positive: list[int]) -> _Solution:

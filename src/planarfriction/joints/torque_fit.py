@@ -357,9 +357,8 @@ def doubt(data: Data, fit: Refined, term: str) -> str:
         if term == "gravity"
         else values[names[0]]
     )
-    tested = (
-        names[:1] if term == "asymmetry" else names
-    )  # its level may as well be an offset of the torque
+    # Its level may as well be an offset of the torque.
+    tested = names[:1] if term == "asymmetry" else names
     clear = max(abs(values[name]) / max(spread[name], 1e-300) for name in tested)
     if term == "load" and size >= MOST_LOAD - 0.01:
         return "the level would grow with all of the torque"

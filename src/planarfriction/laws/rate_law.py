@@ -40,7 +40,8 @@ _SPEED = 1e-3
 
 _COMMON = ("sigma_0", "sigma_1", "sigma_2", "largest_deflection")
 
-_POINT, _ALONE = np.zeros((2, 1)), np.ones(1)
+_POINT = np.zeros((2, 1))
+_ALONE = np.ones(1)
 
 
 class RateLaw(FrictionLaw):

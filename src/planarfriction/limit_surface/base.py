@@ -102,9 +102,8 @@ class LimitSurface(ByValue):
                 normal_force=validation.positive_load("normal_force", self.normal_force)
             )
         if self.normal_force is not None or not self.patch.depends_on_load:
-            _ = (
-                self.contact_radius
-            )  # refuses a patch of one point now rather than later
+            # Refuses a patch of one point now rather than later.
+            _ = self.contact_radius
 
     def __repr__(self) -> str:
         parts = [
@@ -284,12 +283,10 @@ class LimitSurface(ByValue):
         """
         wrench = validation.vectors("wrench", wrench, 3)
         if wrench.ndim > 1:
-            validation.finite_numbers(
-                "wrench", wrench, largest=math.inf
-            )  # before it is copied, whatever its size
-        rows = np.array(wrench, order="C").reshape(
-            -1, 3
-        )  # writable, for which loops are compiled
+            # Before it is copied, whatever its size.
+            validation.finite_numbers("wrench", wrench, largest=math.inf)
+        # Writable, for which loops are compiled.
+        rows = np.array(wrench, order="C").reshape(-1, 3)
         found = np.empty_like(rows)
         angle = self._find_twists(rows, found)
         if not 0.0 <= angle <= CERTIFIED:

@@ -34,9 +34,13 @@ _CORNERS = (
 )
 """Corners of a cell that extends in no direction (a point), in one (a segment), in two."""
 
-_ENDS, _RADII = 3.3, 64
-"""Double-exponential rule over radii: it ends where a share of 3e-19 of the way is left, and has so many points between
-kinks. Error of the wrench at most 3e-13 and of its slope 3e-12 (pressures that end in a step, k > 8), else 1e-14."""
+_ENDS = 3.3
+"""End of the double-exponential rule over radii: a share of 3e-19 of the way is left.
+The error of the wrench is at most 3e-13 and that of its slope 3e-12 for pressures that
+end in a step with k > 8, else 1e-14."""
+
+_RADII = 64
+"""Number of points of that rule between kinks."""
 
 _EVEN = 1e300
 """Exponent of the profile of an even pressure: that of a soft fingertip tends to it."""

@@ -317,9 +317,8 @@ class LimitSurfaceQuartic(LimitSurface):
             size = np.linalg.norm(
                 0.25 * self._gradient(x[active]) - units[active], axis=1
             )
-            moved = size < 0.5 * np.linalg.norm(
-                slope, axis=1
-            )  # else at rounding, or far and still damped
+            # Else at rounding, or far and still damped.
+            moved = size < 0.5 * np.linalg.norm(slope, axis=1)
             active = active[moved | (size > 1e-10)]
         return x
 

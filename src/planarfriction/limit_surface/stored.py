@@ -76,9 +76,10 @@ def stored_potential(
         mixed = np.einsum(
             "pai,paij,paj->pa", across, slope.reshape(*direction.shape, 3), along
         )
+        # 0 at the axis.
         inner[1:, :, 3] = (sin_p * mixed + cos_p * h_across - tilt_slope * lean_slope)[
             1:
-        ]  # 0 at the axis
+        ]
     nodes[:, -1] = nodes[:, 0]
     return np.append(nodes, (ax, ay))
 

@@ -47,9 +47,8 @@ class DistributedModel(FrictionModel):
                 "patches of discs (dataclasses.replace(patch, radii=None) has points)",
             )
         if self.patch.asymmetric:
-            refuse_creep(
-                self.law, "patches with an asymmetry"
-            )  # at rest they would push
+            # At rest they would push.
+            refuse_creep(self.law, "patches with an asymmetry")
             refuse_rate_law(self.law, "patches with an asymmetry")
         if self.law.reference_load is not None and self.patch.depends_on_load:
             rule = "have a shape that does not depend on the load, for a law with a reference_load"

@@ -110,10 +110,11 @@ class PublishedShapes:
         self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[Any, ...]:
+        # Threads share recent shapes, copies of a model do not.
         return (
             PublishedShapes,
             self._arguments,
-        )  # threads share recent shapes, copies of a model do not
+        )
 
     def shape_at(self, load: float | None) -> PublishedShape:
         """Return the shape at a load > 0 [N]; recent loads are cached. None: any load, if it does not change it."""

@@ -40,8 +40,11 @@ SAME = 1e-9
 SLANTED = np.array([1.0, 0.5 * (1.0 + math.sqrt(5.0))])
 """Direction along which no two cells of a grid are level: sorted along it, equal patches are equal cell by cell."""
 
-STEPS, LAST_STEPS = 60, 200
-"""Steps of Lloyd's iteration while partitions are compared, and of the one that is taken."""
+STEPS = 60
+"""Steps of Lloyd's iteration while partitions are compared."""
+
+LAST_STEPS = 200
+"""Steps of Lloyd's iteration of the partition that is taken."""
 
 WORK = 3e6
 """Distances between cells and centres that are computed, about: bounds the number of seeds."""
@@ -49,8 +52,11 @@ WORK = 3e6
 MOST_SEEDS = 12
 """Seeds of one arrangement of centres on the mirrors."""
 
-NEAR_BEST, COMPARED = 1.02, 8
-"""Cost over the least, and number of partitions, up to which their friction is compared."""
+NEAR_BEST = 1.02
+"""Cost over the least up to which partitions are compared by their friction."""
+
+COMPARED = 8
+"""Largest number of partitions that are compared by their friction."""
 
 BESIDE = np.array([(0.1, 0.0), (0.0, 0.1), (0.25, 0.0), (0.0, 0.25), (0.17, 0.17)])
 """Centres of rotation beside the centre of pressure, in radii of gyration: the slope of friction at a pure spin."""
@@ -300,9 +306,8 @@ def _period(points: np.ndarray, weights: np.ndarray, squares: np.ndarray) -> _Pe
             np.abs(each[image] - each).max() <= SAME * each.max()
             for each in (weights, squares)
         )
-        known = any(
-            np.array_equal(image, other) for other in found.values()
-        )  # all points lie on an axis
+        # All points lie on an axis.
+        known = any(np.array_equal(image, other) for other in found.values())
         if alike and not known and np.abs(points[image] - points * flip).max() <= near:
             found[flip] = image
     signs = np.array(list(found))
@@ -342,9 +347,10 @@ def _arrangements(period: _Period, n: int) -> list[tuple[int, int, int, int]]:
 
 def _partitions(period: _Period, n: int) -> list[_Partition]:
     """Return the partitions into n clusters that cost little more than the best, the best first."""
+    # Compiled code, which a patch alone does not need.
     from planarfriction._engine.cells import (
         clusters,
-    )  # compiled code, which a patch alone does not need
+    )
 
     points = period.points
     weights = period.weights

@@ -15,8 +15,11 @@ from planarfriction.errors import InvalidValueError
 MOST_CELLS = 1_100_000
 """Cells of a patch, and boxes of its grid, that are taken: some 1050 x 1050, half a gigabyte while shapes are cut."""
 
-LEAST_WIDTH, MOST_WIDTH = 1e-5, 1.0
-"""Widths of a patch [m] outside of which its maker is asked whether they are in metres."""
+LEAST_WIDTH = 1e-5
+"""Width of a patch [m] below which its maker is asked if it is in metres."""
+
+MOST_WIDTH = 1.0
+"""Width of a patch [m] above which its maker is asked if it is in metres."""
 
 
 def check_cells(count: int, name: str = "cells") -> None:
@@ -85,9 +88,8 @@ class Grid(Checked):
         height = validation.positive("height", height)
         columns = validation.count("columns", columns, at_most=MOST_CELLS)
         rows = validation.count("rows", rows, at_most=MOST_CELLS)
-        check_cells(
-            columns * rows, "cells (rows x columns)"
-        )  # before the cells are too small to be any
+        # Before the cells are too small to be any.
+        check_cells(columns * rows, "cells (rows x columns)")
         return cls(
             -width / 2, -height / 2, width / columns, height / rows, columns, rows
         )

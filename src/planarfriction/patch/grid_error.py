@@ -34,10 +34,11 @@ def finer(patch: ContactPatch, parts: int, name: str = "parts") -> ContactPatch:
     ).reshape(-1, 2)
     times = len(inside)
     (width, height) = patch.cell_size or (0.0, 0.0)
+    # What each cell has is repeated.
     own = {
         "metric": (patch.metric, 2),
         "asymmetry": (patch.asymmetry, 1),
-    }  # what each cell has is repeated
+    }
     fields = {
         name: value
         if value is None or value.ndim == axes
@@ -61,9 +62,13 @@ def finer(patch: ContactPatch, parts: int, name: str = "parts") -> ContactPatch:
 NEAREST = 60
 """Largest number of cells, those nearest to the centre of pressure, beside which the centre of rotation is placed."""
 
-BESIDE, BESIDE_DISCS = (0.01,), (0.01, 0.2, 0.35, 0.5)
-"""Distances of the centre of rotation from the middle of a cell, in cells: a point there pulls with all its load, while
-its continuous friction nearly cancels; a disc differs most at its rim."""
+BESIDE = (0.01,)
+"""Distance of the centre of rotation from the middle of a cell, in cells: a point there
+pulls with all its load, while its continuous friction nearly cancels."""
+
+BESIDE_DISCS = (0.01, 0.2, 0.35, 0.5)
+"""Distances of the centre of rotation from the middle of a disc, in cells: a disc
+differs most at its rim."""
 
 FINER = 3
 """Refinement by which a pressure that is given by a law, and not cell by cell, is taken to be continuous."""

@@ -30,8 +30,11 @@ from planarfriction.reading import number, read_bytes, read_rows, read_text, wid
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
 """Suffixes of the files that are read as grey images."""
 
-MOST_BYTES, MOST_VALUES = 256_000_000, 32_000_000
-"""Largest file of a map that is read [bytes], and largest number of pressures in all of its frames."""
+MOST_BYTES = 256_000_000
+"""Largest file of a map that is read [bytes]."""
+
+MOST_VALUES = 32_000_000
+"""Largest number of pressures in all frames of a map."""
 
 GREY_MODES = ("1", "L", "I", "F", "I;16", "I;16B", "I;16L", "I;16N")
 """Pillow's names for images with one channel of numbers."""
@@ -40,9 +43,14 @@ RINGING = 0.1
 """Share of the peak below which cells of a JPEG count as empty: its compression leaves up to 12 % beside an edge at the
 usual quality of 75 (1308 cells above it where 1288 were drawn, 1684 above 0)."""
 
-BRIGHT, PAPER, INK = 0.75, 0.9, 0.5
-"""Brightness over the largest from which a pixel may be paper, share of such pixels along the rim of an image from
-which it may be a print, and brightness below which a pixel inside is ink."""
+BRIGHT = 0.75
+"""Brightness over the largest from which a pixel may be paper."""
+
+PAPER = 0.9
+"""Share of such pixels along the rim of an image from which it may be a print."""
+
+INK = 0.5
+"""Brightness below which a pixel inside is ink."""
 
 ARRAYS = (".npy", ".npz", ".mat")
 """Suffixes of the files of arrays."""
@@ -399,9 +407,8 @@ def _read_npy(path: Path, _: MapReading) -> np.ndarray:
 
 def _array(path: Path, content: bytes) -> np.ndarray:
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "error"
-        )  # of a damaged header, which NumPy reads as source code
+        # Of a damaged header, which NumPy reads as source code.
+        warnings.simplefilter("error")
         try:
             values = np.load(io.BytesIO(content), allow_pickle=False)
         except Warning as warning:

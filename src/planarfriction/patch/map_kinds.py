@@ -25,8 +25,11 @@ FEWEST_PLACES = 6
 LOADED = 0.3
 """Share of the largest sum of a row from which the row is compared with the others: noise changes smaller ones."""
 
-FEWEST_FRAMES, MOST_FRAMES = 8, 64
-"""Number of loaded rows from which they may be frames, and number of them that are compared."""
+FEWEST_FRAMES = 8
+"""Number of loaded rows from which they may be frames."""
+
+MOST_FRAMES = 64
+"""Number of rows that are compared."""
 
 ALIKE = 0.03
 """Second singular value of rows over their first up to which they are one pattern: frames of one pad with a noise of
@@ -35,8 +38,11 @@ ALIKE = 0.03
 HUMPS = 3
 """Number of peaks along a row, each next to values below half of the largest, from which it may be several rows."""
 
-FLAT, RIM = 0.1, 0.9
-"""Share of the pressure above the rim within which a rim is flat, and share of its cells that must be."""
+FLAT = 0.1
+"""Share of the pressure above the rim within which a rim is flat."""
+
+RIM = 0.9
+"""Share of the cells of a rim that must be flat."""
 
 FEWEST_RIM = 5
 """Rows and columns from which a map has an inside and a rim."""

@@ -25,9 +25,8 @@ def disc_friction(slide: Any, spin: Any) -> tuple[np.ndarray, np.ndarray, np.nda
     Friction is `W/S`, `W = (c_t u, c_s kappa a omega)` (see `formulas.disc_friction`).
     """
     total = np.asarray(slide + spin)
-    per = np.divide(
-        1.0, total, out=np.zeros_like(total), where=total > 0.0
-    )  # shares of the sum keep in range
+    # Shares of the sum keep in range.
+    per = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
     c_t, c_s, m = formulas.disc_friction(np, slide * per, spin * per)
     return c_t, c_s, np.sqrt(slide + m * spin)
 

@@ -60,9 +60,8 @@ class PressureMaps(ByValue, Pressure):
     @functools.cached_property
     def _shares(self) -> np.ndarray:
         """Share of each cell in the total of its map, `[L, N]`."""
-        shares = self.values / self.values.max(
-            axis=1, keepdims=True
-        )  # first, so that no sum can overflow
+        # First, so that no sum can overflow.
+        shares = self.values / self.values.max(axis=1, keepdims=True)
         return shares / shares.sum(axis=1, keepdims=True)
 
     @property

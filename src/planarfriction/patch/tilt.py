@@ -22,9 +22,10 @@ def moments_of(value: Any) -> np.ndarray:
 
 def centre_of(moments: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
+    # Compiled code, which a patch alone does not need.
     from planarfriction._engine.cells.tilt import (
         REACH,
-    )  # compiled code, which a patch alone does not need
+    )
 
     loaded = load > 0.0
     with np.errstate(over="ignore"):

@@ -17,8 +17,14 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.limit_surface import LimitSurface
 
-STICK, LEFT, RIGHT = "stick", "slide left", "slide right"
-"""Mode of a pusher that pushes; left and right are seen along its direction."""
+STICK = "stick"
+"""Mode of a pusher that pushes without sliding."""
+
+LEFT = "slide left"
+"""Mode of a pusher that slides to the left, seen along its direction."""
+
+RIGHT = "slide right"
+"""Mode of a pusher that slides to the right, seen along its direction."""
 
 _BEYOND = 0.1
 """Angle beyond the friction cone [rad] at which a sticking force is still sought: steps may pass the end of a mode."""

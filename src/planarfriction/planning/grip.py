@@ -37,12 +37,17 @@ KICK = 0.7
 SPANS = (0.75, 0.2)
 """Shares of the duration over which knots are spread: a short drop needs them close, a slow turn far apart."""
 
-ROUNDS, TRIES = 2, 16
-"""Rounds in which the worst friction gets more weight, and profiles that are tried for one friction; for several half
-as many in each round."""
+ROUNDS = 2
+"""Rounds in which the worst friction gets more weight."""
 
-NEAR, GAIN = 1e-3, 1e-3
-"""Share of the goal by which a profile to start from may miss it, and of the cost that a further step must save."""
+TRIES = 16
+"""Profiles that are tried for one friction; for several, half as many in each round."""
+
+NEAR = 1e-3
+"""Share of the goal by which a profile to start from may miss it."""
+
+GAIN = 1e-3
+"""Share of the cost that a further step must save."""
 
 MOST_KNOTS = 200
 

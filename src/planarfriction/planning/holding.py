@@ -20,8 +20,11 @@ from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
 from planarfriction.scenes.contact import checked_model
 
-_STEP, _STEPS = 1.25, 120
-"""Factor between the loads that are tried on a patch that follows its load, and how many of them."""
+_STEP = 1.25
+"""Factor between the loads that are tried on a patch that follows its load."""
+
+_STEPS = 120
+"""Number of such loads."""
 
 GRAVITY = 9.81
 """Gravity [m/s^2] by which a load becomes the mass that is assumed to hang on it."""
@@ -32,11 +35,18 @@ FALL = 1.5
 SLIP = 1e-5
 """Displacement [m] beyond that of bristles bent to their end from which on a contact has slipped."""
 
-BEFORE, AFTER = 0.02, 0.5
-"""Times before and after a fall [s]: a load that exceeds friction by 0.1 % moves its own mass by 1 mm in the latter."""
+BEFORE = 0.02
+"""Time before a fall [s]."""
 
-FIRST_STEP, CLOSE = 0.02, 1e-3
-"""First step and last interval of the search, as shares of the `holding_load` [-]."""
+AFTER = 0.5
+"""Time after a fall [s]: a load that exceeds friction by 0.1 % moves its own mass by 1
+mm in it."""
+
+FIRST_STEP = 0.02
+"""First step of the search, as a share of the `holding_load` [-]."""
+
+CLOSE = 1e-3
+"""Last interval of the search, as a share of the `holding_load` [-]."""
 
 WIDEST = 4.0
 """Factor by which the result may differ from the `holding_load` either way; the search gives up there [-]."""
@@ -74,9 +84,8 @@ def holding_load(
         if patch.root is None
         else float(np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max())
     )
-    strongest = metric * (
-        1.0 + float(np.hypot(*patch.asymmetries().T).max())
-    )  # bounds friction over mu
+    # Bounds friction over mu.
+    strongest = metric * (1.0 + float(np.hypot(*patch.asymmetries().T).max()))
     low = max(float(np.hypot(*load[:2])), abs(float(load[2])) / reach) / (
         mu * strongest
     )
@@ -113,9 +122,8 @@ def _needed(
 @functools.lru_cache(maxsize=8)
 def _surface(patch: ContactPatch, normal_force: float | None) -> LimitSurface:
     """Return the limit surface of a patch, whose table for twists is dear: a plan asks several times."""
-    few = (
-        patch.has_discs and not patch.cell_extents().any()
-    )  # these pull as they do in models
+    # These pull as they do in models.
+    few = patch.has_discs and not patch.cell_extents().any()
     cells = few or (patch.root is not None and patch.root.ndim == 3)
     kind: type[LimitSurface] = LimitSurfaceCells if cells else LimitSurfaceExact
     return kind(patch, normal_force=normal_force)
@@ -159,9 +167,8 @@ def dynamic_holding_load(
     slow = holding_load(load, model.patch, model.law.numbers.mu_s)
     if slow == 0.0:
         return 0.0
-    radius = max(
-        float(model.patch.contact_radius(slow)), SLIP
-    )  # soft fingers shrink to a point
+    # Soft fingers shrink to a point.
+    radius = max(float(model.patch.contact_radius(slow)), SLIP)
     if mass is None:
         mass = float(np.linalg.norm(load / [1.0, 1.0, radius])) / GRAVITY
     mass = validation.positive("mass", mass)

@@ -20,12 +20,24 @@ from planarfriction.scenes.body import pull_on
 from planarfriction.scenes.contact import with_friction
 from planarfriction.scenes.start import contact_map
 
-TIGHT, LOOSE = 1e-5, 1e-4
-"""Relative tolerances of the motions that are planned with; of those of derivatives, and to start from [-]."""
+TIGHT = 1e-5
+"""Relative tolerance of the motions that are planned with [-]."""
 
-ANGLE, SHIFT, SPEED, TURN = 3e-4, 3e-3, 1e-3, 1e-3
-"""Units of the residuals in the sum of squares: of the goal 0.03 % of an angle and 0.1 % of a slide; of the contact
-radius 0.3 % of slide where the goal is an angle; 1 mm/s at the end; a turn of 1 mrad where the goal is a slide."""
+LOOSE = 1e-4
+"""Relative tolerance of derivatives and of motions to start from [-]."""
+
+ANGLE = 3e-4
+"""Unit of the residual of a goal that is an angle: 0.03 % of it, and 0.1 % of a
+slide."""
+
+SHIFT = 3e-3
+"""Unit of the residual of a slide where the goal is an angle, in contact radii."""
+
+SPEED = 1e-3
+"""Unit of the residual of the speed at the end [m/s]."""
+
+TURN = 1e-3
+"""Unit of the residual of a turn where the goal is a slide [rad]."""
 
 ROUGH = 0.08
 """Weight of a bend of the profile by the holding load [-]: it chooses among profiles that do the same."""

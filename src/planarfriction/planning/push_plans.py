@@ -32,9 +32,12 @@ PLACES = ((0.5,), (0.35, 0.65))
 CHORDS = 40
 """Lines that the arc of the pusher in one part is made of."""
 
-NODES, ROUNDS = 65, 2
-"""Forces whose twists are joined by a spline for the search, and times that a plan aims beside the goal by what the
-spline and its lines have missed."""
+NODES = 65
+"""Forces whose twists are joined by a spline for the search."""
+
+ROUNDS = 2
+"""Times that a plan aims beside the goal by what the spline and its lines have
+missed."""
 
 _TURNS = ((-0.7, 0.0, 0.7), (0.7, 0.0, -0.7), (0.7, 0.0, 0.7), (-0.7, 0.0, -0.7))
 """Forces that a search begins with, as shares of the angle that they may have."""

@@ -36,12 +36,18 @@ from planarfriction.scenes.signal import as_signal
 FREE = "free"
 """The mode of a pusher that does not touch, or that goes away."""
 
-MOST_SAMPLES, MOST_PHASES = 100_000, 2_000
-"""Largest numbers of instants that are recorded, and of changes of mode that are followed."""
+MOST_SAMPLES = 100_000
+"""Largest number of instants that are recorded."""
 
-RESTLESS, STILL = 4, 1e-6
-"""Changes of mode in a row, each within a share of the whole time, after which events no longer separate the modes: on
-a facet of a limit surface a push may stay at the edge of its motion cone."""
+MOST_PHASES = 2_000
+"""Largest number of changes of mode that are followed."""
+
+RESTLESS = 4
+"""Quick changes of mode in a row after which events no longer separate the modes: on a
+facet of a limit surface a push may stay at the edge of its motion cone."""
+
+STILL = 1e-6
+"""Share of the whole time within which a change of mode is quick."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

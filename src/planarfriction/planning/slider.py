@@ -101,7 +101,9 @@ class Pusher(Checked):
         return np.array([[0.0, -half], [0.0, half]]) if half > 0.0 else np.zeros((1, 2))
 
 
-END, CORNER, FACE = "end", "corner", "face"
+END = "end"
+CORNER = "corner"
+FACE = "face"
 
 _LEAST = 1e-4
 """Least displacement between two looks at a free pusher, as a share of the slider's size: it may miss a graze."""

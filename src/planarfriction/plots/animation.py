@@ -24,8 +24,14 @@ from planarfriction.plots.track import Track, track_of
 from planarfriction.shown import unit_for
 from planarfriction.writing import replacing
 
-LEAST_FRAMES, USUAL_FRAMES, MOST_FRAMES = 75, 300, 3000
-"""Frames that a picture has at least, and at most, where nothing is asked for; most that it can have."""
+LEAST_FRAMES = 75
+"""Frames that a picture has at least where nothing is asked for."""
+
+USUAL_FRAMES = 300
+"""Frames that a picture has at most where nothing is asked for."""
+
+MOST_FRAMES = 3000
+"""Frames that a picture can have at most."""
 
 FASTEST = 50.0
 """Most frames a second: browsers show faster GIFs ten times too slow."""
@@ -135,14 +141,20 @@ def _round_up(value: float) -> float:
     )
 
 
-WIDTH, HEIGHT = 9.6, 5.4
-"""Size of a frame [inch]."""
+WIDTH = 9.6
+"""Width of a frame [inch]."""
+
+HEIGHT = 5.4
+"""Height of a frame [inch]."""
 
 MOST_PANELS = 3
 """Contacts that have panels of their own beside the motion: those that are pressed hardest."""
 
-VIEW, ROAM = 2.3, 1.5
-"""Side of a view that follows the body, in its largest radius [-]; how many such views the motion fills before one."""
+VIEW = 2.3
+"""Side of a view that follows the body, in its largest radius [-]."""
+
+ROAM = 1.5
+"""Number of such views that a motion fills before there is one [-]."""
 
 ARROW = 0.3
 """Length of the longest of a force, as a share of the view [-]."""
@@ -188,9 +200,8 @@ class Film:
         far = float(np.abs(self.views).max())
         side = float(np.diff(self.views[0], axis=-1).max())
         style.show_lengths(self.axes, 1e-3 * max(0.1 * far, side))
-        self.axes.yaxis.set_label_coords(
-            0.022, 0.5, transform=self.figure.transFigure
-        )  # clear of any tick label
+        # Clear of any tick label.
+        self.axes.yaxis.set_label_coords(0.022, 0.5, transform=self.figure.transFigure)
         self.axes.locator_params(nbins=7)
         style.tidy(self.axes)
         self._legend()
@@ -325,9 +336,10 @@ class Film:
             ("turned by", "angle", 2),
         ):
             unit = unit_for(kind, moved[:, column])
+            # No -0.00.
             parts.append(
                 f"{words} {round(unit.factor * moved[frame, column], 2) + 0.0:.2f} {unit.label}"
-            )  # no -0.00
+            )
         return ", ".join(parts)
 
 
@@ -386,9 +398,8 @@ def _views(solution: pf.Solution, track: Track, follow: bool) -> np.ndarray:
             1e3 * np.stack([low, high], -1), (len(track.times), 2, 2)
         )
     half = np.minimum(0.5 * side, 0.5 * (high - low).max())
-    room = np.maximum(
-        0.5 * (high - low) - half, 0.0
-    )  # how far the middle may go from that of the whole
+    # How far the middle may go from that of the whole.
+    room = np.maximum(0.5 * (high - low) - half, 0.0)
     whole = 0.5 * (low + high)
     middle = np.clip(track.poses[:, :2], whole - room, whole + room)
     return 1e3 * np.stack([middle - half, middle + half], -1)

@@ -108,9 +108,8 @@ def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
     colours, counts = np.unique(
         pixels @ np.array([1 << 16, 1 << 8, 1]), return_counts=True
     )
-    often = np.repeat(
-        colours, np.ceil(np.sqrt(counts)).astype(int)
-    )  # what is rare has its colours too
+    # What is rare has its colours too.
+    often = np.repeat(colours, np.ceil(np.sqrt(counts)).astype(int))
     sheet = Image.fromarray(_colours(often)[None])
     found = sheet.quantize(
         256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
@@ -142,9 +141,8 @@ def _write_gif(
     from PIL import Image
 
     palette = _palette(frame, count)
-    ends = np.round(
-        100.0 * np.arange(1, count + 1) / fps
-    )  # GIF counts hundredths of a second
+    # GIF counts hundredths of a second.
+    ends = np.round(100.0 * np.arange(1, count + 1) / fps)
     durations = 10.0 * np.diff(ends, prepend=0.0)
     durations[-1] += 1e3 * LAST
     pictures = (Image.fromarray(frame(number)) for number in range(count))
@@ -189,9 +187,8 @@ class _Shown(Figure):
 def _writing(path: Path, drawn: Path, figure: Any, fps: Any) -> Iterator[Any]:
     from matplotlib.animation import FFMpegWriter, HTMLWriter
 
-    settings: Any = {
-        "animation.embed_limit": 4096.0
-    }  # [MB]: all frames, for whoever asks for them
+    # [MB]: all frames, for whoever asks for them.
+    settings: Any = {"animation.embed_limit": 4096.0}
     if drawn.suffix == ".mp4":
         settings["animation.ffmpeg_path"] = _ffmpeg(path)
         writer: Any = FFMpegWriter(

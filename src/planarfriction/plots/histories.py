@@ -27,16 +27,25 @@ KICK = 5.0
 NAMED = 6
 """Runs that the legend names where there are more than colours."""
 
-LONGEST, LETTER, HANDLE = 60, 6.6, 48.0
-"""Letters in a line of the legend; width of a letter of 10 pt, and of a line with its gaps [pt]."""
+LONGEST = 60
+"""Letters in a line of the legend."""
+
+LETTER = 6.6
+"""Width of a letter of 10 pt [pt]."""
+
+HANDLE = 48.0
+"""Width of a line of the legend with its gaps [pt]."""
 
 
 TITLES = "body: position, angle, speed", "contacts: friction on the body, normal force"
 """Titles of the columns of all panels; short ones end before the colon."""
 
-LOW, NARROW = 1.0, 6.0
-"""Height of a panel, with its share of all that is around it, below which labels have two lines, and width of a figure
-below which titles are short [inch]."""
+LOW = 1.0
+"""Height of a panel, with its share of all that is around it, below which labels have
+two lines [inch]."""
+
+NARROW = 6.0
+"""Width of a figure below which titles are short [inch]."""
 
 
 class _Panel(NamedTuple):

@@ -13,8 +13,12 @@ from planarfriction.errors import needing
 from planarfriction.families import SURFACES
 from planarfriction.plots import style
 
-POLAR_SEGMENTS, AZIMUTH_SEGMENTS = 90, 180
-"""Mesh of the direction sphere: fine enough that the facets of a 21 x 21 patch look as they are."""
+POLAR_SEGMENTS = 90
+"""Mesh of the direction sphere from pole to pole: fine enough that the facets of a 21 x
+21 patch look as they are."""
+
+AZIMUTH_SEGMENTS = 180
+"""Mesh of the direction sphere, around."""
 
 _AXES = ("fx [-]", "fy [-]", "τ/r [-]")
 

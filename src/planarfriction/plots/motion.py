@@ -26,14 +26,20 @@ INSTANTS = 12
 PAD_OPACITY = 0.35
 """Opacity of contact patches, so that those of a strobe show through each other."""
 
-TINY, SEEN = 25.0, 0.08
-"""Ratio of a side of the view to the body beyond which the body is drawn larger, and its share of the side then [-]."""
+TINY = 25.0
+"""Ratio of a side of the view to the body beyond which the body is drawn larger [-]."""
+
+SEEN = 0.08
+"""Share of the side of the view that such a body is drawn with [-]."""
 
 UNSEEN = 0.01
 """Share of the size of the body by which it has to move for that to be seen [-]."""
 
-ROUND, CORNERS = 0.02, 12
-"""Share by which the radii of a round outline differ at most [-]; corners that it has at least."""
+ROUND = 0.02
+"""Share by which the radii of a round outline differ at most [-]."""
+
+CORNERS = 12
+"""Corners that a round outline has at least."""
 
 
 def plot_motion(

@@ -21,14 +21,23 @@ from planarfriction.plots.limit_surface import draw_surface, scaled_samples
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import ContactTrack
 
-STICK, SLIP, PLAIN = "#0072B2", "#E66100", "#9AA5B1"
-"""Colours of what sticks (from pale to this as its bristles bend), of what slips, and of what is not known."""
+STICK = "#0072B2"
+"""Colour of what sticks, which pales towards it as its bristles bend."""
+
+SLIP = "#E66100"
+"""Colour of what slips."""
+
+PLAIN = "#9AA5B1"
+"""Colour of what is not known."""
 
 LOAD_STEP = 1.15
 """A patch that follows the load has its limit surface drawn at loads that differ by this factor."""
 
-POLAR, AZIMUTH = 36, 72
-"""Mesh of the limit surface."""
+POLAR = 36
+"""Mesh of the limit surface from pole to pole."""
+
+AZIMUTH = 72
+"""Mesh of the limit surface, around."""
 
 FARTHEST = 1.6
 """Largest force of the limit surface's axes, of mu_c f_N [-]; what is beyond is drawn outside."""
@@ -39,8 +48,11 @@ TAIL = 25
 LONGEST = 24
 """Letters of the name of a contact."""
 
-STILL, ARM = 1e-3, 1e-2
-"""Share of the largest speed below which a body stands, and turns about no point [-]; lever of its spin in it [m]."""
+STILL = 1e-3
+"""Share of the largest speed below which a body stands and turns about no point [-]."""
+
+ARM = 1e-2
+"""Lever of the spin of a body in its speed [m]."""
 
 _PALE = LinearSegmentedColormap.from_list("stick", ["#EAF1F7", STICK])(
     np.linspace(0.0, 1.0, 230)
@@ -66,9 +78,10 @@ def cell_polygons(patch: Any) -> np.ndarray:
 def cells_of(track: ContactTrack, *, edge: str) -> PolyCollection:
     """Return the cells of a contact [mm], to be coloured frame by frame; `edge` is the colour of their edges."""
     boxes = list(1e3 * cell_polygons(track.contact.model.patch))
+    # Seams would show.
     cells = PolyCollection(
         boxes, edgecolor=edge, linewidth=0.3, antialiased=edge != "face"
-    )  # seams would show
+    )
     if track.slip is not None:
         cells.set(cmap=CELLS, clim=(0.0, 1.0))
     return cells
@@ -180,9 +193,8 @@ class SurfacePanel:
             for level, (directions, mesh) in meshes.items()
         }
         axes.tick_params(labelsize="x-small", pad=-2)
-        axes.set(
-            xticks=[-0.5, 0.0, 0.5], yticks=[-0.5, 0.0, 0.5]
-        )  # those at the corner would meet
+        # Those at the corner would meet.
+        axes.set(xticks=[-0.5, 0.0, 0.5], yticks=[-0.5, 0.0, 0.5])
         if beside:
             axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.85 if beside == 1 else 0.72)
             for axis in (axes.xaxis, axes.yaxis, axes.zaxis):  # no room for numbers
@@ -209,9 +221,8 @@ class SurfacePanel:
         )
         for artist in self.artists():
             artist.set_animated(True)
-            artist.set_clip_box(
-                axes.bbox
-            )  # viscous friction may be many times mu_c f_N
+            # Viscous friction may be many times mu_c f_N.
+            artist.set_clip_box(axes.bbox)
             artist.set_clip_on(True)
 
     def artists(self) -> list[Artist]:

@@ -198,7 +198,6 @@ def _title(
     if normal_force is not None:
         force = unit_for("force", normal_force)
         parts.append(f"load {force.factor * normal_force:.6g} {force.label}")
-    whole = [
-        part.replace(" ", "\N{NO-BREAK SPACE}") for part in parts[1:]
-    ]  # a number keeps its unit
+    # A number keeps its unit.
+    whole = [part.replace(" ", "\N{NO-BREAK SPACE}") for part in parts[1:]]
     return style.wrapped(", ".join(parts[:1] + whole), width)

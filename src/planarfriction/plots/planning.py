@@ -49,9 +49,8 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
         slide_of(plan.scene, each.contact_index(plan.contact), body_poses(each))
         for each in solutions
     ]
-    slides = [
-        np.hypot(*each.T) for each in place
-    ]  # of the place that was under the grip
+    # Of the place that was under the grip.
+    slides = [np.hypot(*each.T) for each in place]
     angles = [
         np.asarray(each.histories["theta"].values) - plan.scene.body.angle
         for each in solutions

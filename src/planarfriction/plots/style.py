@@ -22,9 +22,26 @@ from planarfriction.shown import unit_for
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""
 
-DISTRIBUTED, PUBLISHED, ELLIPSOID, OTHER, FEW, SECOND, EXACT = PALETTE
-"""Colours in every figure: sums over cells and their model, the published table and its model, the ellipsoid and its
-model, something else, `ReducedModel` with few discs, a second thing else, what is exact."""
+DISTRIBUTED = PALETTE[0]
+"""Colour in every figure of sums over cells and of their model."""
+
+PUBLISHED = PALETTE[1]
+"""Colour in every figure of the published table and of its model."""
+
+ELLIPSOID = PALETTE[2]
+"""Colour in every figure of the ellipsoid and of its model."""
+
+OTHER = PALETTE[3]
+"""Colour in every figure of something else."""
+
+FEW = PALETTE[4]
+"""Colour in every figure of `ReducedModel` with few discs."""
+
+SECOND = PALETTE[5]
+"""Colour in every figure of a second thing else."""
+
+EXACT = PALETTE[6]
+"""Colour in every figure of what is exact."""
 
 MEASURED = "0.6"
 """Colour of what was measured, drawn as a broad line below the rest."""

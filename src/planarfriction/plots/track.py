@@ -154,9 +154,8 @@ def _displacements(
     moved = geometry.twist_at(
         body, middle[:, :2] - 0.5 * (poses[1:, :2] + poses[:-1, :2])
     )
-    ground = np.diff(
-        _carried(contact, times), axis=0
-    )  # of a pad at its frame, of the ground at the world's origin
+    # Of a pad at its frame, of the ground at the world's origin.
+    ground = np.diff(_carried(contact, times), axis=0)
     moved = moved - (
         geometry.twist_at(ground, middle[:, :2])
         if contact.mounted_on == "body"

@@ -385,9 +385,8 @@ class SegmentBatches:
                 rows.append(np.zeros(len(pieces), np.int64))
                 continue
             held = self._pieces.held(c, pieces[:count])
-            loads, row = _in_order(
-                np.where(held > 0.0, held, between[0])
-            )  # any, where there is no load
+            # Any, where there is no load.
+            loads, row = _in_order(np.where(held > 0.0, held, between[0]))
             between = between if self._most < MOST_PIECES else None
             self.models.append(packed_contact(contact, loads, between, outline))
             rows.append(row)
@@ -395,9 +394,8 @@ class SegmentBatches:
             count = count if packed == len(loads) else int(np.argmax(row == packed))
         first = _starts([len(model.records) for model in self.models])
         self._done += count
-        self._ahead = min(
-            self._most, 2 * count
-        )  # one contact does not pack much more than another has room for
+        # One contact does not pack much more than another has room for.
+        self._ahead = min(self._most, 2 * count)
         addresses = [places_of(model.records) for model in self.models]
         row = np.stack([row[:count] for row in rows], axis=1) + first[:-1]
         return np.concatenate(addresses), row, pieces[:count]

@@ -137,9 +137,8 @@ def drift(
         )
     around = 2.0 * np.pi * np.arange(64) / 64
     outline = 0.05 * np.stack([np.cos(around), np.sin(around)], axis=1)
-    body = Body(
-        1.0, 1.25e-3, gravity=(0.0, 0.0), outline=outline
-    )  # inertia of a disc, m R^2 / 2
+    # Inertia of a disc, m R^2 / 2.
+    body = Body(1.0, 1.25e-3, gravity=(0.0, 0.0), outline=outline)
     contact = Contact(model, normal_force, name="table")
     return Scene(
         body,
@@ -235,9 +234,8 @@ def driven(
             model.patch.centre_of_pressure(float(contact.normal_force(0.0)))
         )
         contact = dataclasses.replace(contact, position=-centre)
-    body = Body(
-        1.0, 1.0, gravity=(0.0, 0.0)
-    )  # moved as prescribed: mass and inertia play no part
+    # Moved as prescribed: mass and inertia play no part.
+    body = Body(1.0, 1.0, gravity=(0.0, 0.0))
     velocity = published_velocity() if twist is None else as_signal("twist", twist, 3)
     return Scene(body, [contact], t_end, velocity=velocity, **FINE, name="driven")
 

@@ -30,9 +30,13 @@ from planarfriction.scenes.signal import (
 STARTS = ("rest", "equilibrium", "sliding")
 """Ways in which bristles may start."""
 
-RTOL, ATOL = 1e-5, 2e-4
-"""Default tolerances: with 0.5 to 1.5 times these, the published in-hand runs of all models end within 2e-6 m and
-2e-5 rad of the same model's run at a relative tolerance of 1e-9."""
+RTOL = 1e-5
+"""Default relative tolerance: with 0.5 to 1.5 times this and `ATOL`, the published in-
+hand runs of all models end within 2e-6 m and 2e-5 rad of the same model's run at a
+relative tolerance of 1e-9."""
+
+ATOL = 2e-4
+"""Default tolerance in natural scales."""
 
 
 def _listed(name: str, value: Any, kind: type) -> tuple[Any, ...]:

@@ -38,9 +38,8 @@ def breaks_between(times: np.ndarray, t_end: float) -> np.ndarray:
 
 def sample_count(span: float, step: float, name: str) -> int:
     """Return the number of steps of `step` [s] in `span` [s]; raise if they would need too much memory."""
-    count = (
-        span / step * (1.0 + 1e-12)
-    )  # so that the end itself is kept in spite of rounding
+    # So that the end itself is kept in spite of rounding.
+    count = span / step * (1.0 + 1e-12)
     if count > MOST_SAMPLES:
         rule = f"be at least {span / MOST_SAMPLES:.3g} s (at most {MOST_SAMPLES} samples up to t_end, {span:g} s)"
         raise InvalidValueError(name, rule, step)
@@ -51,9 +50,8 @@ def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
     """Return the times `i * dt` [s] from 0 to the last one not after `t_end`; no rounding accumulates."""
     t_end = validation.non_negative("t_end", t_end)
     dt = validation.positive("dt", dt)
-    return (
-        np.arange(sample_count(t_end + 1e-9 * dt, dt, "dt") + 1) * dt
-    )  # 1e-9 keeps t_end itself despite rounding
+    # 1e-9 keeps t_end itself despite rounding.
+    return np.arange(sample_count(t_end + 1e-9 * dt, dt, "dt") + 1) * dt
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -340,9 +338,8 @@ def as_signal(name: str, value: Any, columns: int | None) -> Signal:
         raise InvalidValueError(
             name, wanted, f"a Signal of {given}" if signal is value else value
         )
-    validation.finite_numbers(
-        name, signal.values
-    )  # alone it may have any, in a scene it moves something
+    # Alone it may have any, in a scene it moves something.
+    validation.finite_numbers(name, signal.values)
     return signal
 
 

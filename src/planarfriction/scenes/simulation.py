@@ -22,10 +22,8 @@ BRISTLES = ("none", "all")
 MOST_NUMBERS = 10**9
 """Numbers of bristles that a run records at most: 8 GB."""
 
-_BODY, _CONTACT = (
-    ("vx", "vy", "omega", "x", "y", "theta"),
-    ("fx", "fy", "tau", "normal_force"),
-)
+_BODY = ("vx", "vy", "omega", "x", "y", "theta")
+_CONTACT = ("fx", "fy", "tau", "normal_force")
 
 _QUANTITIES = {
     "time": ("s", "time"),
@@ -182,9 +180,8 @@ def _histories(
             if cells is not None:
                 size = contact.model.state_shape[0]
                 full = np.zeros((len(part), size, len(cells)))
-                bent = part[
-                    :, : size * cells.sum()
-                ]  # without the place of the pressure
+                # Without the place of the pressure.
+                bent = part[:, : size * cells.sum()]
                 full[:, :, cells] = bent.reshape(len(part), size, -1)
                 axis = "axis" if size == 2 else "component"
                 histories[name] = History(

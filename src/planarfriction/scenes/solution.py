@@ -381,9 +381,8 @@ def _read(path: str | Path) -> Solution:
             f"{path}: the scene in this file cannot be read: {_one_line(error)}"
         ) from None
     solution = Solution(data, statistics, meta["status"], meta["message"], scene)
-    solution.data.attrs.update(
-        data.attrs
-    )  # as they were, with notes that someone added before it was saved
+    # As they were, with notes that someone added before it was saved.
+    solution.data.attrs.update(data.attrs)
     return solution
 
 

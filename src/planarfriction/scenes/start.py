@@ -52,9 +52,8 @@ def first_slopes(
     motion = _least_energy(cells, pull)
     bent, slope = cells.bent(motion)
     share = np.repeat(d_loads / np.where(loads == 0.0, 1.0, loads), sizes, axis=1)
-    longer = bent - np.einsum(
-        "nij,nj->ni", slope, cells.levers @ motion
-    )  # limits of a fixed stiffness grow with loads
+    # Limits of a fixed stiffness grow with loads.
+    longer = bent - np.einsum("nij,nj->ni", slope, cells.levers @ motion)
     fixed = cells.fixed[:, None]
     held = np.einsum(
         "kn,n,nij,ni->kj",
@@ -215,9 +214,10 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
     patch = model.patch
     law = model.law.numbers
     levers = patch.levers() @ contact_map(scene, contact)
+    # Points do not spin.
     levers = np.concatenate(
         [levers, np.zeros((len(levers), 3 - levers.shape[1], 3))], axis=1
-    )  # points do not spin
+    )
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
     sigma_0 = law.sigma_0 * float(model.law.stiffness_factor(load))
     largest = float(formulas.stribeck(np, np.zeros(()), law)) / sigma_0
@@ -236,9 +236,8 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
 def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:
     """Return the motion `[3]` after which bristles carry a load `[3]`; raises where none does."""
     elastic = np.einsum("n,nia,nib->ab", cells.stiffness, cells.levers, cells.levers)
-    carries = (
-        np.diagonal(elastic) > np.finfo(float).tiny
-    )  # stiffness of smaller loads has too few digits to divide by
+    # Stiffness of smaller loads has too few digits to divide by.
+    carries = np.diagonal(elastic) > np.finfo(float).tiny
     scale = 1.0 / np.sqrt(np.where(carries, np.diagonal(elastic), 1.0))
     scaled = np.where(np.outer(carries, carries), elastic, 0.0) * np.outer(scale, scale)
     motion = scale * np.linalg.lstsq(scaled, scale * pull, rcond=1e-14)[0]

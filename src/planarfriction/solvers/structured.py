@@ -144,9 +144,8 @@ def integrate(
                 first = kernels.Run(
                     system, method, output, start_of(state), rtol=rtol, atol=atol
                 )
-                kernels.advance(
-                    first.address, 0
-                )  # compiles, or loads from the cache, and takes no step
+                # Compiles, or loads from the cache, and takes no step.
+                kernels.advance(first.address, 0)
                 compile_time = time.perf_counter() - begin
                 _loaded.add(kernels.advance)
             run = kernels.Run(system, method, output, at, rtol=rtol, atol=atol)

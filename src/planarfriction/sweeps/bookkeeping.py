@@ -35,8 +35,11 @@ OWN = {
 }
 """Variables of every sweep, with their descriptions."""
 
-BETWEEN, SHARE = 0.5, 0.02
-"""Time between two files of runs: some seconds [s], and a share of the time since the sweep began."""
+BETWEEN = 0.5
+"""Least time between two files of runs [s]."""
+
+SHARE = 0.02
+"""Time between two files of runs as a share of the time since the sweep began."""
 
 Index = tuple[int, ...]
 """Place of a run in the grid."""
@@ -212,10 +215,11 @@ class Bookkeeper:
             ):
                 arrays[name] = array = array.astype(np.result_type(array, values))
             array[index] = values
+        # They are in the arrays now.
         self.runs[index] = (
             key,
             record._replace(variables={}),
-        )  # they are in the arrays now
+        )
 
 
 def _name(content: bytes) -> str:

@@ -43,9 +43,13 @@ if TYPE_CHECKING:
 _BETWEEN = 0.5
 """Time between two reports of progress [s]."""
 
-_AHEAD, _WORKERS = 2, 64
-"""Number of batches of runs that wait for each worker of an executor, so that none is idle and little memory is used,
-and number of workers of an executor that does not tell it: each gets one run until the first has ended."""
+_AHEAD = 2
+"""Number of batches of runs that wait for each worker of an executor, so that none is
+idle and little memory is used."""
+
+_WORKERS = 64
+"""Number of workers of an executor that does not tell it: each gets one run until the
+first has ended."""
 
 _BATCH = 64
 """Largest number of runs that are handed out together."""

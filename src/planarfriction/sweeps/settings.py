@@ -199,9 +199,8 @@ class Settable:
     ) -> dict[str, Any]:
         tables = table.get("contact", [])
         tables = tables if isinstance(tables, list) else [tables]
-        default = (
-            "contact" if len(tables) == 1 else "contact {}"
-        )  # as a solution names them
+        # As a solution names them.
+        default = "contact" if len(tables) == 1 else "contact {}"
         given = [
             each.get("name") if isinstance(each, Mapping) else None for each in tables
         ]

@@ -84,9 +84,8 @@ def _bristle(xp, name: str, law: Any, shape: Cells, z, u, *dt):
     """Return two arrays `[..., d, N]`, the results of a function of the bristles."""
     kind = KINDS[len(shape.levers)]
     (_, asymmetry) = _numbers(shape)
-    vector = (
-        Vector if kind.bristles == 2 else split
-    )  # the source of discs names components
+    # The source of discs names components.
+    vector = Vector if kind.bristles == 2 else split
     law = law if asymmetry is None else Leaning(law, asymmetry)
     found = xp.over(getattr(kind, name))(law, vector(z), vector(u), *dt)
     return tuple(joined(xp, each) for each in found)

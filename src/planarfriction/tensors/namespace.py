@@ -128,9 +128,8 @@ def non_negative(xp: Any, name: str, value: Any) -> Any:
     """Return `value`; raise InvalidValueError if it can be read and is below zero, else replace what is by zero."""
     extremes = xp.extremes(name, value)
     if extremes is None:
-        return xp.where(
-            value < 0.0, 0.0, value
-        )  # not a maximum, which of NaN and zero takes zero
+        # Not a maximum, which of NaN and zero takes zero.
+        return xp.where(value < 0.0, 0.0, value)
     if extremes[0] < 0.0:
         raise InvalidValueError(name, "be >= 0", extremes[0])
     return value

@@ -255,9 +255,8 @@ def scene_function(
         of_name = f"values of {name}"
         shape = function.shapes[name]
         array = shaped(of_name, xp.real(of_name, values), shape)
-        check = (
-            non_negative if len(shape) == 1 else finite
-        )  # a load; a force or a velocity
+        # A load; a force or a velocity.
+        check = non_negative if len(shape) == 1 else finite
         arrays[name] = check(xp, of_name, array).reshape(
             *array.shape[: array.ndim - len(shape)], -1
         )

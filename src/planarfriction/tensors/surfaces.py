@@ -24,9 +24,8 @@ def sliding(xp, kind: int, size: int, data, scaled, speed):
     if kind == kernel.ELLIPSOID:
         return scaled
     moving = speed > 0.0
-    safe = xp.where(
-        moving, scaled, 1.0
-    )  # at rest any twist will do: the result is not used
+    # At rest any twist will do: the result is not used.
+    safe = xp.where(moving, scaled, 1.0)
     u = (
         _cells(xp, size, data, safe)
         if kind == kernel.CELLS

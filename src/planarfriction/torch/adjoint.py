@@ -122,9 +122,8 @@ class _Linear(torch.autograd.Function):
             *operation.inner,
             *(operation.inner if name == "push" else operation.outer),
         )
-        inner += (1 + operation.outer[0],) * (
-            count - len(inner)
-        )  # states before each step
+        # States before each step.
+        inner += (1 + operation.outer[0],) * (count - len(inner))
         found, out = _mapped(
             _Linear, size, dims, (operation, name, count), tensors, inner
         )

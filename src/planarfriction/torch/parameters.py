@@ -104,9 +104,8 @@ class PhysicalParameters(nn.Module):
             if name.startswith("centre"):
                 now[name] = now[name] + scale * raw
                 continue
-            size = scale * nn.functional.leaky_relu(
-                -raw, -1.0
-            )  # |w|, with the slope 1 at 0
+            # |w|, with the slope 1 at 0.
+            size = scale * nn.functional.leaky_relu(-raw, -1.0)
             if bounded:
                 now[name] = now["mu_s"] / (1.0 + size)
             elif name == "mu_s":
@@ -135,9 +134,8 @@ def _raw(
         return 1.0, -float(torch.log1p(torch.tensor(-value, dtype=torch.float64)))
     if name.startswith("centre"):
         return values["contact_radius"], 0.0
-    natural = (
-        mu_c / values["v_s"] if name == "sigma_1" else mu_c
-    )  # of mu_c at the Stribeck speed, or at 1 m/s
+    # Of mu_c at the Stribeck speed, or at 1 m/s.
+    natural = mu_c / values["v_s"] if name == "sigma_1" else mu_c
     return (value, 1.0) if value > 0.0 else (natural, 0.0)
 
 

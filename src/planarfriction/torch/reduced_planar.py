@@ -162,9 +162,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         v_scaled = self._number("v_scaled", v_scaled)
         (law, shape, _) = self._contact_at(None)
         speed = xp.norm(v_scaled, -1)
-        h = shape.surface(v_scaled, speed) / torch.where(
-            speed > 0.0, speed, 1.0
-        )  # zero at rest
+        # Zero at rest.
+        h = shape.surface(v_scaled, speed) / torch.where(speed > 0.0, speed, 1.0)
         most = formulas.stribeck(xp, published.wide(speed), law) / law.sigma_0
         return published.narrow(published.raw(xp, shape, published.wide(h) * most))
 

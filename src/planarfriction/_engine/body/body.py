@@ -378,9 +378,8 @@ def linearise(address: Place, piece: int, y: Doubles) -> None:
         contact_map(mount, place, at(y, system.bristles + 3), a)
         contact_map_slopes(mount, a, seen, at(work.wrench, 3 * c), g, h)
         if moves:
-            omega = work.frame[
-                8 * c + 7
-            ]  # elsewhere, the other side has another velocity
+            # Elsewhere, the other side has another velocity.
+            omega = work.frame[8 * c + 7]
             for i in range(3):
                 g[3 * i] -= omega * a[3 * i + 1]
                 g[3 * i + 1] += omega * a[3 * i]

@@ -14,8 +14,15 @@ from planarfriction._engine.codegen.vectors import clear
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, Integers
 
-WORLD, BODY, BODY_AXES = 0, 1, 2
-"""Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
+WORLD = 0
+"""Axes of a contact that is fixed to the world."""
+
+BODY = 1
+"""Axes of a contact that is fixed to the body."""
+
+BODY_AXES = 2
+"""Axes of a contact on the body whose prescribed velocity is given in the body's
+axes."""
 
 
 class Contacts(NamedTuple):

@@ -73,7 +73,18 @@ def note_ends(
 # Distance that a body is moved to see whether it rests, in full deflections of the bristles: on that way they go from
 # one side to the other, all but exp(-10) of it. Steps grow from one far below any swing to one that no bristle
 # overshoots.
-_FAR, _FIRST, _GROWTH, _LARGEST = 10.0, 1e-7, 2.5, 0.1
+_FAR = 10.0
+"""Distance that a body is moved to see if it rests, in full deflections of its
+bristles: they go from one side to the other on the way, all but exp(-10) of it."""
+
+_FIRST = 1e-7
+"""First step on that way, in full deflections: far below any swing."""
+
+_GROWTH = 2.5
+"""Ratio of one step on that way to the one before."""
+
+_LARGEST = 0.1
+"""Largest step on that way, in full deflections: no bristle overshoots it."""
 
 # Speed, in stop speeds, that a body at rest may reach in swinging out, which takes bristles without damping a long
 # time: about what the change within the bristles' time lets through where they swing out in three periods.

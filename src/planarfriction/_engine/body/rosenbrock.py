@@ -60,24 +60,61 @@ from planarfriction._engine.compiler.memory import (
     layout,
 )
 
-DONE, PAUSED, STEP_TOO_SMALL, AT_REST, APART = range(5)
-"""Outcomes of `advance`."""
+DONE = 0
+"""Outcome of `advance`: the motion has reached its end."""
 
-STEPS, REJECTIONS, EVALUATIONS, JACOBIANS = 0, 1, 2, 3
-"""Numbers of `Progress.statistics`."""
+PAUSED = 1
+"""Outcome of `advance`: the number of steps of this call is used up."""
 
-PIECE, SAMPLE = 0, 1
-"""Numbers of `Progress.cursor`."""
+STEP_TOO_SMALL = 2
+"""Outcome of `advance`: no step is small enough."""
 
-SINCE, STEP, FIRST = 0, 1, 2
-"""Numbers of `Progress.clock`."""
+AT_REST = 3
+"""Outcome of `advance`: the body rests."""
+
+APART = 4
+"""Outcome of `advance`: the body has left its supports."""
+
+STEPS = 0
+"""Place in `Progress.statistics` of the number of steps."""
+
+REJECTIONS = 1
+"""Place in `Progress.statistics` of the number of rejected steps."""
+
+EVALUATIONS = 2
+"""Place in `Progress.statistics` of the number of evaluations of the rates."""
+
+JACOBIANS = 3
+"""Place in `Progress.statistics` of the number of Jacobians."""
+
+PIECE = 0
+"""Place in `Progress.cursor` of the piece of time."""
+
+SAMPLE = 1
+"""Place in `Progress.cursor` of the next sample."""
+
+SINCE = 0
+"""Place in `Progress.clock` of the time since the piece began."""
+
+STEP = 1
+"""Place in `Progress.clock` of the next step."""
+
+FIRST = 2
+"""Place in `Progress.clock` of the mark of a first step."""
 
 # Friction goes by the direction of a contact's twist. While a patch comes to a halt that direction may sweep across a
 # pad, which holds the patch as soon as it is all that stands still, and a step from one side of it to the other has a
 # small error estimate. So steps that turn a twist by more than an angle [rad], about half of what such a pad takes, are
 # looked into: once an angle, at most some times, and what is missing there is taken for an error in excess of some
 # tolerances only, since the continuous extension is less accurate than the step.
-_ANGLE, _LOOKS, _DOUBT = 0.1, 8, 10.0
+_ANGLE = 0.1
+"""Turn of a twist in a step from which it is looked into [rad]."""
+
+_LOOKS = 8
+"""Looks into a step at most."""
+
+_DOUBT = 10.0
+"""Tolerances beyond which what a look finds missing counts as an error."""
 
 # A contact with more bristle states than this has a twist for each of many cells, of which none holds the patch alone:
 # looks would cost a quarter of the time and find nothing.

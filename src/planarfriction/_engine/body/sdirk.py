@@ -31,9 +31,12 @@ STAGES = np.array(
 """Stage arguments below the diagonal, `a_ij`."""
 ERROR = np.array([-3.0 / 16.0, -27.0 / 32.0, 25.0 / 32.0, 0.0, 0.25])
 """Solution minus the solution of the embedded method, in `h G_i`."""
-START, AGAIN = 0.125, np.array([-11.0 / 32.0, -11.0 / 64.0, 25.0 / 64.0, 0.0, 0.0])
-"""Another difference of order 3, `START h s'` at the start of the step and `AGAIN` in `h G_i`: a Jacobian that jumps
-before the first stage would go unseen without it."""
+START = 0.125
+"""Weight of `h s'` at the start of the step in another difference of order 3: a
+Jacobian that jumps before the first stage would go unseen without it."""
+
+AGAIN = np.array([-11.0 / 32.0, -11.0 / 64.0, 25.0 / 64.0, 0.0, 0.0])
+"""Weights of `h G_i` in the difference of `START`."""
 
 PLAIN = 0.3
 """Error of a step, in units of the tolerance, above which its estimates are damped by `(I - h gamma J)^-1`: this damps

@@ -16,8 +16,23 @@ from planarfriction._engine.codegen.vectors import Vector, plus
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, at
 
-STIFFNESS, DAMPING, TORSION, TORSION_DAMPING, AT_X, AT_Y = range(6)
-"""Columns of `Motion.spring`."""
+STIFFNESS = 0
+"""Column of `Motion.spring`: stiffness."""
+
+DAMPING = 1
+"""Column of `Motion.spring`: damping."""
+
+TORSION = 2
+"""Column of `Motion.spring`: torsional stiffness."""
+
+TORSION_DAMPING = 3
+"""Column of `Motion.spring`: torsional damping."""
+
+AT_X = 4
+"""Column of `Motion.spring`: x of the place on the body."""
+
+AT_Y = 5
+"""Column of `Motion.spring`: y of the place on the body."""
 
 
 @kernel

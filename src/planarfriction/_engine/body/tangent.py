@@ -66,12 +66,32 @@ from planarfriction._engine.compiler.calls import call, pointer
 from planarfriction._engine.compiler.memory import Doubles, Place, arrays_at, at
 from planarfriction._engine.protocol import ROWS
 
-FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
-"""Parameters; each is a factor, 1 as the scene is."""
+FRICTION = 0
+"""Parameter: factor on the friction of a contact, 1 as the scene is."""
 
-NORMAL_FORCE, FORCE, VELOCITY, INITIAL = 5, 6, 7, 8
-"""Other inputs of the motion: the load of one contact, a component of the applied wrench or of the prescribed velocity,
-each in proportion to a weight that is linear on a piece, and a component of the start."""
+SIZE = 1
+"""Parameter: factor on the size of a contact."""
+
+MASS = 2
+"""Parameter: factor on the mass."""
+
+INERTIA = 3
+"""Parameter: factor on the moment of inertia."""
+
+LOAD = 4
+"""Parameter: factor on the loads."""
+
+NORMAL_FORCE = 5
+"""Input: load of one contact, in proportion to a weight that is linear on a piece."""
+
+FORCE = 6
+"""Input: component of the applied wrench, in proportion to such a weight."""
+
+VELOCITY = 7
+"""Input: component of the prescribed velocity, in proportion to such a weight."""
+
+INITIAL = 8
+"""Input: component of the start."""
 
 
 class Drives(NamedTuple):

@@ -22,10 +22,22 @@ VECTOR = 8
 LANES = 64
 """Most cells of a block: several of the longest vectors of processors, so that constants are read once for all."""
 
-Z, WEIGHT, BY_LOAD, BAR, OUT = (LANES * n for n in (8, 11, 12, 13, 16))
-"""Fields of a block behind the numbers of the levers and an asymmetry: state, weights, their slopes by the load,
-cotangent or change of the state, and the wrench with its change, which add up over the cells; three fields for a state,
-of which points use two. Blocks share nothing, so that each is seen to be free of dependences."""
+Z = LANES * 8
+"""Field of a block behind the numbers of the levers and an asymmetry: bristles, three
+numbers a cell, of which points use two. Blocks share nothing, so that each is seen to
+be free of dependences."""
+
+WEIGHT = LANES * 11
+"""Field of a block: weights of the cells."""
+
+BY_LOAD = LANES * 12
+"""Field of a block: slopes of the weights by the load."""
+
+BAR = LANES * 13
+"""Field of a block: cotangent or change of the bristles."""
+
+OUT = LANES * 16
+"""Field of a block: wrench and its change, which add up over the cells."""
 
 BLOCK = LANES * 23
 """Numbers of a block: an odd number of fields, for if it were a power of two, blocks would drive each other out of the

@@ -319,9 +319,8 @@ def slope_passes(kind: CellKind) -> Passes:
             tuple(row[which] for row in half) for half in halves for which in range(2)
         )
 
-    stores = [
-        f"block.out[{m * LANES} + i]" for m in range(2 * count * element.size)
-    ]  # of a block: that lies apart
+    # Of a block: that lies apart.
+    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * count * element.size)]
     return passes(
         f"slopes of {element.name}",
         traced(slopes),

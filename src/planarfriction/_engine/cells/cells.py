@@ -123,8 +123,7 @@ def _of_discs(count: int, points: Lever) -> Lever:
     return _of_points(count, seen, wrench)._replace(around=around)
 
 
-POSITIONS, LEVERS = (
-    _of_points(2, _seen, _wrench),
-    _of_points(5, _seen_by_map, _wrench_by_map),
-)
-DISC_POSITIONS, DISC_LEVERS = _of_discs(3, POSITIONS), _of_discs(6, LEVERS)
+POSITIONS = _of_points(2, _seen, _wrench)
+LEVERS = _of_points(5, _seen_by_map, _wrench_by_map)
+DISC_POSITIONS = _of_discs(3, POSITIONS)
+DISC_LEVERS = _of_discs(6, LEVERS)

@@ -45,8 +45,11 @@ _PLACES = tuple(
 )
 """Place in `PARAMETERS` of each column of a row."""
 
-_CHANGE, _PULL = BLOCK, BLOCK + 3 * LANES * len(_MOVING)
-"""Fields behind a block: changes of the state, and traction with its changes."""
+_CHANGE = BLOCK
+"""Field behind a block: changes of the bristles."""
+
+_PULL = BLOCK + 3 * LANES * len(_MOVING)
+"""Field behind a block: traction with its changes."""
 
 _ALL = _PULL + 3 * LANES * (1 + len(PARAMETERS))
 _SIZE = _ALL + LANES * (1 - _ALL // LANES % 2)

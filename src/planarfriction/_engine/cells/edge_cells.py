@@ -28,7 +28,12 @@ from planarfriction._engine.compiler.memory import (
 from planarfriction._engine.protocol import SEEN, Addresses, ModelFunctions, Seen
 
 # Share of its area below which nothing of a disc is covered, and above which all is: rounding makes 1e-15 of it.
-_NONE, _ALL = 1e-9, 1.0 - 1e-9
+_NONE = 1e-9
+"""Share of the area of a disc below which nothing of it is covered: rounding makes
+1e-15 of it."""
+
+_ALL = 1.0 - 1e-9
+"""Share of the area of a disc above which all of it is covered."""
 
 # Change of the place of the body for differences [rad], and, times the radius of the patch, [m].
 _NUDGE = 1e-6
@@ -94,7 +99,8 @@ class Linear(NamedTuple):
 
 
 _LINEAR = Layout(Linear, share=1, slopes=9)
-_PLACES, OWN = _LINEAR.offsets, _LINEAR.size
+_PLACES = _LINEAR.offsets
+OWN = _LINEAR.size
 
 
 @kernel

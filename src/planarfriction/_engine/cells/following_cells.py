@@ -96,7 +96,8 @@ class Linear(NamedTuple):
 
 
 _LINEAR = Layout(Linear, by_x=3, by_y=3, centre=2, inverse=4, stiffness=6, residual=2)
-_PLACES, OWN = _LINEAR.offsets, _LINEAR.size
+_PLACES = _LINEAR.offsets
+OWN = _LINEAR.size
 
 
 @kernel

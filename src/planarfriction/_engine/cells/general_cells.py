@@ -37,7 +37,20 @@ MATRICES = 5
 LINEAR = 3
 """Matrices of a cell whose bristle is `Bristle.linear`: A, F and the inverse."""
 
-A, F, INVERSE, C, E = range(MATRICES)
+A = 0
+"""Place of the matrix df/dz: slope of the rate by the bristle."""
+
+F = 1
+"""Place of the matrix df/du: slope of the rate by the velocity."""
+
+INVERSE = 2
+"""Place of the inverse of D."""
+
+C = 3
+"""Place of the matrix dt/dz: slope of the traction by the bristle."""
+
+E = 4
+"""Place of the matrix dt/du: slope of the traction by the velocity."""
 
 
 class CellSlopes(NamedTuple):

@@ -25,8 +25,11 @@ of the plane. It makes the plane finite where the centre lies beyond all cells."
 FARTHEST = 100.0
 """Distance of the centre asked for, in radii of gyration, beyond which it is brought back: it lies outside."""
 
-STEPS, SHORTENINGS = 60, 30
-"""Newton steps at most, and times at most that a step is shortened: both end after a few."""
+STEPS = 60
+"""Newton steps at most: they end after a few."""
+
+SHORTENINGS = 30
+"""Times at most that a Newton step is shortened."""
 
 NARROW = 1e-8
 """Square of the ratio of width to length below which cells count as a line, across which a plane does not tilt them."""
@@ -288,9 +291,8 @@ def tilted(
     positions: np.ndarray, weights: np.ndarray, centre: np.ndarray
 ) -> np.ndarray:
     """Return weights `[B, N]` of cells at `positions` `[N, 2]` times planes that bring their centres to `[B, 2]`."""
-    x, y = (
-        np.array(each)[None] for each in positions.T
-    )  # writable, all of them: compiled once
+    # Writable, all of them: compiled once.
+    x, y = (np.array(each)[None] for each in positions.T)
     out = np.empty(weights.shape)
     tilt_many(x, y, np.array(weights, order="C"), np.array(centre, order="C"), out)
     return out

@@ -92,13 +92,13 @@ NAMES: dict[str, Any] = {
 }  # fmt: skip
 """Functions that generated code and the texts of rules name."""
 
+# Only the numerator: `derive` writes other quotients as products.
+# No square of `per`, which 1e-160 takes out of range.
 RULES: dict[Any, Rule] = {
     ast.Add: Rule("s", {0: "1.0", 1: "1.0"}),
     ast.Sub: Rule("s", {0: "1.0", 1: "-1.0"}),
     ast.Mult: Rule("s", {0: "{1}", 1: "{0}"}),
-    ast.Div: Rule(
-        "s", {0: "1.0 / {1}"}
-    ),  # only the numerator: `derive` writes other quotients as products
+    ast.Div: Rule("s", {0: "1.0 / {1}"}),
     ast.USub: Rule("s", {0: "-1.0"}),
     plus: Rule(
         "v",
@@ -130,9 +130,7 @@ RULES: dict[Any, Rule] = {
     ),
     math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
     per: Rule("s", {0: "-{t} * {t}"}),
-    ratio: Rule(
-        "s", {0: "per({1})", 1: "-{t} * per({1})"}
-    ),  # no square of `per`, which 1e-160 takes out of range
+    ratio: Rule("s", {0: "per({1})", 1: "-{t} * per({1})"}),
     xp.where: Rule("s", {1: "xp.where({0}, 1.0, 0.0)", 2: "xp.where({0}, 0.0, 1.0)"}),
     # of equal numbers the slope is that of the first
     xp.maximum: Rule(

@@ -55,9 +55,8 @@ class _Linked(JITCodeLibrary):
         made = self._codegen._module_pass_manager(
             opt=0, loop_vectorize=False, slp_vectorize=False, cost="cheap"
         )
-        passes, *builder = (
-            made if isinstance(made, tuple) else (made,)
-        )  # Numba before 0.62 has no builder
+        # Numba before 0.62 has no builder.
+        passes, *builder = made if isinstance(made, tuple) else (made,)
         passes.run(self._final_module, *builder)
 
     def _finalize_final_module(self) -> None:

@@ -46,9 +46,8 @@ event.register("numba:run_pass", _keyboard)
 
 
 def _in_main_thread() -> bool:
-    return (
-        threading.current_thread() is threading.main_thread()
-    )  # no other hears signals
+    # No other hears signals.
+    return threading.current_thread() is threading.main_thread()
 
 
 @contextlib.contextmanager

@@ -288,9 +288,10 @@ def _view(number: Any) -> Any:
     return view
 
 
-doubles, floats, integers, integers32 = (
-    _view(number) for number in (types.float64, types.float32, types.int64, types.int32)
-)
+doubles = _view(types.float64)
+floats = _view(types.float32)
+integers = _view(types.int64)
+integers32 = _view(types.int32)
 
 
 @intrinsic

@@ -28,9 +28,8 @@ class _Said(Listener):
     done = False
 
     def on_start(self, event: Any) -> None:
-        module = (
-            event.data["dispatcher"].py_func.__module__ or ""
-        )  # none of functions that are made from others
+        # None of functions that are made from others.
+        module = event.data["dispatcher"].py_func.__module__ or ""
         if _Said.done or not module.startswith("planarfriction"):
             return
         _Said.done = True

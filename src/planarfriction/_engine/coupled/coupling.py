@@ -43,9 +43,13 @@ DOWNHILL = 0.5
 SHORTENINGS = 6
 """Times at most that a Newton step which went too far is shortened."""
 
-JOINT, ROUND = 8, 24
-"""Number of iterations at the start of a round in which loads move with the wrenches, and length of a round; in its
-others loads follow behind: where both turn against each other, one of the two ways gets on."""
+ROUND = 24
+"""Iterations of a round. Newton's method moves loads together with wrenches in some and
+lets loads follow the wrenches in the rest; a problem in which one of these goes round
+in circles is solved by the other."""
+
+JOINT = 8
+"""Iterations at the start of a round in which loads move together with the wrenches."""
 
 HALVINGS = 40
 """Times at most that a careful Newton step which passed a root is halved."""
@@ -371,9 +375,8 @@ def _search(
         if misfit <= tolerance or iteration == most or misfit == math.inf:
             break
         keep_loads = iteration % ROUND >= JOINT
-        step_all(
-            patches, p, patches.slopes
-        )  # dear: not before they are needed, which at rest they are not
+        # Dear: not before they are needed, which at rest they are not.
+        step_all(patches, p, patches.slopes)
         write_load_slopes(patches, p)
         if not _newton(patches, p, keep_loads, False):
             _newton(patches, p, keep_loads, True)

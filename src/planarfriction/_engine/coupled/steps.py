@@ -339,7 +339,9 @@ def linearise_many(
 UNFIT = (TypeError, ValueError, NumbaError)
 """Exceptions that the entry points raise for arguments of other types."""
 
-_NUMBER, _VECTOR, _ROWS = types.float64, types.float64[::1], types.float64[:, ::1]
+_NUMBER = types.float64
+_VECTOR = types.float64[::1]
+_ROWS = types.float64[:, ::1]
 _SIGNATURES: dict[Any, tuple] = {
     step_one: (_VECTOR, _VECTOR, *(_NUMBER,) * 5, _VECTOR),
     step_many: (_VECTOR, _ROWS, _ROWS, _VECTOR, _VECTOR, _ROWS, _ROWS, _VECTOR),

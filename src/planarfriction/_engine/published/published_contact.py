@@ -188,7 +188,8 @@ def _decay(law: LawNumbers, z: Vector, u: Vector, twist: Vector) -> float:
 
 
 _SLOPES = derive(_decay, ("z", "u", "twist"), ("z", "u", "twist"))
-_forth, _back = _SLOPES.forth, _SLOPES.back
+_forth = _SLOPES.forth
+_back = _SLOPES.back
 
 
 @kernel

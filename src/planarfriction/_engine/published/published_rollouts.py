@@ -53,23 +53,45 @@ SCRATCH = 9
 
 _NUMBERS = len(NAMES)
 _SIZES = (_NUMBERS, _NUMBERS, 3, 3, 1, 3, 1, 3, 3, 3, 1, 9)
-(
-    _ROW,
-    _ROW_BAR,
-    _STATE,
-    _TWIST,
-    _OMEGA,
-    _SLIDING,
-    _LOAD,
-    _WRENCH,
-    _CARRY,
-    _TWIST_BAR,
-    _LOAD_BAR,
-    _SLOPES,
-    _END,
-) = (ABREAST * n for n in itertools.accumulate(_SIZES, initial=0))
-"""Fields: numbers of the contact and their gradient; state before a step; scaled twist, spin, sliding and load; wrench
-or its cotangent; cotangent of the state, of the twist and of the load; slopes of the sliding."""
+_OFFSETS = [ABREAST * n for n in itertools.accumulate(_SIZES, initial=0)]
+_ROW = _OFFSETS[0]
+"""Field: numbers of the contact."""
+
+_ROW_BAR = _OFFSETS[1]
+"""Field: gradient by the numbers of the contact."""
+
+_STATE = _OFFSETS[2]
+"""Field: state before a step."""
+
+_TWIST = _OFFSETS[3]
+"""Field: scaled twist."""
+
+_OMEGA = _OFFSETS[4]
+"""Field: spin."""
+
+_SLIDING = _OFFSETS[5]
+"""Field: sliding."""
+
+_LOAD = _OFFSETS[6]
+"""Field: load."""
+
+_WRENCH = _OFFSETS[7]
+"""Field: wrench or its cotangent."""
+
+_CARRY = _OFFSETS[8]
+"""Field: cotangent of the state."""
+
+_TWIST_BAR = _OFFSETS[9]
+"""Field: cotangent of the twist."""
+
+_LOAD_BAR = _OFFSETS[10]
+"""Field: cotangent of the load."""
+
+_SLOPES = _OFFSETS[11]
+"""Field: slopes of the sliding."""
+
+_END = _OFFSETS[12]
+"""Number of all fields."""
 
 
 @kernel

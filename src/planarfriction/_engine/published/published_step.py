@@ -170,7 +170,8 @@ _BY = (
     *(f"shape.{n}" for n in PublishedPatch._fields),
 )
 DERIVATIVE = derive(_step, _BY, ("z", "u", "twist"))
-_forth, _back = DERIVATIVE.forth, DERIVATIVE.back
+_forth = DERIVATIVE.forth
+_back = DERIVATIVE.back
 
 
 @kernel

@@ -24,12 +24,23 @@ from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel
 from planarfriction._engine.compiler.memory import Doubles
 
-BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
+BILINEAR = 0
+"""Kind of surface: a table, bilinear between its nodes."""
+
+POTENTIAL = 1
+"""Kind of surface: a table of the dissipation whose gradient is the wrench."""
+
+ELLIPSOID = 2
+"""Kind of surface: the ellipsoid."""
+
+CELLS = 3
+"""Kind of surface: the sum over cells."""
 
 # Nearer to the spin axis [rad] the azimuth's slopes are taken at this polar angle: they differ from their limit by
 # about as much, and rounding, which the Jacobian divides by its square, stays below 1e-5 too.
 _AXIS = 1e-5
-_SIN_AXIS, _COS_AXIS = math.sin(_AXIS), math.cos(_AXIS)
+_SIN_AXIS = math.sin(_AXIS)
+_COS_AXIS = math.cos(_AXIS)
 
 # A cell slower than this share of the twist stands in the centre of rotation: what is left of its speed is rounding.
 _AT_REST = 1e-14
@@ -103,9 +114,8 @@ def _bilinear_jacobian(
         -per_segment * sin_p,
     )
     azimuth_slope = (-per_azimuth * sin_a, per_azimuth * cos_a, 0.0)
-    a = xp.where(
-        polar < _AXIS, _AXIS * per_segment, a
-    )  # the axis has no slope by the azimuth
+    # The axis has no slope by the azimuth.
+    a = xp.where(polar < _AXIS, _AXIS * per_segment, a)
     for i in range(3):
         h, h_polar, h_azimuth = _corners(data, p + i, row, a, b)
         for j in range(3):

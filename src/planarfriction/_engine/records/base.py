@@ -26,7 +26,10 @@ from planarfriction._engine.records.packed import PackedModel, driven, rates
 from planarfriction.equality import by_parts
 from planarfriction.geometry import twist_at, wrench_at
 
-_ARRAY, _FLOAT, _EMPTY, _MAKE = np.ndarray, np.dtype(float), np.empty, np.array
+_ARRAY = np.ndarray
+_FLOAT = np.dtype(float)
+_EMPTY = np.empty
+_MAKE = np.array
 _TRUTH = frozenset((bool, np.bool_))
 _PLAIN = frozenset((float, int, np.float64))
 _REFUSED = (*UNFIT, OverflowError)

@@ -29,17 +29,15 @@ def under_edge(
     chosen = packed.cells
     patch = compiled.patch
     x, y = np.ascontiguousarray(patch.positions[chosen].T)
-    sides = np.sqrt(
-        patch.cell_extents()[chosen].prod(axis=1) / np.pi
-    )  # a disc of the same area
+    # A disc of the same area.
+    sides = np.sqrt(patch.cell_extents()[chosen].prod(axis=1) / np.pi)
     radii = np.maximum(
         np.where(patch.radii[chosen] > 0.0, patch.radii[chosen], sides), SMALLEST
     )
     centre = np.array([x.mean(), y.mean()])
     middle = np.append(centre, (np.hypot(x - centre[0], y - centre[1]) + radii).max())
-    outline = outline[
-        (outline != np.roll(outline, 1, axis=0)).any(axis=1)
-    ]  # a corner may stand there twice
+    # A corner may stand there twice.
+    outline = outline[(outline != np.roll(outline, 1, axis=0)).any(axis=1)]
     ahead = np.roll(outline, -1, axis=0)
     area = 0.5 * float(
         (outline[:, 0] * ahead[:, 1] - outline[:, 1] * ahead[:, 0]).sum()

@@ -137,18 +137,16 @@ class Asking:
                     self._learn(
                         wrench - row.guess, twist - row.free_twist, load - row.free_load
                     )
-            turned = self._moved.T @ (
-                wrench @ self._rows - force
-            )  # the axes have, since the last step
+            # The axes have, since the last step.
+            turned = self._moved.T @ (wrench @ self._rows - force)
             row.free_twist[:] = twist + turned
             row.free_load[:] = load
             row.guess[:] = wrench
             row.state[:] = bristles
             row.moments[:] = (self._moments @ pushes[:, :, None]).ravel()
             iterations += row.solve()
-            np.copyto(
-                row.follows, -abs(row.follows)
-            )  # pressures stay for the rest of the step
+            # Pressures stay for the rest of the step.
+            np.copyto(row.follows, -abs(row.follows))
             change = row.wrench - wrench
             wrench = row.wrench.copy()
             solved = True

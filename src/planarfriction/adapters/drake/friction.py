@@ -34,7 +34,8 @@ _SURPRISED = """the plant moves otherwise than predicted, by {:.3g}: one of its 
 (connect a source before it), parameters in its context are not those with which friction was added, or its solver has
 not converged""".replace("\n", " ")
 
-_GEOMETRY, _FORCE = "geometry_query", "applied_generalized_force"
+_GEOMETRY = "geometry_query"
+_FORCE = "applied_generalized_force"
 
 
 class Report(NamedTuple):

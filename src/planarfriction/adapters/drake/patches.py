@@ -28,7 +28,11 @@ from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
 
-CENTRES, PRESSURES = ("auto", "frame", "contact"), ("auto", "follows", "fixed")
+CENTRES = ("auto", "frame", "contact")
+"""Ways to place the centre of a patch."""
+
+PRESSURES = ("auto", "follows", "fixed")
+"""Ways to place the pressure of a patch."""
 
 _ROUND = Sphere, Capsule, Ellipsoid
 """Shapes that touch in points, not faces."""

@@ -329,9 +329,8 @@ class Friction:
         guess = jnp.where(jnp.repeat(where.touching, 3), guess, 0.0)
         found = self._search(*jax.lax.stop_gradient((own, m, d, where, states, guess)))
         answer = responses.answer(m, d, where, found.active)
-        centre = where.centres(
-            answer.forces(d, guess)
-        )  # that of the search, with its derivatives
+        # That of the search, with its derivatives.
+        centre = where.centres(answer.forces(d, guess))
         shift, pressed = self._pressed(
             own, where, found.centre + centre - jax.lax.stop_gradient(centre)
         )

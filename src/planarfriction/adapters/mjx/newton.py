@@ -21,8 +21,14 @@ from planarfriction._engine.coupled.coupling import (
     SHORTENINGS,
 )
 
-_GUESS, _REST, _SEARCH = range(3)
-"""Kinds of evaluation: the twists that the guess causes, twists at rest, or a point along a Newton step."""
+_GUESS = 0
+"""Kind of evaluation: the twists that the guess causes."""
+
+_REST = 1
+"""Kind of evaluation: twists at rest."""
+
+_SEARCH = 2
+"""Kind of evaluation: a point along a Newton step."""
 
 ROUNDING_SINGLE = 1e-5
 """`ROUNDING` in single precision, in which the response of a host has that much less digits.

@@ -13,12 +13,14 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import ContactPatch
 
-OUTLINE, FRICTION, CENTRE = (
-    (0.1, 0.4, 1.0, 1.0),
-    (0.9, 0.1, 0.1, 1.0),
-    (0.1, 0.7, 0.2, 1.0),
-)
-"""Colours: red, green, blue, opacity."""
+OUTLINE = (0.1, 0.4, 1.0, 1.0)
+"""Colour of an outline: red, green, blue, opacity."""
+
+FRICTION = (0.9, 0.1, 0.1, 1.0)
+"""Colour of a friction force."""
+
+CENTRE = (0.1, 0.7, 0.2, 1.0)
+"""Colour of a centre of rotation."""
 
 STANDS = 1e-6
 """Speed of the rim [m/s] below which a patch turns about nothing: what sticks moves by rounding."""

@@ -137,9 +137,8 @@ class Friction:
     def _say_alone(self, d: Any) -> None:
         """Warn, once, if data have moved on by steps without friction."""
         self._used[:] = [True]
-        last = d.userdata[
-            self._memory.next
-        ]  # 0 before the first step: the data may come from elsewhere
+        # 0 before the first step: the data may come from elsewhere.
+        last = d.userdata[self._memory.next]
         steps = (d.time - last) / d.model.opt.timestep
         if (
             last != 0.0

@@ -50,9 +50,12 @@ _IMPLICIT = {
 
 _CYLINDER = int(mujoco.mjtGeom.mjGEOM_CYLINDER)
 
-_PLANE, _BOX = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_BOX)
-"""Geoms whose faces touch in several points: boxes each other, and planes all but what is round. Elsewhere MuJoCo
-finds one point, which says nothing of the pressure."""
+_PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+"""Geoms whose faces touch what is not round in several points. Elsewhere MuJoCo finds
+one point, which says nothing of the pressure."""
+
+_BOX = int(mujoco.mjtGeom.mjGEOM_BOX)
+"""Geoms whose faces touch each other in several points."""
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,8 @@ def _pull(u):
 
 
 _PULL = derive(_pull, ("u",), ("u",))
-_FORTH, _BACK = _PULL.forth, _PULL.back
+_FORTH = _PULL.forth
+_BACK = _PULL.back
 
 
 @kernel

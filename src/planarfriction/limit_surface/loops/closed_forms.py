@@ -28,8 +28,14 @@ from planarfriction._engine.codegen.vectors import accumulate, clear, plus, put_
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel
 
-POINTS, SEGMENTS, QUADS = 1, 2, 4
-"""Kinds of elements by their number of corners; a triangle is a quad with two corners in one place."""
+POINTS = 1
+"""Kind of an element: a point, with one corner."""
+
+SEGMENTS = 2
+"""Kind of an element: a segment, with two corners."""
+
+QUADS = 4
+"""Kind of an element: a quad; a triangle is a quad with two corners in one place."""
 
 
 class Elements(NamedTuple):
@@ -326,9 +332,8 @@ def _means(means, power):
     """Return the next arithmetic and geometric mean, c_n, its square over m^2, and their sum weighted with `power`."""
     a, b, c, square, total = means
     mean = 0.5 * (a + b)
-    ratio = c / (
-        4.0 * mean
-    )  # c_(n+1) = c_n^2/(4 a_(n+1)), and so is its square over m^2
+    # C_(n+1) = c_n^2/(4 a_(n+1)), and so is its square over m^2.
+    ratio = c / (4.0 * mean)
     square *= ratio * ratio
     return mean, math.sqrt(a * b), c * ratio, square, total + power * square
 

@@ -164,9 +164,8 @@ def newton_move(ga, gb, aa, ab, bb):
         return (ab * gb - bb * ga) / det, (ab * ga - aa * gb) / det
     middle = 0.5 * trace
     half = math.sqrt(0.25 * (aa - bb) * (aa - bb) + ab * ab)
-    high = (
-        middle + half if middle >= 0.0 else middle - half
-    )  # the larger one, which loses no digits
+    # The larger one, which loses no digits.
+    high = middle + half if middle >= 0.0 else middle - half
     if high == 0.0:
         return 0.0, 0.0
     low = xp.maximum(abs(det / high), _FLATTEST * abs(high))

@@ -29,11 +29,23 @@ from planarfriction.online.loops.square_root import (
     variance_of,
 )
 
-PEAK_TIME, SEEN_TIME, PLACE_TIME = 0.1, 0.004, 0.06
-"""Times in which the peak of the wrench, its filter and the recent displacement fade [s]."""
+PEAK_TIME = 0.1
+"""Time in which the peak of the wrench fades [s]."""
 
-LEAVES, CREEPS, BREAKS = 2.0, 0.2, 100.0
-"""Rates at which a slip ends, and at which one begins within the surface and at it [1/s]."""
+SEEN_TIME = 0.004
+"""Time of the filter of the wrench [s]."""
+
+PLACE_TIME = 0.06
+"""Time in which the recent displacement fades [s]."""
+
+LEAVES = 2.0
+"""Rate at which a slip ends [1/s]."""
+
+CREEPS = 0.2
+"""Rate at which a slip begins within the surface [1/s]."""
+
+BREAKS = 100.0
+"""Rate at which a slip begins at the surface [1/s]."""
 
 FRESH = 0.03
 """Standard deviation of the slip velocity at its beginning [m/s]."""
@@ -70,8 +82,17 @@ force, wrench without its bias, and slip velocity."""
 NONE = -1e3
 """Log of the gauge of a hand that has not gripped yet."""
 
-NO_BIAS, NO_SIGN, NO_RANGE, NO_FIT = 8, 16, 32, 64
-"""Flags of numbers that nothing is determined by (see `update`)."""
+NO_BIAS = 8
+"""Flag (see `update`): the bias of the wrench is not known."""
+
+NO_SIGN = 16
+"""Flag: friction seems to do work, so a sign is wrong."""
+
+NO_RANGE = 32
+"""Flag: friction or radius is far from what was assumed."""
+
+NO_FIT = 64
+"""Flag: wrench and velocity contradict what was learnt."""
 
 POWERS = 8.0
 """Velocities over which the mean of the dissipated power is taken."""
@@ -88,8 +109,11 @@ FAR = 4.0
 NEAR = 0.1
 """Share of more load at which a part that is about to slip does [-]."""
 
-SEEN_ERROR, PEAK_ERROR = 0.02, 0.06
-"""Relative errors of the filtered wrench over load, and of its peak as `mu_s` [-]."""
+SEEN_ERROR = 0.02
+"""Relative error of the filtered wrench over load [-]."""
+
+PEAK_ERROR = 0.06
+"""Relative error of the peak of the wrench over load, taken as `mu_s` [-]."""
 
 
 class Filter(NamedTuple):
@@ -420,9 +444,8 @@ def update(settings, states, samples, found):
         flags = 2 if s[at.BACK] > 0.0 else 0
         force = math.hypot(wrench[0], wrench[1])
         good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
-        lost = (
-            good and load <= settings.least_load and s[at.GAUGE] > NONE
-        )  # after a grip no load is not an empty hand
+        # After a grip no load is not an empty hand.
+        lost = good and load <= settings.least_load and s[at.GAUGE] > NONE
         flags += 0 if good and not lost else 1
         if good and force >= settings.saturation:
             flags = flags + 4

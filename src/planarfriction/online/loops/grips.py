@@ -85,9 +85,17 @@ PAUSE = 0.1
 """Longest time between samples that grips and loads go on by, and between slip velocities while a part is let slip [s].
 """
 
-LOST, LOSES, LATE = 0.08, 0.05, 0.02
-"""Shares of the wrench that a part loses only if it slips [-]: while the grip is first lowered, and once it has stuck
-in a slip on purpose; and the time of its filter, after which a slip sensor that works has said so [s]."""
+LOST = 0.08
+"""Share of the wrench that a part loses only if it slips, while the grip is first
+lowered [-]."""
+
+LOSES = 0.05
+"""Share of the wrench that a part loses only if it slips, once it has stuck in a slip
+on purpose [-]."""
+
+LATE = 0.02
+"""Time of the filter of that share, after which a slip sensor that works has said so
+[s]."""
 
 HALF = 0.5
 """Share of its first force that a part in the hand keeps at least, unless a sensor is wrong or it falls [-]."""
@@ -113,9 +121,12 @@ STICKS = 0.05
 STUCK = 1.0
 """Rate at which it falls if a part that is to slip has stuck [1/s]."""
 
-BRAKE, BRAKES = 1.3, 0.06
-"""Grip of a part that has stuck, over the one that balances it, and for how long [s]: it stops if its slip sensor is
-dead."""
+BRAKE = 1.3
+"""Grip of a part that has stuck, over the one that balances it: the part stops if its
+slip sensor is dead."""
+
+BRAKES = 0.06
+"""Time for which a part that has stuck is gripped so [s]."""
 
 SURE = 0.17
 """Time without slip after which the wrench of such a part no longer changes if it has stuck [s]."""
@@ -138,25 +149,47 @@ CAUGHT = 1.5
 REACTS = 0.03
 """Time in which a part goes on before a catch acts, beyond the delay that is stated [s]."""
 
-NEAR, ENOUGH = 8.0, 0.7
-"""Distances from the goal, over the tolerance, from which a part that sticks is let slip in dips, and at which it is
-left [-]."""
+NEAR = 8.0
+"""Distance from the goal, over the tolerance, from which a part that sticks is let slip
+in dips [-]."""
 
-APPROACH, DIP, LONGER, WAIT = 0.03, 0.015, 0.015, 0.13
-"""Time near the grip of a break before a dip, time of a dip, what it gains with the root of the distance over the
-tolerance, and the pause in which its slip is seen [s]."""
+ENOUGH = 0.7
+"""Distance from the goal, over the tolerance, at which a part is left [-]."""
 
-ABOVE, DEEPER = 1.06, 0.03
-"""Grip before a dip over the one in it, and the change of the next dip after one that was too small [-]."""
+APPROACH = 0.03
+"""Time near the grip of a break before a dip [s]."""
 
-LITTLE, MUCH = 0.3, 0.7
-"""Shares of the distance from the goal below and above which the slip of a dip is too small and too large [-]."""
+DIP = 0.015
+"""Time of a dip [s]."""
+
+LONGER = 0.015
+"""Time that a dip gains with the root of the distance over the tolerance [s]."""
+
+WAIT = 0.13
+"""Pause in which the slip of a dip is seen [s]."""
+
+ABOVE = 1.06
+"""Grip before a dip over the one in it [-]."""
+
+DEEPER = 0.03
+"""Change of the next dip after one that was too small [-]."""
+
+LITTLE = 0.3
+"""Share of the distance from the goal below which the slip of a dip is too small
+[-]."""
+
+MUCH = 0.7
+"""Share of the distance from the goal above which the slip of a dip is too large
+[-]."""
 
 FADES = 0.1
 """Rate at which the largest friction while a part is let slip is forgotten [1/s]."""
 
-SPEED_GAIN, PLACE_GAIN = 8.0, 16.0
-"""Accelerations per error of the speed [1/s] and of the place [1/s^2] of a slip on purpose."""
+SPEED_GAIN = 8.0
+"""Acceleration per error of the speed of a slip on purpose [1/s]."""
+
+PLACE_GAIN = 16.0
+"""Acceleration per error of the place of a slip on purpose [1/s^2]."""
 
 
 @kernel
@@ -372,9 +405,8 @@ def slip(
         if slips and c.began < 0.0 and c.age >= SETTLED:
             c.began = 0.0
             c.balance = 1.05 * needed / max(e.gauge, 1e-9)
-        rests = (
-            c.since > SURE and c.quiet > STICKS
-        )  # if the slip sensor is right, the wrench stays as it is
+        # If the slip sensor is right, the wrench stays as it is.
+        rests = c.since > SURE and c.quiet > STICKS
         unsure = _unsure(
             c, e, dt, silence, c.began < 0.0 or rests, LOST if c.began < 0.0 else LOSES
         )
@@ -384,9 +416,8 @@ def slip(
         there = x + v * delay
         left = goal - there
         c.since = 0.0 if slips and c.quiet <= STICKS else c.since + dt
-        stuck = (
-            c.since > STICKS
-        )  # then the wrench is that of the load, and says which grip balances it
+        # Then the wrench is that of the load, and says which grip balances it.
+        stuck = c.since > STICKS
         braking = 0.5 * acceleration
         if c.caught == 0.0 and c.pressed > 0.0:
             c.broke = max(c.broke * math.exp(-FADES * dt), c.lately / c.pressed)
@@ -395,9 +426,8 @@ def slip(
         far = left - AIM * tolerance - v * REACTS - 0.5 * v * v / braking
         if c.began >= 0.0 and c.caught == 0.0 and (near or far <= 0.0):
             c.caught = 1.0
-            c.dipped = (
-                APPROACH + span
-            )  # it may be on its way already: no dip before this is seen
+            # It may be on its way already: no dip before this is seen.
+            c.dipped = APPROACH + span
         if slips and c.quiet <= LATE:
             c.balance = min(
                 c.balance * math.exp(adapt * (v - speed - 2.0 * (place - there)) * dt),
@@ -411,9 +441,8 @@ def slip(
         c.dipped += dt
         if c.caught > 0.0:
             if stuck and c.dipped > span + WAIT and left > ENOUGH * tolerance:
-                share = (x - c.before) / (
-                    goal - c.before
-                )  # before the first dip, of all: it is less deep
+                # Before the first dip, of all: it is less deep.
+                share = (x - c.before) / (goal - c.before)
                 c.broke *= 1.0 + (
                     DEEPER
                     if share < LITTLE
@@ -459,9 +488,8 @@ def hinge(states, found, least_load, quantum, silence, most, least_mu, reserve, 
         v = c.velocity
         if slips and c.age >= SETTLED:
             c.found = 1.0
-        moves = slips and (
-            v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0
-        )  # near the surface a slip is probable, unseen
+        # Near the surface a slip is probable, unseen.
+        moves = slips and (v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0)
         c.since = 0.0 if moves else c.since + dt
         sticks = c.since > STICKS + BRAKES
         brakes = c.found > 0.0 and STICKS < c.since < STICKS + BRAKES

@@ -121,9 +121,10 @@ def mjx_discs(full: bool) -> Measurement:
 
     In turns, both in double precision. Raises `MissingExtraError` without MJX.
     """
+    # Before anything else: its error names the missing extra.
     from planarfriction.adapters import (
         mjx as adapter,
-    )  # before anything else: its error names the missing extra
+    )
 
     # isort: split
     import jax
@@ -161,9 +162,10 @@ def mujoco_warp(full: bool, scene: MujocoScene) -> Measurement:
 
     In turns, after steps in which contacts settle. Raises `MissingExtraError` without MuJoCo Warp.
     """
+    # Before anything else: its error names the extra.
     from planarfriction.adapters import (
         mujoco_warp as adapter,
-    )  # before anything else: its error names the extra
+    )
 
     # isort: split
     import mujoco

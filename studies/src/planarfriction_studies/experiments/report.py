@@ -118,10 +118,11 @@ def _image(path: Path) -> dict[str, Any]:
     try:
         data = path.read_bytes()
     except OSError:
+        # Someone removed it: its caption still says what it was.
         return {
             "source": "",
             "width": 100,
-        }  # someone removed it: its caption still says what it was
+        }
     width = int.from_bytes(data[16:20], "big")  # of the header of a PNG
     source = "data:image/png;base64," + base64.b64encode(data).decode()
     return {"source": source, "width": min(100, round(100 * width / WIDEST))}

@@ -214,9 +214,8 @@ def rows_of(
     for case, rows in zip(cases, errors, strict=True):
         if measure.board in ("", case.board):
             values.append(rows[:, measure.column])
-            one_each = (
-                task.name == "pushes"
-            )  # there each row is a push, in the others a case is one
+            # There each row is a push, in the others a case is one.
+            one_each = task.name == "pushes"
             groups += (
                 [f"{case.name} {i}" for i in range(len(rows))]
                 if one_each

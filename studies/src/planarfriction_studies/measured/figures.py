@@ -35,9 +35,8 @@ def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
         10.0, max(3.2, 0.42 * rows + (3.4 if task == "slides" else 1.6))
     )
     figure.set_layout_engine("constrained", w_pad=0.06)
-    parts: Any = (
-        figure.subfigures
-    )  # an array of them, which its annotation does not say
+    # An array of them, which its annotation does not say.
+    parts: Any = figure.subfigures
     if task == "slides":
         above, below = parts(2, 1, height_ratios=(0.42 * rows + 1.0, 2.6))
         _dots(above, benchmark, task)

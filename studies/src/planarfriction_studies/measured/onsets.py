@@ -118,9 +118,10 @@ def read(folder: Path | None = None) -> list[Case]:
             )
         answer = np.array([*(getattr(row, each) for each in end), over])
         kind = "flat" if board == "flat" else "feet"
+        # Half of them to fit to.
         cases.append(
             Case(question, answer, name, f"{4 * i + i % 2}", np.arange(1), kind)
-        )  # half of them to fit to
+        )
     return cases
 
 

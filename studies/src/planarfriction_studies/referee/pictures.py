@@ -183,9 +183,8 @@ def _panel(case: Case, verdict: Verdict, left: float, top: float) -> str:
     moving = "".join(
         _polygon(each, 'fill="#48a" fill-opacity="0.6" stroke="#124"') for each in own
     )
-    moving += _polygon(
-        np.array([own[0].mean(0), own[0][0]]), 'stroke="#124"'
-    )  # a spoke, that shows how it turns
+    # A spoke, that shows how it turns.
+    moving += _polygon(np.array([own[0].mean(0), own[0][0]]), 'stroke="#124"')
     name = html.escape(f"{verdict.engine}: {verdict.mark}")
     return f"""<text x="{left + 4:g}" y="{top + 13:g}" font-size="12">{name}</text>
 <svg x="{left:g}" y="{top + TITLE:g}" width="{WIDTH - 6:g}" height="{HEIGHT - 4:g}" viewBox="{_view(span)}">

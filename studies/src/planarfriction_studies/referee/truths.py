@@ -273,9 +273,8 @@ def _moved(
     size = lambda v: math.hypot(v[0], v[1], scale * v[2])
 
     def rates(_, y):
-        factor = (
-            min(size(y[3:6]) / 0.1, 1.0) if rests else 1.0
-        )  # slower clock where the body comes to rest
+        # Slower clock where the body comes to rest.
+        factor = min(size(y[3:6]) / 0.1, 1.0) if rests else 1.0
         return np.concatenate(
             [factor * y[3:6], factor * acceleration(y[6], y[:3], y[3:6]), [factor]]
         )

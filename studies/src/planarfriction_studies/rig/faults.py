@@ -220,9 +220,8 @@ class Batch:
         if fault.kind == "dropped":
             lost = (step // WINDOW * 7919 + own * 104729) % 97 % 2 == 0
             return np.where(lost[:, None], np.nan, right)
-        return np.where(
-            np.isnan(right), np.nan, self.rows["frozen"][at]
-        )  # as long as samples come
+        # As long as samples come.
+        return np.where(np.isnan(right), np.nan, self.rows["frozen"][at])
 
     def reached(self, moment: int) -> np.ndarray:
         """Return which rows have come to a moment of their task."""

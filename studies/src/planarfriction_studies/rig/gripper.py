@@ -335,9 +335,8 @@ class Gripper:
         parts = self.parts
         (x, y) = self.centre.T
         scale = self._scale()
-        levers = np.zeros(
-            (len(parts), 3, 3)
-        )  # the twist at the grip of that of the centre of mass
+        # The twist at the grip of that of the centre of mass.
+        levers = np.zeros((len(parts), 3, 3))
         levers[:, (0, 1, 2), (0, 1, 2)] = 1.0
         levers[:, 0, 2] = y
         levers[:, 1, 2] = -x

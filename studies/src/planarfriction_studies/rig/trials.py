@@ -112,9 +112,8 @@ class Rule:
         wrench = sample.wrench - self._bias
         came = np.isfinite(sample.slip_velocity)
         self._velocity = np.where(came, sample.slip_velocity, self._velocity)
-        self._slid = (
-            self._slid + DT * self._velocity
-        )  # as the sample is held between two of them
+        # As the sample is held between two of them.
+        self._slid = self._slid + DT * self._velocity
         radius = self._unit * parts.radius * load**parts.growth
         speed = np.hypot(*self._velocity[:, :2].T)
         force = np.hypot(*wrench[:, :2].T)

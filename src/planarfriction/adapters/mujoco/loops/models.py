@@ -24,7 +24,16 @@ COUNT = len(PARAMETERS)
 _PLACES = tuple(
     LawNumbers._fields.index(name) for name in PARAMETERS if name in LawNumbers._fields
 )
-_SIGMA_0, _SIGMA_1, _SIGMA_2, _MU_C, _MU_S, _V_S, _RATIO, _SCALE, _X, _Y = range(COUNT)
+_SIGMA_0 = PARAMETERS.index("sigma_0")
+_SIGMA_1 = PARAMETERS.index("sigma_1")
+_SIGMA_2 = PARAMETERS.index("sigma_2")
+_MU_C = PARAMETERS.index("mu_c")
+_MU_S = PARAMETERS.index("mu_s")
+_V_S = PARAMETERS.index("v_s")
+_RATIO = PARAMETERS.index("breakaway_ratio")
+_SCALE = PARAMETERS.index("scale")
+_X = PARAMETERS.index("centre_x")
+_Y = PARAMETERS.index("centre_y")
 
 
 @kernel

@@ -227,9 +227,8 @@ def _solve(own, patches, m, d, nefc):
 @kernel
 def _forget(host, kept, d):
     """Clear the memory: no patch is in contact, or none can have friction."""
-    clear(
-        kept.after, host.states + 10 * host.count
-    )  # and wrenches, origins, twists and loads behind the state
+    # And wrenches, origins, twists and loads behind the state.
+    clear(kept.after, host.states + 10 * host.count)
     copy(doubles(integers(d + host.data.qfrc_passive)[0]), kept.total, host.nv)
     kept.iterations[0] = 0.0
     kept.passes[0] = 0.0

@@ -325,9 +325,8 @@ def _errors_over_counts(
         )
     if with_profile:
         _draw_profile(panels[2])
-    handles = dict(
-        zip(*reversed(panels[0].get_legend_handles_labels()), strict=True)
-    )  # each label once
+    # Each label once.
+    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))
     published = handles.pop("published")
     figure.legend([*handles.values(), published], [*handles, "published"], loc="outside lower center", ncols=4,
                   frameon=False, fontsize="small")  # fmt: skip

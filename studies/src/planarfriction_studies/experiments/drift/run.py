@@ -236,9 +236,8 @@ def _closed_forms() -> dict[str, dict[str, float]]:
     stiffness = runs.LAW.sigma_0 * GRAVITY
     x = FORCE / stiffness
     surface = runs.published_model("r", "Circle", width=WIDTH).surface
-    twist = surface.twist(
-        np.array([-FORCE, 0.0, -TORQUE])
-    )  # of unit dissipation, against a balancing friction
+    # Of unit dissipation, against a balancing friction.
+    twist = surface.twist(np.array([-FORCE, 0.0, -TORQUE]))
     scaled = twist * [1.0, 1.0, surface.contact_radius]
     duration = x / (-surface.wrench(twist)[0] * np.linalg.norm(scaled))  # z = h |V_S| t
     return {

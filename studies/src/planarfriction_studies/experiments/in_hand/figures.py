@@ -128,9 +128,8 @@ def distances(
         axes.set_title(title, fontsize="medium")
         axes.set_xlabel("time [s]")
     row[0].set_ylabel(label)
-    row[0].set_ylim(
-        bottom=0.0
-    )  # after all lines: it ends the scaling of the shared axis
+    # After all lines: it ends the scaling of the shared axis.
+    row[0].set_ylim(bottom=0.0)
     looks.legend(figure, row[0], 4, "lower", fontsize="small")
     return figure
 

@@ -182,9 +182,8 @@ def _line_rows(numbers: Numbers) -> list[_Row]:
     cause = "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
     for name in ("Line", "LineGrad"):
         row = numbers["patches"][name]
-        end = (
-            0.5 * (CELLS - 1) * cell - row["centre of pressure y [m]"]
-        )  # the nearer one, at the heavy end
+        # The nearer one, at the heavy end.
+        end = 0.5 * (CELLS - 1) * cell - row["centre of pressure y [m]"]
         expected = math.sqrt(2.0 - 2.0 * end / math.hypot(end, row[_RADIUS]))
         words = f"ellipsoid, largest distance of corresponding points, {IN_WORDS[name]}"
         rows.append(
@@ -288,9 +287,8 @@ def gradient_comparisons(numbers: Numbers) -> list[Comparison]:
     total = CELLS * (CELLS + 1) // 2
     k = half_load_cell(CELLS)
     beyond = total - k * (k + 1) // 2  # weights between that cell and the heavy end
-    above = sum(
-        range(math.ceil((2 * CELLS + 1) / 3), CELLS + 1)
-    )  # the centre of pressure lies at (2 N + 1)/3
+    # The centre of pressure lies at (2 N + 1)/3.
+    above = sum(range(math.ceil((2 * CELLS + 1) / 3), CELLS + 1))
     lumped = cell**2 / (12.0 * ours["radius"])
     rounding = "Weights on both sides of {}: rounding."
     rows: list[tuple[str, float, float, float, str, str]] = [

@@ -325,9 +325,8 @@ def _profiles(titles: dict[int, str], loads: np.ndarray) -> PlotFigure:
         axes.set_xlabel("$x$ [mm]")
         tidy(axes)
     row[0].set_ylabel("pressure [kPa]")
-    row[0].set_ylim(
-        bottom=0.0
-    )  # after all lines: it ends the scaling of the shared axis
+    # After all lines: it ends the scaling of the shared axis.
+    row[0].set_ylim(bottom=0.0)
     row[0].legend(frameon=False, fontsize="small")
     _draw_moments(
         parts[1].subplots(1, 2), titles, np.linspace(loads[0], loads[-1], 101)

@@ -303,9 +303,8 @@ def _step_comparisons(steps: Arrays) -> list[Comparison]:
     (start, end, speed) = SLIDE_RAMP
     upward = steps["time"] < end
     y = np.sort(patch.positions[:, 1])
-    crossings = (
-        start + (end - start) * y[y > -1e-9] / speed
-    )  # the centre of rotation is at y = vx/omega
+    # The centre of rotation is at y = vx/omega.
+    crossings = start + (end - start) * y[y > -1e-9] / speed
     # first and last the centre of rotation leaves and meets the middle cell
     heights = (
         np.where(

@@ -53,9 +53,8 @@ class DrakeWorld:
         from pydrake.systems.analysis import Simulator
         from pydrake.systems.framework import DiagramBuilder
 
-        logging.getLogger("drake").setLevel(
-            logging.ERROR
-        )  # half spaces do not touch deformable bodies
+        # Half spaces do not touch deformable bodies.
+        logging.getLogger("drake").setLevel(logging.ERROR)
         self.case = case
         self.dt = dt
         self.now = 0
