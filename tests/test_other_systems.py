@@ -9,8 +9,8 @@ import sys
 
 import pytest
 
-from planarfriction import writing
 from planarfriction._engine.compiler.threads import processors
+from planarfriction._support import writing
 from planarfriction.errors import FileError
 from planarfriction_studies.bench import workflows
 

@@ -19,7 +19,7 @@ from sphinx.ext.napoleon import NumpyDocstring
 from sphinx.pycode import ModuleAnalyzer
 
 import planarfriction
-from planarfriction.described import HEADING
+from planarfriction._support.described import HEADING
 
 OPTIONAL = (
     "extend",

@@ -16,14 +16,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
 from planarfriction._engine.compiler.calls import address_of
 from planarfriction._engine.compiler.memory import Layout, Packed, places_of
 from planarfriction._engine.compiler.threads import share
 from planarfriction._engine.coupled import coupling as kernels
 from planarfriction._engine.coupled.coupling_rows import Followers, Patches, layout
 from planarfriction._engine.records.packed import PackedModel
-from planarfriction.equality import ByValue, by_parts
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 from planarfriction.models import FrictionModel

@@ -52,9 +52,7 @@ class Family(Mapping[str, Any]):
     def choose(self, name: str) -> Any:
         """Return the class or function of a member. Raises `InvalidValueError` with all names if there is none."""
         # Brings NumPy with it, which names alone do not need.
-        from planarfriction import (
-            validation,
-        )
+        from planarfriction._support import validation
 
         return self[validation.choice(self.what, name, self)]
 

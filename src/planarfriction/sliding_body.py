@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import geometry, validation
+from planarfriction import geometry
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Kept, by_parts, checked
 from planarfriction.coupling import CoupledPatches, HostStep
-from planarfriction.equality import ByValue, Kept, by_parts, checked
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.models import FrictionModel
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import panel as pn
 
-from planarfriction.described import field_docs
+from planarfriction._support.described import field_docs
 from planarfriction.families import Family
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES

@@ -13,8 +13,9 @@ from typing import Literal
 
 import numpy as np
 
-from planarfriction import geometry, validation
-from planarfriction.equality import Checked, checked
+from planarfriction import geometry
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked, checked
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.limit_surface import (
     LimitSurfaceEllipsoid,

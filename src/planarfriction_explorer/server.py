@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import FrictionError, InvalidValueError, MissingExtraError
 
 LOOPBACK = "127.0.0.1"

@@ -11,14 +11,15 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from planarfriction import geometry, validation
-from planarfriction.equality import Checked, checked
+from planarfriction import geometry
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked, checked
+from planarfriction._support.reading import Section
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.laws import LAWS, FrictionLaw, LuGre
 from planarfriction.limit_surface.comparison import angles
 from planarfriction.planning import holding_load
 from planarfriction.planning.holding import GRAVITY
-from planarfriction.reading import Section
 from planarfriction.scenes.body import floats
 from planarfriction.scenes.model_files import law_from_dict
 from planarfriction_explorer.drawing import MOST_SIDE, Drawing

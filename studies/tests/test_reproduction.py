@@ -503,7 +503,7 @@ def test_published_and_converged_agree_to_the_stated_deviation():
 
 def test_a_full_disk_ends_in_one_line_and_keeps_what_was_there(tmp_path, monkeypatch):
     """The pieces of an experiment and its results are written as everything is: whole, or not at all."""
-    from planarfriction import writing
+    from planarfriction._support import writing
     from planarfriction.errors import FileError
     from planarfriction_studies.experiments.experiment import Work
 

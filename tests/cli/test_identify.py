@@ -9,10 +9,10 @@ import time
 
 import pytest
 
+from planarfriction._support.validation import number_in
 from planarfriction.cli import console, main
 from planarfriction.cli.output import write_csv
 from planarfriction.identify.logs import columns_of
-from planarfriction.validation import number_in
 from tests.support.identification_logs import clean_log, excitation, noisy
 
 FAST = [

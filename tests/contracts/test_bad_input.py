@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 import planarfriction as pf
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import Grid, PerCell
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import pytest
 
 import planarfriction as pf
-from planarfriction.described import HEADING
+from planarfriction._support.described import HEADING
 
 FRONT_ENDS = {
     "torch": "torch",

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from planarfriction._engine.compiler import FOLDERS
-from planarfriction.pictures import PICTURES
+from planarfriction._support.pictures import PICTURES
 from tests.support.repository import script
 
 ROOT = Path(__file__).parents[2]

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 import planarfriction as pf
-from planarfriction.equality import ByValue, by_parts
+from planarfriction._support.equality import ByValue, by_parts
 
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
 LAW = pf.LuGre(mu_s=1.2)

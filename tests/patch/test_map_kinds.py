@@ -10,9 +10,9 @@ import pytest
 from scipy.io import savemat
 
 import planarfriction as pf
+from planarfriction._support.reading import Table
 from planarfriction.errors import FileError
 from planarfriction.patch import map_kinds
-from planarfriction.reading import Table
 
 MAP = np.array([[0.0, 0.0, 0.0], [0.0, 5.0, 2.5], [0.0, 7.0, 0.0]])
 ROWS = "0,0,0\n0,5,2.5\n0,7,0\n"

@@ -17,7 +17,9 @@ from matplotlib.colors import to_hex
 from mpl_toolkits.mplot3d import Axes3D
 
 import planarfriction as pf
-from planarfriction import plots, shown
+from planarfriction import plots
+from planarfriction._support import shown
+from planarfriction._support.shown import unit_for
 from planarfriction.errors import InvalidValueError, MissingExtraError
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import histories, motion, style
@@ -28,7 +30,6 @@ from planarfriction.plots.limit_surface import (
     sample_limit_surface,
     scaled_samples,
 )
-from planarfriction.shown import unit_for
 from planarfriction_studies.experiments import looks
 from tests.support import synthetic
 from tests.support.pictures import faults

@@ -10,10 +10,10 @@ from scipy.io import netcdf_file
 
 import planarfriction as pf
 from planarfriction import FrictionError, Solution
+from planarfriction._support.writing import check_writable
 from planarfriction.errors import FileError
 from planarfriction.scenes import Statistics, in_hand
 from planarfriction.scenes.solution import History, write_dataset
-from planarfriction.writing import check_writable
 from tests.support import synthetic
 
 UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}

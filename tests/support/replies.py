@@ -18,11 +18,12 @@ from PIL import Image
 from scipy.io import savemat
 
 import planarfriction as pf
-from planarfriction import environments, reading, shown, sweeps, validation, writing
+from planarfriction import environments, sweeps
+from planarfriction._support import reading, shown, validation, writing
+from planarfriction._support.reading import Section
 from planarfriction.cli import doctor, identify, options
 from planarfriction.errors import FrictionError
 from planarfriction.patch import Grid, read_pressure_map
-from planarfriction.reading import Section
 from planarfriction.scenes import files, ready
 from planarfriction.scenes.model_files import patch_from_dict
 from planarfriction.sweeps import settings

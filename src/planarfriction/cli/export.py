@@ -18,8 +18,8 @@ def read_model(file: Path, contact: str | None) -> Any:
     Raises FileError for what is neither, InvalidValueError for a contact that is not there, or one that is needed and
     not given.
     """
-    from planarfriction import validation
-    from planarfriction.reading import Section
+    from planarfriction._support import validation
+    from planarfriction._support.reading import Section
     from planarfriction.scenes.files import read_table
     from planarfriction.scenes.model_files import model_from_dict
 

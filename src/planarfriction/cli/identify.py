@@ -168,10 +168,10 @@ def identify(
       planarfriction identify plan slow.csv --patch disc
       planarfriction identify joint arm.csv --inertia 0.05
     """
+    from planarfriction._support.writing import make_folder, write_text
     from planarfriction.cli.console import note, work_progress
     from planarfriction.cli.output import slug, write_picture
     from planarfriction.identify import FitOptions, identify_lugre
-    from planarfriction.writing import make_folder, write_text
 
     given = find_patch(patch, size)
     chosen: dict[str, Any] = {
@@ -218,7 +218,7 @@ def identify(
 
 def parse_start(entries: Sequence[str]) -> dict[str, float]:
     """Parse the values of `--start NAME=VALUE`, by name."""
-    from planarfriction import validation
+    from planarfriction._support import validation
 
     start = {}
     for entry in entries:
@@ -255,7 +255,7 @@ def parse_nuisance(text: str | None) -> tuple[str, ...]:
 
 def parse_noise(text: str | None) -> list[float] | None:
     """Parse the three numbers of `--noise`."""
-    from planarfriction import validation
+    from planarfriction._support import validation
 
     return (
         None
@@ -467,11 +467,11 @@ def joint(
       planarfriction identify joint arm.csv --inertia 0.05
       planarfriction identify joint a.csv b.csv c.csv d.csv --mass 0.5 --length 0.1 --kp 200 --supply 7.4 --gain 0.003
     """
+    from planarfriction._support.writing import make_folder, write_text
     from planarfriction.cli.console import note, work_progress
     from planarfriction.cli.output import slug, write_picture
     from planarfriction.export.joint import export_joint_c
     from planarfriction.joints import Drive, JointLog, Plant, identify_joint
-    from planarfriction.writing import make_folder, write_text
 
     if len(kp) not in (0, 1, len(logs)):
         raise InvalidValueError(

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 import planarfriction as pf
+from planarfriction._support.writing import write_text
 from planarfriction.cli.console import note, print_table
 from planarfriction.cli.options import find_patch, pressure_map
 from planarfriction.cli.output import PICTURES, check_kind, write_csv, write_picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import SURFACES
-from planarfriction.writing import write_text
 
 HTML = ".html"
 """A picture to be turned with the mouse."""

@@ -55,7 +55,7 @@ def find_patch(
                 )
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
-        from planarfriction import validation  # loads NumPy
+        from planarfriction._support import validation  # loads NumPy
 
         validation.choice("patch", text, [*patch_names(), "a pressure map file"])
     return pressure_map(text, size)

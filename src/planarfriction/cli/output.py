@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import planarfriction as pf
+from planarfriction._support.writing import check_writable, replacing, write_text
 from planarfriction.errors import FileError
-from planarfriction.writing import check_writable, replacing, write_text
 
 PICTURES = (".png", ".pdf", ".svg")
 """Kinds of pictures."""

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import planarfriction as pf
-from planarfriction import validation
+from planarfriction._support import validation
+from planarfriction._support.writing import make_folder
 from planarfriction.cli import INTERRUPTED, output
 from planarfriction.cli.console import note, print_table, simulation_progress
 from planarfriction.cli.options import WIDTH, find_patch
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.families import MODELS, SCENES
-from planarfriction.writing import make_folder
 
 FINISHED = "success"
 """Status of a simulation that ran until its last time."""
@@ -26,7 +26,7 @@ FINISHED = "success"
 
 def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
     """Return rows of text for a table with one column for each solution; differences are those from the first."""
-    from planarfriction.shown import unit_for
+    from planarfriction._support.shown import unit_for
 
     every = list(solutions.values())
     ends = {name: [_last(each, name) for each in every] for name in ("x", "y", "theta")}

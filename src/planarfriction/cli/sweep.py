@@ -81,7 +81,8 @@ def sweep(
       planarfriction sweep in-hand --set mass=0.1:0.3:5 --set fingers.model=reduced,distributed --out runs/
       planarfriction sweep scene.toml --set body.position.0=0:0.02:50 --measure mine.py:slip
     """
-    from planarfriction import sweeps, validation
+    from planarfriction import sweeps
+    from planarfriction._support import validation
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import note, work_progress
     from planarfriction.cli.run import scene_makers
@@ -169,7 +170,7 @@ def _in_units(each: xr.DataArray) -> tuple[str, np.ndarray]:
     """Return the name of a variable with a unit in which its values read well, and all values in that unit."""
     import numpy as np
 
-    from planarfriction.shown import unit_for
+    from planarfriction._support.shown import unit_for
 
     values = each.values.ravel()
     unit = each.attrs.get("units")

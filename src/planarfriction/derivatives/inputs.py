@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.cells.rollouts import Inputs, ShapesByLoad
 from planarfriction._engine.compiler import threads
+from planarfriction._support import validation
 from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
 

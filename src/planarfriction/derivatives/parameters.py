@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.bristles.law import LAW
 from planarfriction._engine.cells import cells_rollout
 from planarfriction._engine.cells.cell_kinds import rollouts_of_cells
@@ -21,6 +20,7 @@ from planarfriction._engine.published.published_rollouts import (
     tangent,
 )
 from planarfriction._engine.records.packed import cells_by_load
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed

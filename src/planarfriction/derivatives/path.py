@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.body import adjoint, rosenbrock, tangent
 from planarfriction._engine.body import path as paths
 from planarfriction._engine.body.body import System
@@ -16,8 +15,9 @@ from planarfriction._engine.body.integration import Output
 from planarfriction._engine.body.path import Path, Stretch, Tolerances
 from planarfriction._engine.body.sdirk import workspace_for
 from planarfriction._engine.body.tangent import Drives
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
 from planarfriction.derivatives.scene_inputs import SceneInputs
-from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene, SolverOptions

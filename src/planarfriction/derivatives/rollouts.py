@@ -7,7 +7,6 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.cells.cell_blocks import divided
 from planarfriction._engine.cells.rollouts import (
     Bars,
@@ -16,6 +15,8 @@ from planarfriction._engine.cells.rollouts import (
     ShapesByLoad,
 )
 from planarfriction._engine.compiler import threads
+from planarfriction._support import validation
+from planarfriction._support.equality import by_parts
 from planarfriction.derivatives.inputs import (
     RolloutInputs,
     checked,
@@ -25,7 +26,6 @@ from planarfriction.derivatives.inputs import (
     sum_to,
 )
 from planarfriction.derivatives.parameters import Packed, is_compiled, pack
-from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.models import FrictionModel

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.compiler import threads
+from planarfriction._support import validation
 from planarfriction.derivatives.path import RTOL, KeptMotion
 from planarfriction.derivatives.scene_inputs import (
     SCENE_PARAMETERS,

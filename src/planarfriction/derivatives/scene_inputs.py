@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.body import tangent
 from planarfriction._engine.body.body import System
 from planarfriction._engine.body.tangent import Drives
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws.base import refuse_rate_law
 from planarfriction.scenes.packing import SegmentBatches

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.body import path as paths
 from planarfriction._engine.body import tangent
 from planarfriction._engine.body.body import System
 from planarfriction._engine.body.path import Path, Stretch, Tolerances
 from planarfriction._engine.body.sdirk import workspace_for
 from planarfriction._engine.body.tangent import Drives
+from planarfriction._support import validation
 from planarfriction.derivatives.path import (
     KeptMotion,
     MotionPath,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from planarfriction import validation, writing
 from planarfriction._engine.codegen.trace import Number, Trace, traced
 from planarfriction._engine.codegen.twins import twin
+from planarfriction._support import validation, writing
 from planarfriction.export.c_source import Writer, rendered
 from planarfriction.export.library import checked_name
 from planarfriction.joints import JointFriction

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation, writing
 from planarfriction._engine.cells import tilt
 from planarfriction._engine.compiler import compiled_math
 from planarfriction._engine.published.surfaces import CELLS
+from planarfriction._support import validation, writing
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.body import body_of
 from planarfriction.export.c_source import (

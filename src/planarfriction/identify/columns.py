@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import FileError, InvalidValueError, shown
 
 TWIST = ("vx", "vy", "omega")

@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log, as_tuple

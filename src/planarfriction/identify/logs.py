@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import ByValue, Kept
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Kept
+from planarfriction._support.reading import Table
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.identify.columns import LOAD, MOTION, TWIST, WRENCH, find_columns
-from planarfriction.reading import Table
 from planarfriction.scenes import Solution
 
 LEAST_SAMPLES = 10

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.checks import check_slides
 from planarfriction.identify.logs import as_tuple

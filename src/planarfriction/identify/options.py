@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import Checked, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.rig import GROUPS, check_groups
 from planarfriction.laws import ElastoPlastic, LuGre

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import Log

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
+from planarfriction._support.pictures import picture
 from planarfriction.formulas import PARAMETERS
 from planarfriction.identify.parameters import ALL, LAW
 from planarfriction.identify.rig import Nuisance
 from planarfriction.identify.uncertainty import draws
 from planarfriction.identify.verdicts import ModelScore, Verdict, interval
 from planarfriction.laws import LuGre
-from planarfriction.pictures import picture
 
 NUMBERS = tuple(name for name in PARAMETERS if name in LAW)
 """Numbers of the law that may differ between environments."""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.identify.logs import Log
 
 GROUPS = ("delay", "bias", "load", "twist")

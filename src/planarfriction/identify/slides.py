@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Checked, checked
 from planarfriction.derivatives.scene_inputs import STATES
-from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.identify.logs import increasing, unwrapped
 from planarfriction.identify.options import check_noise
 from planarfriction.identify.verdicts import Verdict

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.described import described
+from planarfriction._support.described import described
 from planarfriction.identify.decimation import samples_of
 from planarfriction.identify.logs import TWO_LOADS, Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of

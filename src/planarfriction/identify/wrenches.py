@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known

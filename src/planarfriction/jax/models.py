@@ -10,13 +10,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from planarfriction._support.equality import ByValue, by_parts
 from planarfriction.derivatives.parameters import (
     PARAMETERS,
     Packed,
     pack_cells,
     pack_surface,
 )
-from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax.base import FrictionPytree, record_of
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from planarfriction import validation
 from planarfriction._engine.cells.tilt import OVERSHOT, SHORTENINGS, SOFTNESS, STEPS
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.tensors.namespace import Namespace
 

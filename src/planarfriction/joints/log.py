@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import ByValue, Checked, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Checked, checked
+from planarfriction._support.reading import Table
 from planarfriction.errors import FileError, InvalidValueError, shown
 from planarfriction.identify.logs import (
     LEAST_SAMPLES,
@@ -22,7 +23,6 @@ from planarfriction.identify.logs import (
     slopes,
     unwrapped,
 )
-from planarfriction.reading import Table
 
 GRAVITY = 9.81
 """Standard acceleration of gravity of the fits [m/s^2]."""

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.described import described
+from planarfriction._support.described import described
+from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.friction import JointFriction
 from planarfriction.joints.log import JointLog, Plant
 from planarfriction.joints.problem import Problem, friction_of
-from planarfriction.pictures import picture
 
 UNITS = {
     "inertia": "kg m^2", "arm_mass": "kg", "offset": "rad", "gravity": "N m", "torque_offset": "N m", "delay": "s",

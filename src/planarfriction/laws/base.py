@@ -7,11 +7,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import formulas, validation
-from planarfriction.equality import Checked
+from planarfriction import formulas
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked
+from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.pictures import picture
 
 
 class FrictionLaw(Checked):

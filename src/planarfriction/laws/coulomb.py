@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import Checked, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 
 

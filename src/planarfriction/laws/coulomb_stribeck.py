@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from planarfriction import validation
-from planarfriction.equality import checked
+from planarfriction._support import validation
+from planarfriction._support.equality import checked
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
 

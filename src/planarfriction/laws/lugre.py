@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from planarfriction import validation
-from planarfriction.equality import Checked, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw

@@ -10,12 +10,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
 from planarfriction._engine.cells import cells, rate_law
 from planarfriction._engine.codegen import rules, vectors
 from planarfriction._engine.compiler.calls import address_of
 from planarfriction._engine.compiler.memory import place_of, row_of
 from planarfriction._engine.coupled import steps
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw

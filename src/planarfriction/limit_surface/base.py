@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
 from planarfriction._engine.published import surfaces as kernels
-from planarfriction.equality import ByValue, by_parts, unusual
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, by_parts, unusual
+from planarfriction._support.pictures import picture
 from planarfriction.errors import FrictionError, InvalidValueError, SolverError
 from planarfriction.geometry import transformed
 from planarfriction.limit_surface.loops.twists import StoredPotential, table_twists
@@ -24,7 +25,6 @@ from planarfriction.patch.metric import (
     refuse_cell_metrics,
     symmetric_root,
 )
-from planarfriction.pictures import picture
 
 if TYPE_CHECKING:
     from planarfriction.limit_surface.comparison import SurfaceComparison

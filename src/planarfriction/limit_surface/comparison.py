@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.described import described
+from planarfriction._support import validation
+from planarfriction._support.described import described
 
 MOST_SAMPLES = 10_000
 """Directions at which surfaces are compared, in seconds: beyond them the figures hardly change any more."""

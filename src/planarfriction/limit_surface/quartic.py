@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import FrictionError, InvalidValueError, needing
 from planarfriction.geometry import transformed
 from planarfriction.limit_surface.base import LimitSurface, _rows, scaling

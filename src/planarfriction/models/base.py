@@ -11,15 +11,15 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
 from planarfriction._engine.records.base import CompiledModel, StepJacobians
 from planarfriction._engine.records.packed import PackedModel
-from planarfriction.equality import ByValue, by_parts, unusual
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, by_parts, unusual
+from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.tilt import centre_of, moments_of
-from planarfriction.pictures import picture
 
 
 @by_parts

@@ -10,8 +10,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.records.base import CompiledModel
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import is_rate_law

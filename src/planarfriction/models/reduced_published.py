@@ -9,11 +9,11 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.published.published_contact import slopes_in
 from planarfriction._engine.published.surfaces import ELLIPSOID
 from planarfriction._engine.records.published import CompiledPublished
-from planarfriction.equality import by_parts
+from planarfriction._support import validation
+from planarfriction._support.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_fixed_stiffness, refuse_rate_law

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.online.loops import grips
 from planarfriction.online.observer import Estimate, FrictionObserver, estimate_of

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import by_parts
+from planarfriction._support import validation
+from planarfriction._support.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import FrictionModel

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from planarfriction import validation
-from planarfriction.equality import ByValue, by_parts, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, by_parts, checked
 
 GRAVITY = 9.81
 """Gravity [m/s^2]."""

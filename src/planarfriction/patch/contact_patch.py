@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
+from planarfriction._support import validation
+from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
 from planarfriction.patch import pressure as pressures
@@ -27,7 +28,6 @@ from planarfriction.patch.moments import Moments
 from planarfriction.patch.pressure import Pressure, Uniform
 from planarfriction.patch.pressure_maps import map_grid, read_maps
 from planarfriction.patch.tilt import weights_under
-from planarfriction.pictures import picture
 
 _UNIT_BOX = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 

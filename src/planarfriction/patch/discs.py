@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.patch.moments import disc_friction
 from planarfriction.patch.outline import with_outline
 from planarfriction.patch.pressure import PerCell

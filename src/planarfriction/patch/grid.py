@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import Checked, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 
 MOST_CELLS = 1_100_000

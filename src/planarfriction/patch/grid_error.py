@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planarfriction import geometry, validation
-from planarfriction.described import described
+from planarfriction import geometry
+from planarfriction._support import validation
+from planarfriction._support.described import described
 from planarfriction.families import SURFACES
 from planarfriction.patch.grid import MOST_CELLS, check_cells, point_shares
 from planarfriction.patch.pressure import Uniform

@@ -15,8 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import Checked, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked, checked
+from planarfriction._support.reading import (
+    number,
+    read_bytes,
+    read_rows,
+    read_text,
+    width,
+)
 from planarfriction.errors import FileError, FrictionError, InvalidValueError, shown
 from planarfriction.patch.grid import MOST_CELLS
 from planarfriction.patch.map_kinds import (
@@ -25,7 +32,6 @@ from planarfriction.patch.map_kinds import (
     remark_offset,
     rim_of,
 )
-from planarfriction.reading import number, read_bytes, read_rows, read_text, width
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
 """Suffixes of the files that are read as grey images."""

@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.outline import with_outline
 

@@ -12,7 +12,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import formulas, validation
+from planarfriction import formulas
+from planarfriction._support import validation
 from planarfriction.patch.metric import Anisotropy
 
 MOST_DEGREE = 40

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.grid import MOST_CELLS, Grid, point_shares
 

@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import formulas, validation
-from planarfriction.equality import ByValue, Checked, checked
+from planarfriction import formulas
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.families import PRESSURES
 

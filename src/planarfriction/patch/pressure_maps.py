@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.map_files import MapReading, map_reading, read_pressure_map

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import PUBLISHED_PATCHES
 from planarfriction.patch.contact_patch import ContactPatch

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
 from planarfriction.patch.moments import disc_friction
 from planarfriction.patch.pressure import Pressure
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.limit_surface import LimitSurface
 
 STICK = "stick"

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.compiler import threads
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
+from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
-from planarfriction.pictures import picture
 from planarfriction.planning.holding import dynamic_holding_load, holding_load
 from planarfriction.planning.motions import (
     LOOSE,

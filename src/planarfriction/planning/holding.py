@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import twist_at
 from planarfriction.limit_surface import (

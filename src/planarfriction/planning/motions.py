@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction._engine.compiler import threads
+from planarfriction._support.equality import ByValue
 from planarfriction.derivatives import scene_sensitivities
 from planarfriction.derivatives.scene_inputs import STATES
-from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.scenes import Scene, Signal, SolverOptions, simulate

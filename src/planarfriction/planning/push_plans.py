@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.described import described
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.described import described
+from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.geometry import rotate
 from planarfriction.limit_surface import LimitSurfaceEllipsoid

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
+from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
-from planarfriction.pictures import picture
 from planarfriction.planning.contact_modes import (
     LEFT,
     RIGHT,

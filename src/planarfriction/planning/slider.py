@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import ByValue, Checked, Kept, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Checked, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.planning.contact_modes import TouchPoint

@@ -14,15 +14,16 @@ from matplotlib.patches import FancyArrowPatch, Patch
 from matplotlib.patheffects import withStroke
 
 import planarfriction as pf
-from planarfriction import geometry, validation
+from planarfriction import geometry
+from planarfriction._support import validation
+from planarfriction._support.shown import unit_for
+from planarfriction._support.writing import replacing
 from planarfriction.errors import InvalidValueError
 from planarfriction.plots import panels, style
 from planarfriction.plots.film_files import check_kind, write_frames
 from planarfriction.plots.motion import body_lines, move, placed
 from planarfriction.plots.panels import CellPanel, SurfacePanel
 from planarfriction.plots.track import Track, track_of
-from planarfriction.shown import unit_for
-from planarfriction.writing import replacing
 
 LEAST_FRAMES = 75
 """Frames that a picture has at least where nothing is asked for."""

@@ -10,10 +10,10 @@ from matplotlib import rcParams
 from matplotlib.font_manager import FontProperties
 
 import planarfriction as pf
-from planarfriction import validation
+from planarfriction._support import validation
+from planarfriction._support.shown import Unit, unit_for
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.plots import style
-from planarfriction.shown import Unit, unit_for
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,8 +8,8 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction import formulas
+from planarfriction._support.shown import unit_for
 from planarfriction.plots import style
-from planarfriction.shown import unit_for
 
 KINDS = {"N": "force", "N m": "torque", "m": "length", "rad": "angle"}
 """Unit of a channel -> kind of quantity."""

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib import colormaps
 
 import planarfriction as pf
-from planarfriction import geometry, validation
+from planarfriction import geometry
+from planarfriction._support import validation
 from planarfriction.errors import needing
 from planarfriction.families import SURFACES
 from planarfriction.plots import style

@@ -13,12 +13,13 @@ from matplotlib.path import Path as Outline
 from matplotlib.transforms import Affine2D
 
 import planarfriction as pf
-from planarfriction import geometry, validation
+from planarfriction import geometry
+from planarfriction._support import validation
+from planarfriction._support.shown import unit_for
 from planarfriction.plots import style
 from planarfriction.plots.histories import draw_histories
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import body_poses, contact_poses
-from planarfriction.shown import unit_for
 
 INSTANTS = 12
 """Number of outlines in a strobe."""

@@ -12,11 +12,11 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction import geometry
+from planarfriction._support.shown import unit_for
 from planarfriction.errors import FrictionError
 from planarfriction.identify.parameters import LAW
 from planarfriction.plots import style
 from planarfriction.plots.motion import draw_motion
-from planarfriction.shown import unit_for
 
 _LOAD = 1.0
 """Load [N] at which a patch is shown whose shape depends on it."""

@@ -9,9 +9,9 @@ from matplotlib.collections import EllipseCollection, PolyCollection
 from matplotlib.ticker import MaxNLocator
 
 import planarfriction as pf
-from planarfriction import validation
+from planarfriction._support import validation
+from planarfriction._support.shown import Unit, unit_for
 from planarfriction.plots import style
-from planarfriction.shown import Unit, unit_for
 
 MOST_EDGES = 5000
 """Cells whose edges are drawn: those of more would hide them."""

@@ -9,11 +9,11 @@ from matplotlib.colors import Normalize
 
 import planarfriction as pf
 from planarfriction import geometry
+from planarfriction._support.shown import unit_for
 from planarfriction.planning.motions import slide_of
 from planarfriction.plots import style
 from planarfriction.plots.track import body_poses
 from planarfriction.scenes import simulate
-from planarfriction.shown import unit_for
 
 INSTANTS = 8
 """Outlines that are drawn."""

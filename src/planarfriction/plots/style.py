@@ -14,10 +14,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
-from planarfriction import validation
+from planarfriction._support import validation
+from planarfriction._support.shown import unit_for
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.shown import unit_for
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import ByValue, Kept, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import rotate
 from planarfriction.scenes.signal import Signal, as_signal

@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import ByValue, Kept
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Kept
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.scenes.body import floats

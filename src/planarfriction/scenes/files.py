@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
+from planarfriction._support.reading import Section, read_text
+from planarfriction._support.writing import write_text
 from planarfriction.errors import FileError, InvalidValueError, shown
-from planarfriction.reading import Section, read_text
 from planarfriction.scenes.body import Body, Spring
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.model_files import model_from_dict, model_to_dict
 from planarfriction.scenes.signal import Signal, read_signal
-from planarfriction.writing import write_text
 
 SCENE_KEYS = (
     "name", "t_end", "save_every", "stop_speed", "rtol", "atol", "start",

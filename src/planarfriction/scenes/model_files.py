@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction._support.reading import Section
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
 from planarfriction.laws import ElastoPlastic
-from planarfriction.reading import Section
 
 _GIVEN = ("patch", "law")
 """Parameters of models and surfaces that are not keys of their tables."""

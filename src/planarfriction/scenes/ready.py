@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.scenes.body import Body
 from planarfriction.scenes.contact import Contact, checked_model

@@ -12,10 +12,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import ByValue, Checked, Kept, checked
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Checked, Kept, checked
+from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
-from planarfriction.pictures import picture
 from planarfriction.scenes.body import Body, Spring
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.signal import (

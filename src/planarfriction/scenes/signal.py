@@ -11,10 +11,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
-from planarfriction.equality import ByValue, Kept
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue, Kept
+from planarfriction._support.reading import Section, Table
 from planarfriction.errors import InvalidValueError, shown
-from planarfriction.reading import Section, Table
 
 Hold = Literal["previous", "linear"]
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.body.integration import Method, Output
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.scenes.packing import SegmentBatches, centres_of_pressure
 from planarfriction.scenes.scene import MAX_STEPS, Scene, SolverOptions

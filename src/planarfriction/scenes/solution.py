@@ -16,17 +16,17 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
-from planarfriction import validation
-from planarfriction.described import described
-from planarfriction.equality import by_parts
+from planarfriction._support import validation
+from planarfriction._support.described import described
+from planarfriction._support.equality import by_parts
+from planarfriction._support.pictures import picture
+from planarfriction._support.reading import read_bytes
+from planarfriction._support.writing import replacing
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.geometry import rotate, twist_at
-from planarfriction.pictures import picture
-from planarfriction.reading import read_bytes
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import displacement
 from planarfriction.solvers.statistics import Statistics
-from planarfriction.writing import replacing
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from planarfriction._engine.body.integration import Method
-from planarfriction.equality import by_parts
+from planarfriction._support.equality import by_parts
 
 by_parts(Method)  # kernels hold loops and nothing else
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
-from planarfriction.described import described
+from planarfriction._support.described import described
 
 
 @described

@@ -15,7 +15,7 @@ from planarfriction._engine.body.body import System
 from planarfriction._engine.body.integration import Method, Output, Progress
 from planarfriction._engine.compiler import missing, threads, together
 from planarfriction._engine.compiler.calls import address_of, signature_of
-from planarfriction.equality import ByValue
+from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.solvers.statistics import Statistics
 

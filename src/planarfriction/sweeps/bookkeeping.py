@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from planarfriction._support.writing import make_folder, replacing, write_text
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.scenes import Scene
 from planarfriction.scenes.signal import SAME_TIME
 from planarfriction.scenes.solution import History
 from planarfriction.sweeps.records import FAILED, Record, failure, pack, unpack
 from planarfriction.sweeps.settings import Grid
-from planarfriction.writing import make_folder, replacing, write_text
 
 if TYPE_CHECKING:
     import xarray as xr

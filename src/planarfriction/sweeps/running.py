@@ -20,9 +20,9 @@ from concurrent.futures import (
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from planarfriction import validation
 from planarfriction._engine.compiler import threads
-from planarfriction.described import described
+from planarfriction._support import validation
+from planarfriction._support.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene, Solution
 from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index

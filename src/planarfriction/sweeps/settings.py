@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import FrictionError, InvalidValueError, shown
 from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
 from planarfriction.scenes import Scene

@@ -6,7 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from planarfriction import models, validation
+from planarfriction import models
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch

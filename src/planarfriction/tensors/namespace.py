@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.tensors.elements import over

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import derivatives
+from planarfriction._support.equality import by_parts
 from planarfriction.derivatives.parameters import Packed
 from planarfriction.derivatives.rollouts import weights_vjp
 from planarfriction.derivatives.scene_function import SceneFunction
-from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.scene import MAX_STEPS, Scene
 from planarfriction.tensors.namespace import (

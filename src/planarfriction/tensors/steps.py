@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
-from planarfriction import validation
 from planarfriction._engine.bristles import settle
+from planarfriction._support import validation
 from planarfriction.derivatives.parameters import PARAMETERS, check_range
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import torch
 from torch import Tensor, nn
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.derivatives.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre

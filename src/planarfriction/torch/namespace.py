@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.tensors.elements import over
 from planarfriction.tensors.namespace import Namespace

@@ -22,7 +22,7 @@ from collections.abc import Iterable, Mapping
 import torch
 from torch import Tensor, nn
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.derivatives.parameters import POSITIVE
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.tensors.steps import LAW

@@ -12,7 +12,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from planarfriction import formulas, validation
+from planarfriction import formulas
+from planarfriction._support import validation
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 
 PRECISIONS = {wp.float32: "float", wp.float64: "double"}

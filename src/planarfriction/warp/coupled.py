@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from planarfriction import coupling, validation
+from planarfriction import coupling
+from planarfriction._support import validation
 from planarfriction.coupling import CoupledStep, HostStep
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.pieces import pieces_of

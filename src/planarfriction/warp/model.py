@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.export.pieces import pieces_of
 from planarfriction.models import FrictionModel

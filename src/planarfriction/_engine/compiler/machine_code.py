@@ -30,7 +30,7 @@ from numba.misc.appdirs import AppDirs
 from planarfriction._engine.compiler.internals import need, part
 from planarfriction._engine.compiler.sources import Sources, digest_of
 from planarfriction._engine.compiler.together import wait_for
-from planarfriction.writing import replacing
+from planarfriction._support.writing import replacing
 
 need(CompileResult, "_reduce", "_rebuild")
 _PASSES = "planarfriction._engine.compiler.interrupts", "heard_between_passes"

@@ -23,7 +23,7 @@ from planarfriction._engine.coupled.steps import (
 )
 from planarfriction._engine.protocol import StepFunctions
 from planarfriction._engine.records.packed import PackedModel, driven, rates
-from planarfriction.equality import by_parts
+from planarfriction._support.equality import by_parts
 from planarfriction.geometry import twist_at, wrench_at
 
 _ARRAY = np.ndarray

@@ -11,7 +11,7 @@ from planarfriction._engine.cells.rollouts import ShapesByLoad
 from planarfriction._engine.compiler.calls import address_of
 from planarfriction._engine.compiler.memory import place_of, row_of
 from planarfriction._engine.coupled.steps import Stepped, linearise_many, rates_many
-from planarfriction.equality import by_parts
+from planarfriction._support.equality import by_parts
 from planarfriction.formulas import LIGHTEST
 
 MAX_PACK_BYTES = 64e6

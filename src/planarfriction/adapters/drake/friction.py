@@ -20,7 +20,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.adapters.drake.asking import Asking
 from planarfriction.adapters.drake.patches import PatchContact, found
 from planarfriction.adapters.drake.shadow import Shadow

@@ -21,10 +21,10 @@ from pydrake.geometry import (
 from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import BodyIndex, FrameIndex
 
-from planarfriction import validation
 from planarfriction._engine.coupled import placing
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked
 from planarfriction.coupling import follows
-from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
 

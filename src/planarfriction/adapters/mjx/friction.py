@@ -14,8 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from mujoco import mjx
 
-from planarfriction import models, validation
+from planarfriction import models
 from planarfriction._engine.coupled import placing
+from planarfriction._support import validation
 from planarfriction.adapters.mjx import newton, responses
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.patches import (

@@ -15,13 +15,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from planarfriction import validation
 from planarfriction._engine.compiler.memory import Layout
 from planarfriction._engine.coupled import placing
+from planarfriction._support import validation
+from planarfriction._support.equality import Checked
 from planarfriction.adapters.mujoco.loops.models import DIGEST, LONGEST
 from planarfriction.adapters.mujoco.loops.records import Memory, memory_layout
 from planarfriction.environments import defaults
-from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import PARAMETERS
 from planarfriction.models import FrictionModel

@@ -14,8 +14,8 @@ import mujoco_warp as mjw
 import numpy as np
 import warp as wp
 
-from planarfriction import validation
 from planarfriction._engine.coupled import placing
+from planarfriction._support import validation
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.patches import (
     PatchContact,

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from planarfriction._support.reading import read_text
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.extend import processors
-from planarfriction.reading import read_text
 from planarfriction_studies.bench.measurement import Measurement
 
 ROUNDS = 3

@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import MissingExtraError
 from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
 from planarfriction.models import ReducedModel, ReducedModelPublished

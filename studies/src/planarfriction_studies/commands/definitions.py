@@ -201,11 +201,11 @@ def measured(
       planarfriction measured --task joints
       planarfriction measured --list
     """
-    from planarfriction import validation
+    from planarfriction._support import validation
+    from planarfriction._support.writing import make_folder
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import note, print_table, work_progress
     from planarfriction.errors import FrictionError, InvalidValueError
-    from planarfriction.writing import make_folder
     from planarfriction_studies.measured import TASKS, Benchmark
     from planarfriction_studies.measured.library import LIBRARY
 
@@ -259,9 +259,9 @@ def _joints(tables: Path | None, folder: Path | None, as_json: bool) -> int:
     """Fit the joint, print what was found, and draw it."""
     import json
 
+    from planarfriction._support.writing import make_folder
     from planarfriction.cli.console import note, work_progress
     from planarfriction.cli.output import write_picture
-    from planarfriction.writing import make_folder
     from planarfriction_studies.measured.joints import fit_joints
 
     if folder is not None:
@@ -278,7 +278,7 @@ def _models(
     only: Sequence[str], own: Sequence[str]
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the models that are asked for, and what is left out."""
-    from planarfriction import validation
+    from planarfriction._support import validation
     from planarfriction.cli.options import load_function
     from planarfriction.errors import InvalidValueError
     from planarfriction_studies.measured.library import LIBRARY, library
@@ -309,9 +309,9 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
 
     import numpy as np
 
+    from planarfriction._support.writing import write_text
     from planarfriction.cli import output
     from planarfriction.cli.console import note, print_table
-    from planarfriction.writing import write_text
     from planarfriction_studies.measured.benchmark import table, to_dict
     from planarfriction_studies.measured.figures import draw
     from planarfriction_studies.measured.tasks import TASKS
@@ -391,9 +391,9 @@ def reproduce(
       planarfriction reproduce --quick
     """
     use_one_thread()
+    from planarfriction._support.writing import make_folder
     from planarfriction.cli.console import note, print_table
     from planarfriction.errors import InvalidValueError
-    from planarfriction.writing import make_folder
     from planarfriction_studies.experiments import EXPERIMENTS, find_experiment
 
     if list_only:

@@ -72,9 +72,9 @@ def trials(parts: int, seed: int, file: Path | None) -> None:
     Example:
       planarfriction online trials --parts 100 --json trials.json
     """
-    from planarfriction import validation
+    from planarfriction._support import validation
+    from planarfriction._support.writing import check_writable, write_text
     from planarfriction.cli.console import note, print_table, work_progress
-    from planarfriction.writing import check_writable, write_text
     from planarfriction_studies.rig.trials import KINDS, run_trials
 
     parts = validation.count("--parts", parts, len(KINDS))
@@ -118,10 +118,10 @@ def demo(out: Path, seed: int) -> None:
     Example:
       planarfriction online demo --out hold.gif
     """
-    from planarfriction import validation
+    from planarfriction._support import validation
+    from planarfriction._support.writing import check_writable
     from planarfriction.cli.console import note, work_progress
     from planarfriction.plots.film_files import check_kind
-    from planarfriction.writing import check_writable
     from planarfriction_studies.rig.demo import record_hold
     from planarfriction_studies.rig.pictures import write_grip_film
 

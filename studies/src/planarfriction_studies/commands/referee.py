@@ -74,9 +74,9 @@ def referee(
     """
     if context.invoked_subcommand is not None:
         return 0
-    from planarfriction import validation
+    from planarfriction._support import validation
+    from planarfriction._support.writing import make_folder
     from planarfriction.cli.console import note, print_table
-    from planarfriction.writing import make_folder
     from planarfriction_studies.referee import report
 
     chosen = _cases(cases)
@@ -119,10 +119,10 @@ def _judged(
     steps: tuple[float, ...] | None = None,
 ) -> tuple[list[Any], int]:
     """Judge with progress; return verdicts, those of the file among them, and the exit code."""
+    from planarfriction._support.writing import check_writable
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import note, work_progress
     from planarfriction.errors import FrictionError
-    from planarfriction.writing import check_writable
     from planarfriction_studies.referee.run import Apart, Kept, run
 
     if not engines:
@@ -189,8 +189,8 @@ def export(folder: Path) -> int:
     Examples:
       planarfriction referee export cases/
     """
+    from planarfriction._support.writing import make_folder
     from planarfriction.cli.console import note
-    from planarfriction.writing import make_folder
     from planarfriction_studies.referee.case import all_cases
     from planarfriction_studies.referee.export import export_case
 
@@ -203,7 +203,7 @@ def export(folder: Path) -> int:
 
 def _cases(names: tuple[str, ...]) -> dict[str, Any]:
     """Return the cases that are asked for: by name, or from a file."""
-    from planarfriction import validation
+    from planarfriction._support import validation
     from planarfriction_studies.referee.case import all_cases, read_case
 
     own = all_cases()

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from planarfriction import validation
+from planarfriction._support import validation
 
 if TYPE_CHECKING:
     from planarfriction_studies.experiments.experiment import Result, Work

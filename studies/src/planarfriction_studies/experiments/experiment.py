@@ -16,9 +16,9 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from planarfriction._support.writing import make_folder, replacing
 from planarfriction.scenes import Signal
 from planarfriction.scenes.signal import sample_times
-from planarfriction.writing import make_folder, replacing
 from planarfriction_studies.experiments import facts
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 
 CONVERGED_SHARE = 1e-6
 """Accuracy of the converged solutions as a share of the span of a curve [-]."""

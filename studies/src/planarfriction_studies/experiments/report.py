@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planarfriction import __version__
-from planarfriction.writing import write_text
+from planarfriction._support.writing import write_text
 from planarfriction_studies.experiments.reproduction import (
     Record,
     Reproduction,

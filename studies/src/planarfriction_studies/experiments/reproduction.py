@@ -24,9 +24,10 @@ from pathlib import Path
 from typing import Any
 
 import planarfriction
-from planarfriction import __version__, validation
+from planarfriction import __version__
+from planarfriction._support import validation
+from planarfriction._support.writing import make_folder, replacing, write_text
 from planarfriction.scenes.solution import write_dataset
-from planarfriction.writing import make_folder, replacing, write_text
 from planarfriction_studies.experiments import EXPERIMENTS, Experiment
 from planarfriction_studies.experiments.experiment import Result, Work
 

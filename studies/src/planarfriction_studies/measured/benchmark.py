@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.sweeps.records import reason_of
 from planarfriction_studies.measured.library import library

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._support.reading import read_text
 from planarfriction.errors import FileError
-from planarfriction.reading import read_text
 
 FOLDER = Path(__file__).parent / "cases"
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.writing import write_text
+from planarfriction._support.writing import write_text
 from planarfriction_studies.referee.case import (
     FOLDER,
     QUANTITIES,

@@ -13,8 +13,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from planarfriction._support.writing import write_text
 from planarfriction.plots.style import PlotFigure, new_figure, tidy
-from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import Case
 from planarfriction_studies.referee.engines import Engine
 from planarfriction_studies.referee.pictures import film, scene

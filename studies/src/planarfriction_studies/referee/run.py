@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction._support.reading import read_text
+from planarfriction._support.writing import write_text
 from planarfriction.errors import FileError
-from planarfriction.reading import read_text
-from planarfriction.writing import write_text
 from planarfriction_studies.referee.case import QUANTITIES, Case, Path3, Truth
 from planarfriction_studies.referee.engines import Engine
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction._support.validation import count
 from planarfriction.online.controllers import Hold
 from planarfriction.online.observer import FrictionObserver
-from planarfriction.validation import count
 from planarfriction_studies.rig.gripper import Gripper, Parts
 from planarfriction_studies.rig.trials import known_model
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction import validation
+from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
 from planarfriction.coupling import CoupledPatches, HostStep
-from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel

@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Circle, Polygon
 
+from planarfriction._support.writing import replacing
 from planarfriction.plots import style
 from planarfriction.plots.film_files import check_kind, write_frames
-from planarfriction.writing import replacing
 
 if TYPE_CHECKING:
     from planarfriction_studies.rig.demo import GripRecord

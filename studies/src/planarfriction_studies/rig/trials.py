@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.laws import LuGre
 from planarfriction.models import ReducedModel
 from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy

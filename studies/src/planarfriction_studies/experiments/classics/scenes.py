@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch

@@ -15,7 +15,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import FileError, FrictionError
 
 _PATIENCE = (0.01, 0.03, 0.1, 0.3) if os.name == "nt" else ()

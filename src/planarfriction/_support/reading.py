@@ -19,7 +19,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction._support import validation
 from planarfriction.errors import FileError, FrictionError, shown
 from planarfriction.formulas import LARGEST
 

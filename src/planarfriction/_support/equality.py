@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
-from planarfriction.described import described
+from planarfriction._support.described import described
 
 _KindT = TypeVar("_KindT", bound=type)
 _GivenT = TypeVar("_GivenT")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planarfriction import validation as v
+from planarfriction._support import validation as v
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 

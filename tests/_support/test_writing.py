@@ -14,7 +14,12 @@ from pathlib import Path
 import pytest
 
 from planarfriction import FrictionError
-from planarfriction.writing import check_writable, make_folder, replacing, write_text
+from planarfriction._support.writing import (
+    check_writable,
+    make_folder,
+    replacing,
+    write_text,
+)
 
 resource = pytest.importorskip("resource")  # not on Windows
 
@@ -42,7 +47,7 @@ def started(code: str, *arguments: object) -> Iterator[subprocess.Popen]:
 
 WRITER = """
     import sys
-    from planarfriction.writing import replacing
+    from planarfriction._support.writing import replacing
 
     path, letter, rounds = sys.argv[1], sys.argv[2].encode(), int(sys.argv[3])
     print("ready", flush=True)
@@ -95,7 +100,7 @@ def test_a_kill_before_the_writing_itself_leaves_nothing(tmp_path):
     target.write_bytes(OLD)
     code = """
         import sys, time
-        from planarfriction.writing import replacing
+        from planarfriction._support.writing import replacing
 
         with replacing(sys.argv[1]) as file:
             file.write(b"half of ")
@@ -261,7 +266,7 @@ def test_a_limit_on_the_size_of_files_leaves_the_old_one(tmp_path):
     path.write_bytes(OLD)
     code = """
     import resource, signal, sys
-    from planarfriction.writing import write_text
+    from planarfriction._support.writing import write_text
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
     print("ready", flush=True)

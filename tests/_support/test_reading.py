@@ -10,7 +10,8 @@ import pytest
 from PIL import Image
 
 import planarfriction as pf
-from planarfriction import FrictionError, Scene, Signal, reading
+from planarfriction import FrictionError, Scene, Signal
+from planarfriction._support import reading
 from planarfriction.errors import FileError
 from planarfriction.identify import Log
 from planarfriction.patch import map_files as patch_files
