@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction._support import validation
+from planarfriction._support.equality import ByValue
 from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
 from planarfriction.patch import pressure as pressures
+from planarfriction.patch.disc_friction import disc_friction
 from planarfriction.patch.grid import (
     MOST_CELLS,
     Grid,
@@ -24,16 +28,19 @@ from planarfriction.patch.grid import (
     warn_of_the_unit,
 )
 from planarfriction.patch.grid_error import GridError, finer, grid_error
-from planarfriction.patch.moments import Moments
+from planarfriction.patch.metric import positive_definite, symmetric_root
 from planarfriction.patch.pressure import Pressure, Uniform
 from planarfriction.patch.pressure_maps import map_grid, read_maps
 from planarfriction.patch.tilt import weights_under
+
+MOST_DEGREE = 40
+"""Largest degree of polynomial moments: beyond it powers are rounding."""
 
 _UNIT_BOX = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactPatch(Moments):
+class ContactPatch(ByValue):
     """A flat contact: N cells at `rho_i` with areas `a_i`, and a pressure that determines their weights.
 
     `w_i = p_i a_i q_i / sum(p a q)`, so that `sum(w) = 1` and cell i carries the normal force `w_i f_N`; see
@@ -75,6 +82,10 @@ class ContactPatch(Moments):
     areas, although each cell is a point; None: ones (other pressures, the published masks)."""
     radii: Any = field(default=None, kw_only=True)
     """Radii `a` of cells that are small discs, shape `[N]` [m], 0 for points; None: points (see `discs`)."""
+    metric: Any = field(default=None, kw_only=True)
+    """Metric of the friction, `[2, 2]` or one per cell `[N, 2, 2]` [-]; None: the same in all directions."""
+    asymmetry: Any = field(default=None, kw_only=True)
+    """Asymmetry `a`, `[2]` or one per cell `[N, 2]` [-], `|a| < 1`; None: the same forwards and backwards."""
     outline: outlines.Outline | None = field(init=False, default=None)
     """Outline from which the class methods cut the cells; None for other cells."""
     _fixed_weights: np.ndarray | None = field(init=False, default=None, compare=False)
@@ -446,6 +457,190 @@ class ContactPatch(Moments):
         )
         return np.where(loaded[..., None], weights, 0.0)
 
+    def tile_weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
+        """Return the share of the normal force on the area of each cell, `p_i a_i / sum(p a)`, shape `[..., N]` [-].
+
+        For sums that spread the load of a cell over its `cell_extents`. Raises InvalidValueError as `weights` does.
+        """
+        weights = self.weights(normal_force)
+        if self.point_shares is None or self.has_discs:
+            return weights
+        tiles = weights / self.point_shares
+        return tiles / tiles.sum(-1, keepdims=True)
+
+    def pressure_values(self, normal_force: ArrayLike) -> np.ndarray:
+        """Return the pressure on each cell, `p_i f_N / sum(p a)`, shape `[..., N]` [Pa].
+
+        Raises InvalidValueError for a load below zero.
+        """
+        load = validation.non_negative_numbers("normal_force", normal_force)
+        return self.tile_weights(load) * load[..., None] / self.areas
+
+    def centre_of_pressure(self, normal_force: ArrayLike | None = None) -> np.ndarray:
+        """Return the centre of pressure `sum(w rho)`, shape `[..., 2]` [m].
+
+        Raises InvalidValueError without a load that is needed, as all sums here.
+        """
+        weights = self.weights(normal_force)
+        return np.stack(
+            [(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1
+        )
+
+    @overload
+    def contact_radius(self, normal_force: float | None = None) -> float: ...
+    @overload
+    def contact_radius(
+        self, normal_force: np.ndarray | Sequence[Any]
+    ) -> np.ndarray: ...
+    def contact_radius(self, normal_force: Any = None) -> Any:
+        """Return the contact radius `r = sum(w |rho - CoP|)` [m]: a spin about the CoP has the torque `mu f_N r`.
+
+        With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise. A disc counts
+        with the mean distance of its points.
+        """
+        weights, *offset = self._about_centre_of_pressure(normal_force)
+        x, y = self.lever_coordinates(*offset)
+        if not self.has_discs:
+            return (weights * np.hypot(x, y)).sum(-1)
+        return (weights * disc_friction(x**2 + y**2, self.lever_radii**2)[2]).sum(-1)
+
+    @overload
+    def second_moment(self, normal_force: float | None = None) -> float: ...
+    @overload
+    def second_moment(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
+    def second_moment(self, normal_force: Any = None) -> Any:
+        """Return the second moment `<rho^2> = sum(w (|rho - CoP|^2 + a^2/2))` of cells with radii a [m^2]."""
+        weights, *offset = self._about_centre_of_pressure(normal_force)
+        dx, dy = self.lever_coordinates(*offset)
+        return (weights * (dx**2 + dy**2 + 0.5 * self.lever_radii**2)).sum(-1)
+
+    @overload
+    def area(self, normal_force: float | None = None) -> float: ...
+    @overload
+    def area(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
+    def area(self, normal_force: Any = None) -> Any:
+        """Return the area of the cells under load [m^2]."""
+        return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
+
+    def moments(
+        self, degree: int, normal_force: ArrayLike | None = None, *, about: Any = None
+    ) -> np.ndarray:
+        """Return the moments of the pressure `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
+
+        Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
+        [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones. Raises InvalidValueError for
+        a parameter that breaks its rule.
+        """
+        degree = validation.count("degree", degree, at_least=0, at_most=MOST_DEGREE)
+        weights, dx, dy = self._about_centre_of_pressure(normal_force)
+        if about is not None:
+            dx, dy = (self.positions - validation.vector("about", about, 2)).T
+        result = np.zeros((*weights.shape[:-1], degree + 1, degree + 1))
+        for i in range(degree + 1):
+            for j in range(degree + 1 - i):
+                result[..., i, j] = (weights * dx**i * dy**j).sum(-1)
+        return result
+
+    def _about_centre_of_pressure(
+        self, normal_force: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the weights and both coordinates of the cells relative to the CoP, each of shape `[..., N]`."""
+        weights = self.weights(normal_force)
+        dx, dy = ((x - (weights * x).sum(-1, keepdims=True)) for x in self.positions.T)
+        return weights, dx, dy
+
+    def with_friction_metric(self, metric: Any, asymmetry: Any = None) -> ContactPatch:
+        """Return the same patch with friction that depends on the direction; None and None for friction that does not.
+
+        `metric` `M`: sliding along a unit vector e meets the coefficient `mu sqrt(e' M e)`; see `friction_metric`.
+        `asymmetry`
+        `a`: sliding along e, a principal axis of M, meets `1 + a . e` times that, so that it is easiest against a. Both
+        are in the axes of the contact frame and turn with it: the grooves belong to the patch.
+
+        Raises `InvalidValueError` unless every metric is symmetric and positive definite and every `|a| < 1`.
+        """
+        patch = dataclasses.replace(self, metric=metric, asymmetry=asymmetry)
+        return outlines.with_outline(patch, self.outline)
+
+    @functools.cached_property
+    def anisotropic(self) -> bool:
+        """True if friction depends on the direction; metrics of ones and asymmetries of zero do not make it so."""
+        same = self.metric is None or (self.metric == np.eye(2)).all()
+        return not same or self.asymmetric
+
+    @functools.cached_property
+    def asymmetric(self) -> bool:
+        """True if friction differs forwards and backwards."""
+        return self.asymmetry is not None and bool(self.asymmetry.any())
+
+    def levers(self) -> np.ndarray:
+        """Return `B` with `u_i = B_i V` for the twist V about the contact frame's origin, shape `[N, 2, 3]`.
+
+        `B_i = L_i [[1, 0, -y_i], [0, 1, x_i]]`; the wrench of a traction `t` of cell i is `B_i' t`. If any cell is a
+        disc, all have a third row `(0, 0, kappa a_i)` with the `lever_radii` a and `kappa^2 = 1/2`: `[N, 3, 3]`.
+        """
+        x, y = self.positions.T
+        one = np.ones_like(x)
+        zero = np.zeros_like(x)
+        plain = np.moveaxis(np.array([[one, zero, -y], [zero, one, x]]), -1, 0)
+        levers = plain if self.root is None else self.root @ plain
+        if not self.has_discs:
+            return levers
+        spin = np.zeros((len(x), 1, 3))
+        spin[:, 0, 2] = math.sqrt(0.5) * self.lever_radii
+        return np.concatenate([levers, spin], axis=1)
+
+    @functools.cached_property
+    def has_discs(self) -> bool:
+        """True if any cell is a disc and not a point."""
+        return bool(self.radii.any())
+
+    @property
+    def bristles(self) -> int:
+        """Number of components of the bristle of a cell: two of a point; three of all cells if any is a disc."""
+        return 3 if self.has_discs else 2
+
+    @functools.cached_property
+    def lever_radii(self) -> np.ndarray:
+        """Radii `[N]` [m] of the cells in the space of the metric M, `a sqrt(tr M/2)`; those of points are 0."""
+        radii = self.radii
+        return (
+            radii
+            if self.root is None
+            else radii * np.sqrt(0.5 * (self.root**2).sum((-2, -1)))
+        )
+
+    def asymmetries(self) -> np.ndarray:
+        """Return the asymmetry `a_i` of each cell, shape `[N, 2]`; zeros where there is none."""
+        shape = self.positions.shape
+        return (
+            np.zeros(shape)
+            if self.asymmetry is None
+            else np.broadcast_to(self.asymmetry, shape).copy()
+        )
+
+    @functools.cached_property
+    def root(self) -> np.ndarray | None:
+        """Symmetric root `L` of the metric: `[2, 2]` where it is one for all cells, `[N, 2, 2]`, or None."""
+        if self.metric is None or (self.metric == np.eye(2)).all():
+            return None
+        root = symmetric_root(self.metric)
+        return root[0] if root.ndim == 3 and (root == root[0]).all() else root
+
+    def lever_coordinates(
+        self, x: np.ndarray, y: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return `(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: a cell sees a spin as if it stood there.
+
+        For a metric per cell the last axis of `x` and `y` runs over all cells of the patch.
+        """
+        if self.root is None:
+            return x, y
+        xx = self.root[..., 0, 0]
+        xy = self.root[..., 0, 1]
+        yy = self.root[..., 1, 1]
+        return yy * x - xy * y, xx * y - xy * x
+
     def plot(self, *, normal_force: float | None = None) -> Any:
         """Draw the pressure map with its centre of pressure; returns a matplotlib Figure."""
         return picture("patch", self, normal_force=normal_force)
@@ -462,6 +657,24 @@ class ContactPatch(Moments):
 
     def _repr_html_(self) -> str:
         return picture("patch in a notebook", self)
+
+    def _check_anisotropy(self, kept: np.ndarray) -> None:
+        """Check both fields against the cells given, and drop those of cells that are not `kept` `[n]`."""
+        for name, axes in (("metric", 2), ("asymmetry", 1)):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            value = validation.numbers(name, value)
+            per_cell = value.ndim == axes + 1
+            value = validation.array(name, value, (len(kept),) * per_cell + (2,) * axes)
+            if name == "metric":
+                value = positive_definite(value)
+            elif not ((size := np.hypot(value[..., 0], value[..., 1])) < 1.0).all():
+                rule = "be shorter than 1 (friction must oppose sliding)"
+                raise InvalidValueError("asymmetry", rule, float(size.max()))
+            value = value[kept] if per_cell else value
+            value.setflags(write=False)
+            self._set(**{name: value})
 
     def _shares(self, relative: np.ndarray) -> np.ndarray:
         """Return weights `[..., N]` from relative pressures of that shape, scaled first so that no sum can overflow."""

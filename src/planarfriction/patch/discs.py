@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planarfriction._support import validation
-from planarfriction.patch.moments import disc_friction
+from planarfriction.patch.disc_friction import disc_friction
 from planarfriction.patch.outline import with_outline
 from planarfriction.patch.pressure import PerCell
 from planarfriction.patch.shared import SharedPressure, mean_weights

@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
-from planarfriction.patch.moments import disc_friction
+from planarfriction.patch.disc_friction import disc_friction
 from planarfriction.patch.pressure import Pressure
 
 if TYPE_CHECKING:
