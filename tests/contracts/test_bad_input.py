@@ -512,7 +512,6 @@ def test_what_was_unchecked(call, message):
             "velocity must hold at most",
         ),
         (lambda: SQUARE.moments(10**5), "degree must be at most 40"),
-        (lambda: SQUARE.compressed(3), r"compressed must be replaced by discs\(n\)"),
         (lambda: pf.LimitSurfaceTable(SQUARE, 10**5), "segments must be at most 256"),
         (
             lambda: pf.LimitSurfaceTablePublished(SQUARE, 10**5),

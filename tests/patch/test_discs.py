@@ -357,10 +357,6 @@ def test_cells_in_one_place_are_one_disc():
     [
         (lambda: DISC.discs(0), "n must be an integer >= 1, got 0"),
         (lambda: DISC.discs(2.5), "n must be an integer >= 1, got 2.5"),
-        (
-            lambda: DISC.compressed(5, cells=40),
-            r"compressed must be replaced by discs\(n\)",
-        ),
     ],
 )
 def test_wrong_calls_are_one_line(call, message):

@@ -101,12 +101,6 @@ def test_values_of_a_scene_are_changed_too(file):
 def test_a_model_that_is_only_named_gets_keys(file):
     Path(file).write_text(SCENE.format(model='"reduced"'))
     assert Settable(file)(**{"fingers.model.cells": 2}).contacts[0].model.cells == 2
-    for old in ("parts", "segments", "speeds", "load_error"):
-        with pytest.raises(
-            pf.FrictionError, match=f"{old} must be left out: write cells="
-        ) as caught:
-            Settable(file)(**{f"fingers.model.{old}": 2})
-        assert "\n" not in str(caught.value)
 
 
 def test_contacts_are_called_what_they_are_called_in_results():

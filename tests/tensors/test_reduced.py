@@ -18,12 +18,3 @@ LAW = pf.LuGre(mu_c=0.3, mu_s=0.4, elasto_plastic=0.9)
 def front(request):
     pytest.importorskip(request.param)
     return importlib.import_module(f"planarfriction.{request.param}")
-
-
-@pytest.mark.parametrize("option", ["parts", "segments", "speeds", "load_error"])
-def test_an_option_that_it_had_says_what_to_write_instead(front, option):
-    with pytest.raises(
-        pf.FrictionError, match=f"^{option} must be left out: write cells="
-    ) as caught:
-        front.ReducedModel(pf.ContactPatch.disc(0.02), LAW, **{option: 1})
-    assert "\n" not in str(caught.value)

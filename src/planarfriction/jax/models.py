@@ -143,7 +143,7 @@ class ReducedModel(DistributedModel):
         **options: Any,
     ) -> None:
         super().__init__(
-            few_discs("jax.ReducedModel", patch, law, cells, options),
+            few_discs("jax.ReducedModel", patch, law, cells),
             law,
             normal_force,
             **options,

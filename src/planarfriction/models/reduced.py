@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
 from planarfriction._engine.records.base import CompiledModel
 from planarfriction._support import validation
-from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models.base import FrictionModel, ModelJacobians
@@ -37,9 +36,6 @@ class ReducedModel(FrictionModel):
 
     Raises InvalidValueError unless `cells` is an integer >= 1.
     """
-
-    REPLACED: ClassVar[tuple[str, ...]] = ("parts", "segments", "speeds", "load_error")
-    """Options of models that stood here before."""
 
     _: KW_ONLY
     cells: int = 24
@@ -88,26 +84,6 @@ class ReducedModel(FrictionModel):
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
         return _of_discs(self.reduction.patch, self.patch, deflections, load)
-
-
-def _refusing_replaced(init: Callable[..., None]) -> Callable[..., None]:
-    """Return the constructor of `ReducedModel` with one clear line for options that were replaced."""
-
-    @functools.wraps(init)
-    def checked(self: ReducedModel, *given: Any, **options: Any) -> None:
-        for name in self.REPLACED:
-            if name in options:
-                raise InvalidValueError(
-                    name,
-                    "be left out: write cells=, the number of discs",
-                    options[name],
-                )
-        init(self, *given, **options)
-
-    return checked
-
-
-ReducedModel.__init__ = _refusing_replaced(ReducedModel.__init__)
 
 
 def _of_discs(

@@ -389,14 +389,6 @@ class ContactPatch(ByValue):
 
         return discs(self, n)
 
-    def compressed(self, *_: Any, **__: Any) -> ContactPatch:
-        """Refuse an old name, and say what to write instead. Raises InvalidValueError."""
-        raise InvalidValueError(
-            "compressed",
-            "be replaced by discs(n): a patch of n small discs",
-            "compressed()",
-        )
-
     def grid_error(
         self, normal_force: float | None = None, *, refined: int = 1
     ) -> GridError:

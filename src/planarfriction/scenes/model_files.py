@@ -198,13 +198,8 @@ def _arguments(
 ) -> dict[str, Any]:
     """Return the values of a table for the parameters of `make`, checked to be neither unknown nor missing."""
     parameters = _parameters(make)
-    replaced = getattr(make, "REPLACED", ())  # the member itself refuses the latter
-    table.only([*others, *parameters, *replaced])
+    table.only([*others, *parameters])
     for name, parameter in parameters.items():
         if parameter.default is parameter.empty:
             table.get(name)
-    return {
-        name: value
-        for name, value in table.data.items()
-        if name in (*parameters, *replaced)
-    }
+    return {name: value for name, value in table.data.items() if name in parameters}

@@ -276,15 +276,12 @@ def _set(
         inner = {_BY_NAME[key]: inner}
     return {
         **table,
-        key: _set(inner, rest, value, path, name, _keys(key, inner, rest[0])),
+        key: _set(inner, rest, value, path, name, _keys(key, inner)),
     }
 
 
-def _keys(key: str, table: Any, wanted: str) -> list[str] | None:
-    """Return the keys that a table may have, or None if only those that are written are known.
-
-    An old name that is `wanted` is among them: its member says what to write instead.
-    """
+def _keys(key: str, table: Any) -> list[str] | None:
+    """Return the keys that a table may have, or None if only those that are written are known."""
     if key == "body":
         return list(BODY_KEYS)
     family, kind = _FAMILIES.get(key, (None, ""))
@@ -300,7 +297,6 @@ def _keys(key: str, table: Any, wanted: str) -> list[str] | None:
             if name not in ("patch", "law")
         ]
     )
-    more += [wanted] if wanted in getattr(make, "REPLACED", ()) else []
     return list(
         dict.fromkeys(
             [kind, *more, *table, *(("metric", "asymmetry") if key == "patch" else ())]

@@ -69,13 +69,7 @@ def few_discs(
     patch: ContactPatch,
     law: FrictionLaw,
     cells: int,
-    options: dict[str, Any],
 ) -> ContactPatch:
-    """Return the discs on which the reduced model `name` is the distributed one, and take its settings from options."""
+    """Return the discs on which the reduced model `name` is the distributed one."""
     TensorModel.refuse(patch, law, name)
-    replaced = {
-        each: options.pop(each)
-        for each in models.ReducedModel.REPLACED
-        if each in options
-    }
-    return models.ReducedModel(patch, law, cells=cells, **replaced).reduction.patch
+    return models.ReducedModel(patch, law, cells=cells).reduction.patch

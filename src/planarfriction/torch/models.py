@@ -193,7 +193,7 @@ class ReducedModel(DistributedModel):
         **options: Any,
     ):
         super().__init__(
-            few_discs("torch.ReducedModel", patch, law, cells, options),
+            few_discs("torch.ReducedModel", patch, law, cells),
             law,
             normal_force,
             **options,
