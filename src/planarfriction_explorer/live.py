@@ -133,9 +133,8 @@ class Paced:
     def ask(self) -> None:
         """Draw what there is to draw, now or soon."""
         document: Any = pn.state.curdoc
-        if (
-            document is None or self.asked.value == 0
-        ):  # the first picture comes with the page
+        # The first picture comes with the page.
+        if document is None or self.asked.value == 0:
             self._send()
         elif self._took > FLUENT:
             if self._timer is not None:

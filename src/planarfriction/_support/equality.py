@@ -74,9 +74,8 @@ class ByValue(Checked):
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
-        if (
-            "__repr__" not in cls.__dict__
-        ):  # else the decorator `dataclass` writes one of its own
+        # Else the decorator `dataclass` writes one of its own.
+        if "__repr__" not in cls.__dict__:
             cls.__repr__ = super(cls, cls).__repr__  # pyright: ignore[reportAttributeAccessIssue]
 
     def __repr__(self) -> str:
@@ -206,10 +205,9 @@ def _key(part: Any) -> Any:
         ).tobytes() if part.dtype.kind == "f" else part.tobytes()  # + 0.0: -0.0 is 0.0
     if isinstance(part, (tuple, list)):
         return tuple(map(_key, part))
+    # Mappings and parts of a user's own: these do not tell records apart.
     try:
         hash(part)
-    except (
-        TypeError
-    ):  # mappings and parts of a user's own: these do not tell records apart
+    except TypeError:
         return None
     return part

@@ -138,13 +138,12 @@ def numbers(name: str, value: Any) -> np.ndarray:
     if reason is not None:
         raise InvalidValueError(name, f"be an array of numbers{reason}", quoted(value))
     _check_size(name, value)
+    # Rows of different lengths; what an __array__ or __float__ raises.
     try:
         return np.asarray(value, dtype=float)
     except OverflowError:
         raise InvalidValueError(name, "be finite", value) from None
-    except (
-        Exception
-    ):  # rows of different lengths; what an __array__ or __float__ raises
+    except Exception:
         raise InvalidValueError(
             name, "be an array of numbers, with rows of equal length", value
         ) from None

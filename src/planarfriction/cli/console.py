@@ -42,9 +42,8 @@ def _bar(words: str) -> Iterator[Callable[..., None]]:
 
     expect_compilation()  # the bar says it
     console = Console(stderr=True)
-    if (
-        not console.is_terminal
-    ):  # rich before 15 ends a bar that is not shown with an empty line
+    # Rich before 15 ends a bar that is not shown with an empty line.
+    if not console.is_terminal:
         with _lines(words) as update:
             yield update
         return

@@ -90,9 +90,8 @@ def show(
         from planarfriction import plots
 
         beside = None if alone else "ellipsoid"
-        if (
-            out.suffix.lower() == HTML
-        ):  # with plotly's own code in it, so that it opens without a network
+        # With plotly's own code in it, so that it opens without a network.
+        if out.suffix.lower() == HTML:
             write_text(
                 out,
                 plots.interactive_limit_surface(shown, beside=beside).to_html(

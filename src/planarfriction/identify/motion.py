@@ -140,9 +140,8 @@ def identify_motion(
     slides = as_tuple("slides", slides, Slide)
     names = check_names(parameters, MOTION_PARAMETERS)
     validation.instance("body", body, MassProperties, "MassProperties")
-    if (
-        type(start) is not LuGre
-    ):  # a subclass may compute something else from the parameters that are fitted
+    # A subclass may compute something else from the parameters that are fitted.
+    if type(start) is not LuGre:
         raise InvalidValueError("start", "be a LuGre law", start)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "identify_motion")
@@ -354,9 +353,8 @@ def _identification(
     )
     weighed = np.min((noise / fit.noise) ** 2, axis=1)
     found = [judge_parameter(evidence, i) for i in range(len(problem.names))]
-    if (
-        "contact_radius" in problem.names and not evidence.spinning
-    ):  # its spread over few slides may be small by chance
+    # Its spread over few slides may be small by chance.
+    if "contact_radius" in problem.names and not evidence.spinning:
         found[problem.names.index("contact_radius")] = Verdict(
             "contact_radius", False, "no spin"
         )

@@ -46,9 +46,8 @@ class FrictionPytree(TensorModel):
                 raise InvalidValueError(
                     "leaf", f"be one of {', '.join(self.leaves)}", repr(name)
                 )
-        if isinstance(
-            leaves.get("parameters"), tuple
-        ):  # of arrays: `vmap` takes models of axes too
+        # Of arrays: `vmap` takes models of axes too.
+        if isinstance(leaves.get("parameters"), tuple):
             own = zip(self.names, leaves["parameters"], strict=True)
             self._in_range(
                 {name: value for name, value in own if isinstance(value, jax.Array)}

@@ -285,9 +285,8 @@ def fit_goals(
         for term in chosen:
             problem, values = with_term(problem, values, term)
         kept = attempt(problem, values, progress)
-    for term in (
-        (*TERMS, "stribeck") if auto else ()
-    ):  # again, since bristles may hide a fall of friction
+    # Again, since bristles may hide a fall of friction.
+    for term in (*TERMS, "stribeck") if auto else ():
         has = kept.problem.terms
         if (
             term in has
@@ -297,17 +296,15 @@ def fit_goals(
             continue
         more = attempt(*with_term(kept.problem, kept.values, term), progress)
         pairs[term] = more, kept
-        if term == "load" and not improves(
-            more, kept
-        ):  # motor and load may have different shares
+        # Motor and load may have different shares.
+        if term == "load" and not improves(more, kept):
             both = attempt(
                 *with_term(more.problem, more.values, "directional"), progress
             )
             pairs[term] = (both, kept) if improves(both, kept) else pairs[term]
         kept = more if improves(*pairs[term]) else kept
-    for term in (
-        kept.problem.terms[:-1] if auto else ()
-    ):  # what came later may explain what came before
+    # What came later may explain what came before.
+    for term in kept.problem.terms[:-1] if auto else ():
         rest = base.with_terms(
             [
                 each

@@ -65,9 +65,8 @@ def stored_potential(
     inner[..., 0] = np.einsum("pai,pai->pa", h, direction) - tilt * lean
     inner[..., 1] = np.einsum("pai,pai->pa", h, along) - tilt_slope * lean
     inner[..., 2] = sin_p * h_across - tilt * lean_slope
-    if (
-        slope is None
-    ):  # beyond the equator the surface is mirrored, and the tilt has the other sign
+    # Beyond the equator the surface is mirrored, and the tilt has the other sign.
+    if slope is None:
         beyond = np.roll(inner[-2, :, 2], -2 * segments) - 2.0 * tilt[-2] * lean_slope
         inner[1:, :, 3] = (
             np.concatenate([inner[2:, :, 2], beyond]) - inner[:-1, :, 2]
@@ -140,9 +139,8 @@ def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> 
                 @ plane.T
             )
 
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # a search that runs away: the angle says so
+        # A search that runs away: the angle says so.
+        with np.errstate(over="ignore", invalid="ignore"):
             start = basis @ guess / (target @ guess)
             options = {"xtol": ROUNDING}
             place = root(slope, start, (basis, target), jac=bend, options=options).x

@@ -80,9 +80,8 @@ class DistributedModel(FrictionModel):
         wrench_state = np.einsum("dan,...abn->...dbn", lever, share * pull_state)
         rate_load = np.zeros_like(state)
         wrench_load = self.compiled.evaluate(state, twist, load)[1]
-        if (
-            self.compiled.reference > 0.0
-        ):  # rates and tractions are functions of `z f_ref/f`
+        # Rates and tractions are functions of `z f_ref/f`.
+        if self.compiled.reference > 0.0:
             per = np.where(
                 load > LIGHTEST * self.compiled.reference, -1.0, 0.0
             ) / np.where(load > 0.0, load, 1.0)

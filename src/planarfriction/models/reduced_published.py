@@ -120,9 +120,8 @@ class PublishedShapes:
         """Return the shape at a load > 0 [N]; recent loads are cached. None: any load, if it does not change it."""
         if load is None or not self.depends_on_load:
             return self.reference
-        with (
-            self._lock
-        ):  # threads that ask for one load at once wait for the same shape
+        # Threads that ask for one load at once wait for the same shape.
+        with self._lock:
             return self._recent(load)
 
     @functools.cached_property

@@ -80,9 +80,8 @@ def _own_discs(patch: ContactPatch) -> ContactPatch:
     radii = np.sqrt((patch.cell_extents() ** 2).sum(axis=1) / 6.0)
     if patch.has_discs or not radii.any():
         return patch
-    with warnings.catch_warnings(
-        action="ignore"
-    ):  # of the size, said when the patch was made
+    # Of the size, said when the patch was made.
+    with warnings.catch_warnings(action="ignore"):
         return with_outline(
             dataclasses.replace(patch, radii=radii, point_shares=None), patch.outline
         )

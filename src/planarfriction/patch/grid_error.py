@@ -112,9 +112,8 @@ def grid_error(
     patch: ContactPatch, normal_force: float | None, refined: int
 ) -> GridError:
     """Implement `ContactPatch.grid_error`."""
-    with warnings.catch_warnings(
-        action="ignore"
-    ):  # of the patch's size, said when it was made
+    # Of the patch's size, said when it was made.
+    with warnings.catch_warnings(action="ignore"):
         fine = finer(patch, refined, "refined")
     if not patch.cell_extents().any():
         return GridError(0.0, 0.0, 0.0, fine.cells)

@@ -221,9 +221,8 @@ def read_pressure_map(path: str | Path, **options: Any) -> np.ndarray:
         )
     what = f"pressure map {path}"
     try:
-        with np.errstate(
-            all="ignore"
-        ):  # what is no number, or too large for a float, no patch takes
+        # What is no number, or too large for a float, no patch takes.
+        with np.errstate(all="ignore"):
             values = readers[kind](path, reading)
             if (
                 kind in ARRAYS
@@ -336,9 +335,8 @@ def _frames(
     what: str, table: np.ndarray, blocks: Sequence[int], frame: int | None
 ) -> np.ndarray | list[np.ndarray]:
     """Return the frames of a table whose blocks of rows are parted by blank lines, or a single one as it is."""
-    if (
-        max(blocks) == 1 or len(blocks) == 1
-    ):  # a blank line behind every row, as Windows writes it, parts nothing
+    # A blank line behind every row, as Windows writes it, parts nothing.
+    if max(blocks) == 1 or len(blocks) == 1:
         return table
     if len(set(blocks)) > 1 and frame is None:
         sizes = ", ".join(map(str, blocks[:5]))

@@ -182,9 +182,8 @@ class SoftFinger(Pressure):
         )
 
     def _radius(self, load: np.ndarray) -> np.ndarray:
-        with np.errstate(
-            over="ignore", under="ignore"
-        ):  # a radius of 0 would divide by zero
+        # A radius of 0 would divide by zero.
+        with np.errstate(over="ignore", under="ignore"):
             radius = np.maximum(self.c * load**self.n, validation.SMALLEST)
         return (
             radius if self.radius_max is None else np.minimum(radius, self.radius_max)

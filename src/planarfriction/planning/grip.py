@@ -193,9 +193,8 @@ class _ProfileSearch:
         self._low = np.where(held, least, low)
         self._highest = np.full(len(times), high * (1.0 + 1e-6))
         self._first = grips.first
-        if (
-            self._first is not None
-        ):  # whoever holds the body at first goes on from there
+        # Whoever holds the body at first goes on from there.
+        if self._first is not None:
             self._low[0], self._highest[0] = (
                 self._first * (1.0 - 1e-6),
                 self._first * (1.0 + 1e-6),

@@ -256,9 +256,8 @@ def _shortest(
         for turns in _TURNS
     ]
     for begin in begins if known is None else [known]:
-        with warnings.catch_warnings(
-            action="ignore", category=RuntimeWarning
-        ):  # older SciPy rounds beyond the bounds
+        # Older SciPy rounds beyond the bounds.
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
             run = minimize(
                 length, begin, jac=lambda x: slope, method="SLSQP", bounds=bounds,
                 constraints={"type": "eq", "fun": miss}, options={"ftol": 1e-6, "maxiter": 30},

@@ -271,9 +271,8 @@ def _phase(scenery: Scenery, contact: Touch, mode: str) -> tuple[Any, dict[str, 
 
     ends: dict[str, Any] = {"mode": lambda t, q: motion(t, *q)[0].slack} if mode else {}
     ends |= {"leaves": approach, "ends": functools.partial(scenery.within, contact)}
-    if (
-        scenery.pusher.width > 0.0 and contact.kind != FACE
-    ):  # something else may begin to touch
+    # Something else may begin to touch.
+    if scenery.pusher.width > 0.0 and contact.kind != FACE:
         ends["closes"] = functools.partial(scenery.clear, contact)
     for event in ends.values():
         event.terminal = True

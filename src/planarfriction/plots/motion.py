@@ -192,9 +192,8 @@ def placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
 def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> Artist:
     """Draw boxes `[N, 4, 2]` or points `[N, 2]` [m] in the frame of the axes [mm]; return the artist."""
     shape = 1e3 * shape
-    if (
-        shape.ndim == 3
-    ):  # all boxes are one path, so that no seams show between neighbours
+    # All boxes are one path, so that no seams show between neighbours.
+    if shape.ndim == 3:
         closed = np.concatenate([shape, shape[:, :1]], axis=1)
         codes = [
             Outline.MOVETO,

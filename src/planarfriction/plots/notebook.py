@@ -179,9 +179,8 @@ def _section(surface: pf.limit_surface.LimitSurface) -> style.PlotFigure:
 
 
 def _size(patch: pf.ContactPatch) -> str:
-    if (
-        patch.grid is None or patch.cell_size is None or min(patch.cell_size) == 0.0
-    ):  # points, lines
+    # Points, lines.
+    if patch.grid is None or patch.cell_size is None or min(patch.cell_size) == 0.0:
         width, height = np.ptp(patch.positions, axis=0) + (
             0.0 if patch.cell_size is None else patch.cell_size
         )

@@ -65,9 +65,8 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
             if len(solutions) > 1
         ),
     ]
-    for i, (solution, factor) in enumerate(
-        zip(solutions, factors, strict=True)
-    ):  # first as it is, then the others
+    # First as it is, then the others.
+    for i, (solution, factor) in enumerate(zip(solutions, factors, strict=True)):
         time = np.asarray(solution.histories["time"].values)
         label = (
             "friction of the scene"

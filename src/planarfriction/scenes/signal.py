@@ -311,9 +311,8 @@ class Signal(ByValue):
 
     def _value(self, t, side: Literal["left", "right"]) -> np.ndarray:
         t = validation.finite_numbers("t", t)
-        if (
-            self.hold == "linear"
-        ):  # continuous: both limits agree, and at a sample the sample itself is exact
+        # Continuous: both limits agree, and at a sample the sample itself is exact.
+        if self.hold == "linear":
             side = "right"
         i = np.searchsorted(self.times, t, side=side) - 1
         begun = i >= 0

@@ -95,9 +95,8 @@ class Keys:
 
     def _table(self, part: Any) -> dict[str, Any]:
         """Return the digest of a part as the table that stands for it in the plain form of a scene."""
-        if (
-            isinstance(part, Signal) and len(part.times) == 1
-        ):  # it is shorter than its digest
+        # It is shorter than its digest.
+        if isinstance(part, Signal) and len(part.times) == 1:
             return part.to_dict()
         return {"digest": self._of_part(part)}
 

@@ -299,9 +299,8 @@ class Sweeping:
             self._stopped.set()
             for future in pending:
                 future.cancel()
-            if (
-                stopped is not None
-            ):  # threads of its own, which hand over what they have
+            # Threads of its own, which hand over what they have.
+            if stopped is not None:
                 wait(pending)
             self._take(
                 [
@@ -377,9 +376,8 @@ class Sweeping:
             if isinstance(error, (BrokenExecutor, CancelledError)):
                 self._ended = _ENDED.format(reason_of(error))
                 continue
-            if isinstance(
-                error, KeyboardInterrupt
-            ):  # in a process that heard Ctrl-C too: these runs are not done
+            # In a process that heard Ctrl-C too: these runs are not done.
+            if isinstance(error, KeyboardInterrupt):
                 continue
             # any other error means that the executor lost the runs, or could not send one of them
             if error is not None:

@@ -69,9 +69,8 @@ def _real(name: str, value: Any, like: Tensor | None = None) -> Tensor:
             )
         return value.to(dtype)
     plain = value if type(value) is float else validation.numbers(name, value)
-    if (
-        isinstance(plain, np.ndarray) and min(plain.strides, default=0) < 0
-    ):  # which tensors do not support
+    # Which tensors do not support.
+    if isinstance(plain, np.ndarray) and min(plain.strides, default=0) < 0:
         plain = plain.copy()
     return torch.as_tensor(plain, dtype=dtype, device=device)
 

@@ -89,9 +89,8 @@ class PhysicalParameters(nn.Module):
         """Return the physical values by name; trained ones follow from their raw numbers."""
         now = dict(zip(self.names, self.values.unbind(), strict=True))
         raws = dict(self.raw.items())
-        for name, scale in zip(
-            self.names, self.scale.unbind(), strict=True
-        ):  # mu_c comes before mu_s
+        # Mu_c comes before mu_s.
+        for name, scale in zip(self.names, self.scale.unbind(), strict=True):
             if name not in raws:
                 continue
             raw = raws[name]

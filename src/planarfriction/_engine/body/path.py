@@ -83,9 +83,8 @@ def follow(run: Place, path: Path) -> tuple[int, int]:
         path.since[count] = breaks[piece + 1] - breaks[piece] if ended else clock[SINCE]
         copy(integration.stages.start_rate, path.rate[count - 1], n)
         copy(integration.stages.new, path.state[count], n)
-        if (
-            ended or outcome != PAUSED or count + 3 > path.piece.shape[0]
-        ):  # else the next trial evaluates it
+        # Else the next trial evaluates it.
+        if ended or outcome != PAUSED or count + 3 > path.piece.shape[0]:
             call(
                 system.rates,
                 (

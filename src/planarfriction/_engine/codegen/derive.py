@@ -101,9 +101,8 @@ class Walk:
     # ------------------------------------------------------------------ statements
 
     def _statement(self, node: ast.stmt) -> None:
-        if isinstance(node, ast.Expr) and isinstance(
-            node.value, ast.Constant
-        ):  # a docstring
+        # A docstring.
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             return
         if isinstance(node, ast.Return) and node.value is not None and not self.results:
             if isinstance(node.value, ast.Call):

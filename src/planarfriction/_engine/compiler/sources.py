@@ -39,9 +39,8 @@ class Sources:
             repr(versions),
             *((self.name_of(file), digest_of(file)) for file in self.files),
         ]
-        if not all(
-            map(all, parts[1:])
-        ):  # inside an archive, or installed without its sources
+        # Inside an archive, or installed without its sources.
+        if not all(map(all, parts[1:])):
             return None
         return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 

@@ -183,9 +183,8 @@ def _advance_one(w: np.ndarray, c: int, dt: float) -> None:
 
 @kernel
 def _advance(w: np.ndarray, lanes: int, dt: float) -> None:
-    for c in range(
-        lanes
-    ):  # the body apart: kernel later, it leaves the compiler a loop that it can count
+    # The body apart: kernel later, it leaves the compiler a loop that it can count.
+    for c in range(lanes):
         _advance_one(w, c, dt)
 
 

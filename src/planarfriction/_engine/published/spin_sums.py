@@ -112,7 +112,6 @@ def smoothed_nodes(
             nodes[i, j, 0] = hx
             nodes[i, j, 1] = hy
             nodes[i, j, 2] = ht / radius
-        for c in range(
-            3
-        ):  # one by one: an assignment of arrays takes six times as long to compile
+        # One by one: an assignment of arrays takes six times as long to compile.
+        for c in range(3):
             nodes[i, 4 * size, c] = nodes[i, 0, c]

@@ -130,9 +130,8 @@ class CompiledPublished(CompiledModel):
         for load in loads:
             shapes.append(self.shapes.shape_at(load))
             data = shapes[-1].surface.numbers.data
-            if (
-                id(data) in surfaces
-            ):  # no other array takes the place of one, as `shapes` holds it
+            # No other array takes the place of one, as `shapes` holds it.
+            if id(data) in surfaces:
                 continue
             surfaces[id(data)] = data.nbytes
             if sum(surfaces.values()) > packed.MAX_PACK_BYTES and len(shapes) > 1:

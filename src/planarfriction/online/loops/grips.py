@@ -251,9 +251,8 @@ def _follow(c, e, least_load, quantum, turns):
         e.seen > 0 and not frozen and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
     )
     c.mute = 0.0 if bears else c.mute + dt
-    if (
-        e.seen > 0
-    ):  # filtered as the gauge is, else a grip that falls fast seems to lose load
+    # Filtered as the gauge is, else a grip that falls fast seems to lose load.
+    if e.seen > 0:
         grown = c.pressed + (e.normal_force - c.pressed) * (
             1.0 - math.exp(-dt / SEEN_TIME)
         )

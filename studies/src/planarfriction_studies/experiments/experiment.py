@@ -439,6 +439,7 @@ def _slug(label: str) -> str:
 
 
 def _read_piece(path: Path, fingerprint: str) -> Arrays | None:
+    # None, or cut off while it was written.
     try:
         with path.open("rb") as file, np.load(file) as stored:
             arrays = dict(stored)
@@ -447,7 +448,7 @@ def _read_piece(path: Path, fingerprint: str) -> Arrays | None:
         ValueError,
         EOFError,
         BadZipFile,
-    ):  # none, or cut off while it was written
+    ):
         return None
     return arrays if str(arrays.pop("fingerprint", "")) == fingerprint else None
 

@@ -287,9 +287,8 @@ def staircase(stairs: Arrays) -> PlotFigure:
         ):
             cells = factor * stairs[f"{shape}/sum{ending}"]
             exact = factor * stairs[f"{shape}/exact{ending}"]
-            if (
-                shape == "Circle"
-            ):  # steps of a few thousandths do not show beside the curve itself
+            # Steps of a few thousandths do not show beside the curve itself.
+            if shape == "Circle":
                 cells = 1e3 * (cells - exact)
                 exact = 0.0 * exact
                 label = from_exact

@@ -378,16 +378,18 @@ def _creep_comparisons(
     rows = []
     for what, (load, *window) in WINDOWS.items():
         for model, moved in creep[what].items():
+            # Creeps a little: the table's own doing, see the findings.
             if (what, model) == (
                 "normal force",
                 "r_ep",
-            ):  # creeps a little: the table's own doing, see the findings
+            ):
                 continue
             for name, ours in moved.items():
+                # Nothing turns the disc before 2.8 s.
                 if (what, name) == (
                     "force",
                     "theta",
-                ):  # nothing turns the disc before 2.8 s
+                ):
                     continue
                 words = f"drift per period, {what}, {WORDS[model]}, {name}"
                 tolerance = share * float(np.ptp(found[load, model][name]))

@@ -83,9 +83,8 @@ def _draw_runs(
     published: Mapping[str, str],
 ) -> None:
     factor = AXES[name][1]
-    if (
-        name == "normal_force"
-    ):  # the same for all runs; recorded at the end of each step that it holds over
+    # The same for all runs; recorded at the end of each step that it holds over.
+    if name == "normal_force":
         run = next(iter(runs.values()))
         axes.plot(
             run["time"], run[name], color="0.25", linewidth=1.3, drawstyle="steps-pre"
