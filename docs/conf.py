@@ -74,9 +74,8 @@ default_role = "literal"
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
-autodoc_type_aliases = {
-    "ArrayLike": "ArrayLike"
-}  # by its name, not as the union that it is
+# By its name, not as the union that it is.
+autodoc_type_aliases = {"ArrayLike": "ArrayLike"}
 python_maximum_signature_line_length = 90
 autodoc_default_options = {"members": True}
 napoleon_google_docstring = napoleon_numpy_docstring = (
@@ -130,9 +129,8 @@ sphinx_gallery_conf = {
 html_theme = "furo"
 html_title = f"planarfriction {version}"
 html_static_path = ["static"]
-if plotly := importlib.util.find_spec(
-    "plotly"
-):  # for figures that turn: nothing is loaded from elsewhere
+# For figures that turn: nothing is loaded from elsewhere.
+if plotly := importlib.util.find_spec("plotly"):
     html_static_path.append(
         str(Path(plotly.origin or "").parent / "package_data" / "plotly.min.js")
     )

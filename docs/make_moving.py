@@ -16,9 +16,8 @@ def main(folder: Path) -> None:
     """Write the picture and say how large it is."""
     law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
     model = pf.ReducedModel(PUBLISHED_PATCHES["Circle"](), law)
-    scene = pf.scenes.in_hand(
-        model, size=(0.09, 0.05), centre_of_mass=(0.006, 0.0)
-    )  # large pads, and it turns far
+    # Large pads, and it turns far.
+    scene = pf.scenes.in_hand(model, size=(0.09, 0.05), centre_of_mass=(0.006, 0.0))
     folder.mkdir(parents=True, exist_ok=True)
     check_size(
         pf.simulate(scene, save_every=2e-3).animate(

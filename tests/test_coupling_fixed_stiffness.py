@@ -63,9 +63,8 @@ def test_wrenches_are_those_of_the_models_while_loads_follow_them(second):
             zip(patches.models, patches.states(z), strict=True)
         ):
             new, pull = model.step(state, done.twist[k], done.normal_force[k], 1e-3)
-            rtol = (
-                1e-12 if done.iterations < 8 else 1e-6
-            )  # near a kink the last loads differ by the tolerance
+            # Near a kink the last loads differ by the tolerance.
+            rtol = 1e-12 if done.iterations < 8 else 1e-6
             np.testing.assert_allclose(done.wrench[k], pull, rtol=rtol, atol=1e-13)
             np.testing.assert_allclose(
                 patches.states(done.state)[k], new, rtol=rtol, atol=1e-6 * rtol

@@ -30,9 +30,8 @@ def test_draws_fill_their_ranges_and_repeat():
         assert values.min() < low + 0.01 * (
             high - low
         ) and values.max() > high - 0.01 * (high - low)
-    assert np.median(drawn["v_s"]) == pytest.approx(
-        1e-3, rel=0.15
-    )  # 50 % more than three standard errors
+    # 50 % more than three standard errors.
+    assert np.median(drawn["v_s"]) == pytest.approx(1e-3, rel=0.15)
     np.testing.assert_allclose(drawn["mu_s"], 1.25 * drawn["mu_c"], rtol=1e-14)
     again, other = (pf.randomise(LAW, ranges, 2000, seed=seed) for seed in (3, 4))
     assert all(np.array_equal(drawn[name], again[name]) for name in drawn)

@@ -96,9 +96,8 @@ def test_the_families_are_complete():
             for each in public
             if isinstance(each, type) and issubclass(each, base) and each is not base
         }
-        classes = {
-            each for each in classes if dataclasses.is_dataclass(each)
-        }  # `RateLaw` is another base
+        # `RateLaw` is another base.
+        classes = {each for each in classes if dataclasses.is_dataclass(each)}
         assert classes == set(family.values())
 
 

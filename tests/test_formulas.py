@@ -67,16 +67,14 @@ def test_stribeck_falls_from_static_to_coulomb_friction(gamma):
 @checked
 def test_slip_fraction_limits(ratio):
     below = ratio * np.array([0.0, 0.5, 0.999, 1.0])
-    assert np.array_equal(
-        formulas.slip_fraction(np, below, ratio), np.zeros(4)
-    )  # exactly: nothing may creep
+    # Exactly: nothing may creep.
+    assert np.array_equal(formulas.slip_fraction(np, below, ratio), np.zeros(4))
     assert np.array_equal(
         formulas.slip_fraction(np, np.array([1.0, 1.001, 7.0]), ratio), np.ones(3)
     )
     middle = formulas.slip_fraction(np, 0.5 * (1.0 + ratio), ratio)
-    assert middle == pytest.approx(
-        0.5, abs=1e-13
-    )  # 1e-16 of the deflection over a width of 0.01 or more
+    # 1e-16 of the deflection over a width of 0.01 or more.
+    assert middle == pytest.approx(0.5, abs=1e-13)
     rising = formulas.slip_fraction(np, np.linspace(0.0, 1.2, 200), ratio)
     assert (np.diff(rising) >= 0.0).all()
 
@@ -88,17 +86,17 @@ def test_slip_fraction_is_the_published_sine(ratio, share):
     published = 0.5 + 0.5 * math.sin(
         math.pi * (deflection - 0.5 * (1.0 + ratio)) / (1.0 - ratio)
     )
+    # As above.
     assert formulas.slip_fraction(np, deflection, ratio) == pytest.approx(
         published, abs=1e-13
-    )  # as above
+    )
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.5, 0.9])
 def test_slip_fraction_slope_is_the_slope(ratio):
     width = 1.0 - ratio
-    inside = ratio + width * np.linspace(
-        0.02, 0.98, 97
-    )  # two steps away from the ends, where the curvature jumps
+    # Two steps away from the ends, where the curvature jumps.
+    inside = ratio + width * np.linspace(0.02, 0.98, 97)
     expected = slope(
         lambda d: formulas.slip_fraction(np, d, ratio), inside, 5e-3 * width
     )
@@ -128,9 +126,8 @@ def test_decay_bounds(deflection, cosine, speed, ratio):
     )
     assert plain == speed * grip
     assert 0.0 <= elastic <= plain * (1 + 1e-15)  # beta lies in [0, 1]; rounding
-    if (
-        deflection <= ratio or cosine == -1.0
-    ):  # elastic, or the bristle is being relaxed
+    # Elastic, or the bristle is being relaxed.
+    if deflection <= ratio or cosine == -1.0:
         assert elastic == 0.0
     if deflection >= 1.0 and cosine == 1.0:
         assert elastic == pytest.approx(plain, rel=1e-15)  # rounding
@@ -169,18 +166,15 @@ def test_relaxation_of_endless_steps():
 def test_mean_decay(start, end, log_dt):
     dt = 10.0**log_dt
     k = formulas.mean_decay(start, end, dt)
-    assert (
-        min(start, end) * (1 - 1e-12) <= k <= max(start, end) * (1 + 1e-12)
-    )  # a mean; rounding
+    # A mean; rounding.
+    assert min(start, end) * (1 - 1e-12) <= k <= max(start, end) * (1 + 1e-12)
     half = 0.5 * (start + end)
     x = 0.5 * (start + end) * dt
-    if (
-        x < 1.0
-    ):  # second order: the half-way mean but for a share of x; the half of a denormal number is rounded too
+    # Second order: the half-way mean but for a share of x; the half of a denormal number is rounded too.
+    if x < 1.0:
         assert abs(k - half) <= 0.5 * x * abs(start - end) + 1e-12 * half + 5e-324
-    if (
-        x > 10.0
-    ):  # long steps: the end's, and what is left of the start less than its share of the step
+    # Long steps: the end's, and what is left of the start less than its share of the step.
+    if x > 10.0:
         assert abs(k - end) * dt <= 2.0 * abs(start - end) / half / x + 1e-12 * end * dt
 
 
@@ -189,15 +183,17 @@ def test_mean_decay(start, end, log_dt):
 def test_a_step_ends_within_reach(start, end):
     largest = formulas.reachable_deflection(np, start, bristles_of(1.0, 0.5))
     assert largest == max(start, 1.0)
+    # Rounding.
     assert end * formulas.cap(np, end, largest) == pytest.approx(
         min(end, largest), rel=1e-15
-    )  # rounding
+    )
+    # Plain LuGre is not capped.
     assert (
         formulas.cap(
             np, end, formulas.reachable_deflection(np, start, bristles_of(0.0, 0.5))
         )
         == 1.0
-    )  # plain LuGre is not capped
+    )
 
 
 # ---------------------------------------------------------------------- derivatives of a step
@@ -212,16 +208,16 @@ def test_decay_by_breakaway_is_the_slope(ratio):
             np, deflection, 0.3, 0.7, 2.0, bristles_of(1.0, s)
         )
 
+    # Of k by the deflection.
     partial = (
         formulas.slip_fraction_slope(np, deflection, ratio) * 0.5 * (0.7 + 0.3) * 2.0
-    )  # of k by the deflection
+    )
     got = formulas.bristle_decay_by_breakaway(np, partial, deflection, ratio)
     expected = slope(decay, ratio, 1e-3 * (1.0 - ratio))
     # Truncation (1e-3)^4 of the fifth derivative, some 1e3, over the width; rounding.
     assert got == pytest.approx(expected, abs=1e-8 / (1.0 - ratio))
-    assert (
-        formulas.bristle_decay_by_breakaway(np, 1e-16, 1e6, ratio) == 0.0
-    )  # beyond full deflection nothing moves
+    # Beyond full deflection nothing moves.
+    assert formulas.bristle_decay_by_breakaway(np, 1e-16, 1e6, ratio) == 0.0
 
 
 def test_relaxation_slope_is_the_slope():
@@ -230,9 +226,8 @@ def test_relaxation_slope_is_the_slope():
     # The slope is ((1 + x) exp(-x) - 1)/x^2, for small x as a series.
     series = -sum((n + 1) * (-x) ** n / float(math.factorial(n + 2)) for n in range(40))
     closed = -(-np.expm1(-x) - x * np.exp(-x)) / x**2
-    assert got == pytest.approx(
-        np.where(x < 2.0, series, closed), rel=1e-13
-    )  # above 0.1 a difference loses 1e-16/0.1^2
+    # Above 0.1 a difference loses 1e-16/0.1^2.
+    assert got == pytest.approx(np.where(x < 2.0, series, closed), rel=1e-13)
     assert formulas.relaxation_slope(np, 0.0, 1.0, 1.0) == -0.5
 
 
@@ -312,9 +307,8 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
         finite = np.isfinite(wanted)
         assert np.array_equal(finite, np.isfinite(got)), column
         allowed = 1e-14 * np.abs(wanted[finite]) + 1e-15 * np.abs(wanted[finite]).max()
-        if (
-            column == 6
-        ):  # (1 - exp(-x))/x just above 1e-3 amplifies the last place of exp by 1/x
+        # (1 - exp(-x))/x just above 1e-3 amplifies the last place of exp by 1/x.
+        if column == 6:
             allowed = allowed + 6e-16 / np.maximum(decay_dt, 1e-3)
         if column == 11:  # and its slope, above 0.1, by 1/x^2
             allowed = allowed + 6e-16 / np.maximum(decay_dt, 0.1) ** 2

@@ -148,9 +148,8 @@ def test_largest_step_of_several_patches():
         pf.SlidingBody(MASS, 1.0, model).largest_step(2.0), rel=1e-9
     )
     light = pf.SlidingBody(MASS, 1e-4, [model, model], far)
-    equal = pf.SlidingBody(1e-4 / 1e-2, 1e9, model).largest_step(
-        2.0
-    )  # a mass that the feet feel at their arm
+    # A mass that the feet feel at their arm.
+    equal = pf.SlidingBody(1e-4 / 1e-2, 1e9, model).largest_step(2.0)
     assert light.largest_step([1.0, 1.0]) == pytest.approx(equal, rel=1e-2)
     assert light.largest_step([[0.0, 0.0], [1.0, 1.0]])[0] == np.inf
 
@@ -208,9 +207,8 @@ def test_a_body_on_a_turntable_keeps_its_place(spin, radius, mu, dt):
         pose += dt * twist
         turned += dt * spin
     x, y = geometry.rotate(pose[:2], -turned)
-    deflection = (
-        spin**2 * radius / (9.81 * body.models.law.sigma_0)
-    )  # bristles carry the centripetal force
+    # Bristles carry the centripetal force.
+    deflection = spin**2 * radius / (9.81 * body.models.law.sigma_0)
     # and 1e-9 m/s are the tolerance of a step
     assert (
         abs(x - radius) < 2.0 * deflection + 1e-9 * duration

@@ -152,9 +152,8 @@ def test_warming_up_names_its_parts_to_somebody_who_waits(monkeypatch, processor
 def test_two_first_runs_at_once(tmp_path):
     pair = [started(FIRST_RUN, tmp_path) for _ in range(2)]
     first, second = (result(process) for process in pair)
-    assert (
-        first == second == result(started(FIRST_RUN, tmp_path))
-    )  # compiled or read from the cache: to the last bit
+    # Compiled or read from the cache: to the last bit.
+    assert first == second == result(started(FIRST_RUN, tmp_path))
 
 
 @pytest.mark.slow
@@ -226,11 +225,9 @@ def test_ctrl_c_while_compiling_ends_the_run(what, tmp_path):
             time.sleep(0.01)
         time.sleep(draw.uniform(0.0, 3.0))
         process.send_signal(signal.SIGINT)
-        _, error = process.communicate(
-            timeout=60
-        )  # a second where the machine is idle; two of these never end alone
-        assert process.returncode in (130, -signal.SIGINT), (
-            error
-        )  # -SIGINT: Python ends so, shells call it 130
+        # A second where the machine is idle; two of these never end alone.
+        _, error = process.communicate(timeout=60)
+        # -SIGINT: Python ends so, shells call it 130.
+        assert process.returncode in (130, -signal.SIGINT), error
         assert "Exception ignored" not in error
     assert result(started(FIRST_RUN, cache)) == result(started(FIRST_RUN))

@@ -73,9 +73,8 @@ class CodeLinks(SphinxPostTransform):
         if ("." in text or not text.islower()) and f"planarfriction.{text}" in objects:
             return f"planarfriction.{text}"  # of models that have one name in several front ends, the one in NumPy
         first, _, rest = text.partition(".")
-        if (
-            rest and f"planarfriction.{first}" in objects
-        ):  # a module, from which the object is documented elsewhere
+        # A module, from which the object is documented elsewhere.
+        if rest and f"planarfriction.{first}" in objects:
             first, _, rest = rest.partition(".")
         full = ends.get(first)
         if full is None or (

@@ -25,9 +25,8 @@ def mathml(node: nodes.math | nodes.math_block, as_block: bool) -> str:
     bar = '<mo stretchy="false" lspace="0" rspace="0" form="{}">|</mo>'
     for side, form in (("mathopen", "prefix"), ("mathclose", "postfix")):
         text = text.replace(f'<mo class="{side}">|</mo>', bar.format(form))
-    text = text.replace(
-        "<mo>|</mo>", bar.format("postfix")
-    )  # with an exponent docutils forgets which side it is
+    # With an exponent docutils forgets which side it is.
+    text = text.replace("<mo>|</mo>", bar.format("postfix"))
     return text.replace(
         '<mtable class="ams-align">', '<mtable class="ams-align" displaystyle="true">'
     )

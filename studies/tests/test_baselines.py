@@ -48,9 +48,8 @@ def test_least_grip_of_two_fingers_against_the_ellipsoid():
     exact = holding_load(load, finger, mu=0.8)
     assert exact == pytest.approx(12.452, abs=2e-3)
     ellipsoid = exact
-    for _ in range(
-        60
-    ):  # the radius follows the load: the smallest root by substitution
+    # The radius follows the load: the smallest root by substitution.
+    for _ in range(60):
         radius = 0.635410 * 4.353e-3 * ellipsoid**0.2569
         ellipsoid = float(baselines.ellipsoid_load(load, radius, 0.8))
     assert ellipsoid == pytest.approx(12.382, abs=2e-3)
@@ -99,9 +98,8 @@ def test_torque_of_a_slip_biases_the_regression_of_the_radius():
         np.append(0.5 + 0 * speed, 0.0),
     )
     assert found.mu_c == pytest.approx(0.5)
-    assert found.radius / RADIUS - 1.0 == pytest.approx(
-        -0.66, abs=0.01
-    )  # published: up to -66 %
+    # Published: up to -66 %.
+    assert found.radius / RADIUS - 1.0 == pytest.approx(-0.66, abs=0.01)
 
 
 def test_regression_finds_friction_that_grows_with_speed():

@@ -41,9 +41,8 @@ def test_a_drift_without_a_grain_is_straight_down(monkeypatch):
 @pytest.mark.slow
 def test_the_staircase_of_a_line_has_steps_of_two_cells(result):
     jumps = result.numbers["jumps"]
-    assert jumps["Line/sum"] == pytest.approx(
-        2.0 / 21.0, rel=1e-9
-    )  # a cell of 1/21 of the load turns its force round
+    # A cell of 1/21 of the load turns its force round.
+    assert jumps["Line/sum"] == pytest.approx(2.0 / 21.0, rel=1e-9)
     assert jumps["Line/exact"] < 2.0 / beyond_surfaces.STAIRS
 
 
@@ -182,9 +181,8 @@ def test_soft_finger(result):
 def test_in_hand_ends_are_those_of_two_simulations(result):
     case = Case("LineGrad", 2)
     ends = result.numbers["in hand"][case.words]
-    assert (
-        ends["reduced"] == ends[ladder.ALL] < ends["published"]
-    )  # 21 cells are 21 discs
+    # 21 cells are 21 discs.
+    assert ends["reduced"] == ends[ladder.ALL] < ends["published"]
     rows = ladder.in_hand_rows((case,))
     assert {row.model: row.errors["end"] for row in rows}["reduced"] == pytest.approx(
         ends["reduced"], rel=1e-9
@@ -295,23 +293,22 @@ def test_the_ladder_draws_every_family_that_was_run(result):
     figure = next(
         picture.figure for picture in result.pictures if picture.name == "ladder"
     )
-    assert (
-        len(figure.axes) == 6
-    )  # patches of many cells and of few; velocity-driven, and two loads in hand
+    # Patches of many cells and of few; velocity-driven, and two loads in hand.
+    assert len(figure.axes) == 6
     shown = {text.get_text() for axes in figure.axes for text in axes.texts}
     assert shown == {
         "",
         *(words for family in FAMILIES for words in family.rungs.values()),
     }
+    # Which share their axis of times.
     for column in (
         figure.axes[0::2],
         figure.axes[1::2],
-    ):  # which share their axis of times
+    ):
         first, last = (
             find(axes.dataLim.intervalx[i] for axes in column)
             for i, find in enumerate((min, max))
         )
         left, right = column[0].get_xlim()
-        assert np.log(right / left) < 2.0 * np.log(
-            last / first
-        )  # an axis of times without an empty half
+        # An axis of times without an empty half.
+        assert np.log(right / left) < 2.0 * np.log(last / first)

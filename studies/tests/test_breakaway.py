@@ -35,6 +35,5 @@ def test_a_patch_lets_go_where_it_is_said_to():
 def test_loads_are_on_the_limit_surface():
     patch = made.SHAPES["T"]()
     wrench = made.wrench_at_limit(patch, np.random.default_rng(0))
-    assert made.highest_level(patch, wrench[None]) == pytest.approx(
-        1.0, abs=0.01
-    )  # cells beside the continuous patch
+    # Cells beside the continuous patch.
+    assert made.highest_level(patch, wrench[None]) == pytest.approx(1.0, abs=0.01)

@@ -20,9 +20,8 @@ ELSEWHERE = {"make_breakaway", "make_referee", "make_tables"}
 
 def beside(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
-    monkeypatch.setattr(
-        made, "truth", lambda load: made.in_mujoco(load, None)
-    )  # its finer cells take long
+    # Its finer cells take long.
+    monkeypatch.setattr(made, "truth", lambda load: made.in_mujoco(load, None))
 
     def last(path: Path, file: Any, frame: Any, count: int, fps: float) -> None:
         assert count > 20 and fps == 20.0
@@ -55,9 +54,8 @@ def house(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def images(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     simulate = pf.simulate
-    monkeypatch.setattr(
-        made, "grip_plan", made.bristle
-    )  # tests of grips make that plan
+    # Tests of grips make that plan.
+    monkeypatch.setattr(made, "grip_plan", made.bristle)
     monkeypatch.setattr(pf, "simulate", lambda scene: simulate(scene, t_end=0.05))
     for name, figure in made.figures().items():
         figure.savefig(folder / f"{name}.png", dpi=20)
@@ -117,9 +115,8 @@ def pushing(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def joint(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(made, "T_END", 1.0)
-    made.holds().savefig(
-        folder / "joint-holds.png"
-    )  # the other picture is that of a fit, which test_joints makes
+    # The other picture is that of a fit, which test_joints makes.
+    made.holds().savefig(folder / "joint-holds.png")
 
 
 MAKERS = {

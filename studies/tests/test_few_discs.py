@@ -118,9 +118,8 @@ def test_errors_on_three_feet_are_far_below_those_of_one_threshold():
 @pytest.mark.parametrize("shape", list(new_shapes.SHAPES))
 def test_the_largest_errors_on_new_shapes_are_below_the_published_models(shape):
     ratios = new_shapes.ratios(new_shapes.largest_errors(shape))["reduced"]
-    assert (
-        max(max(each) for each in ratios.values()) < 0.8
-    )  # found 0.72 in the worst of ten motions
+    # Found 0.72 in the worst of ten motions.
+    assert max(max(each) for each in ratios.values()) < 0.8
 
 
 def test_twists_are_smooth_and_start_from_rest():

@@ -88,9 +88,8 @@ def test_the_scaled_patch_is_the_distributed_model_of_the_finger():
     body = pf.Body(0.2, 3e-4, position=(0.01, 0.0))
     scene = pf.Scene(body, pf.Contact(finger, 3.0, count=2), 0.08)
     end = pf.simulate(scene).data.isel(time=-1)
-    assert gripper.angle[0] == pytest.approx(
-        float(end.theta), rel=0.02
-    )  # steps of 1 ms are 1.2 % of 80 ms twice integrated
+    # Steps of 1 ms are 1.2 % of 80 ms twice integrated.
+    assert gripper.angle[0] == pytest.approx(float(end.theta), rel=0.02)
     assert gripper.centre[0] == pytest.approx([float(end.x), float(end.y)], rel=0.02)
     assert abs(gripper.angle[0]) > 0.05
 

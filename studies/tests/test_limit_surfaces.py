@@ -107,9 +107,8 @@ def test_the_spin_without_force_is_not_about_the_centre_of_pressure(result):
     cells = gradient["cells"]
     beside = gradient["ellipsoid"]
     assert cells["middle cell"] == pytest.approx(4 * 0.02 / 21, rel=1e-12)
-    assert cells["force"] == pytest.approx(
-        1.0 / 11.0
-    )  # weights 6 to 21 against 1 to 14, of 231
+    # Weights 6 to 21 against 1 to 14, of 231.
+    assert cells["force"] == pytest.approx(1.0 / 11.0)
     offset = cells["middle cell"] - cells["centre of pressure"]
     radius = cells["radius"]
     assert beside["force at equal halves"] == pytest.approx(

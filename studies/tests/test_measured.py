@@ -214,9 +214,8 @@ def test_mujocos_box_slides_as_far_as_coulomb_says(cases):
     case = cases["slides"][3]
     found = MujocoBox(mu=0.22)(case.question)
     ours = models.SurfaceModel(pf.LimitSurfaceExact, mu=0.22)(case.question)
-    assert (
-        np.hypot(*(found - ours)[-1, :2]) < 1e-3
-    )  # regularised contact: 1 mm of some 60
+    # Regularised contact: 1 mm of some 60.
+    assert np.hypot(*(found - ours)[-1, :2]) < 1e-3
     with pytest.raises(NotImplementedError):
         MujocoBox()(TASKS["pushes"].read(None)[0].question)
 
@@ -264,9 +263,8 @@ def test_a_push_through_the_centre_goes_straight(cases):
 def test_the_peak_of_a_force_in_closed_form():
     time = np.linspace(-0.1, 1.0, 1101)
     force = np.where(time < 0.2, 2.0 * time, 0.25)[:, None] * [1.0, 2.0]
-    assert onsets.peak(time, force) == pytest.approx(
-        np.array([1.6, 1.6]), rel=1e-2
-    )  # 0.2 s at 2 N/s over 0.25 N
+    # 0.2 s at 2 N/s over 0.25 N.
+    assert onsets.peak(time, force) == pytest.approx(np.array([1.6, 1.6]), rel=1e-2)
     assert np.isnan(onsets.peak(time[:300], force[:300])).all()
 
 
@@ -765,9 +763,8 @@ def test_friction_of_single_tosses_is_found_and_regions_hold_their_ends(cases):
     test = made[80:]
     plain = contactnets.SpeedModel().fit(training)
     model = contactnets.TossModel().fit(training)
-    assert plain.mu_0 + 0.3 * plain.mu_1 == pytest.approx(
-        0.215, rel=0.02
-    )  # 6 % over the root of 80; each alone is told worse
+    # 6 % over the root of 80; each alone is told worse.
+    assert plain.mu_0 + 0.3 * plain.mu_1 == pytest.approx(0.215, rel=0.02)
     errors = [
         TASKS["slides"].errors(c, m(c.question))[0]
         for m in (plain, model)
@@ -779,9 +776,8 @@ def test_friction_of_single_tosses_is_found_and_regions_hold_their_ends(cases):
     ).all()  # first poses without pushes tell most of the friction
     found = model.check(test)
     for name in ("places", "angles"):
-        assert (
-            85.0 <= found[f"{name} inside 95% regions [%]"][0] <= 100.0
-        )  # 95 +- 3.4 of 40 tosses
+        # 95 +- 3.4 of 40 tosses.
+        assert 85.0 <= found[f"{name} inside 95% regions [%]"][0] <= 100.0
 
 
 def test_a_pose_that_jumps_does_not_decide(cases):
@@ -820,9 +816,8 @@ def test_regions_hold_ends_at_every_level_in_each_third():
                 [100.0 * level] * 7, abs=6.4
             )
     wide = sized.radii(np.array([[0.0, 0.05], [1.0, 0.05]]), 0.95)
-    assert wide[1] / wide[0] == pytest.approx(
-        [5.0**0.5] * 2, rel=0.25
-    )  # in steps of `GROWTHS`
+    # In steps of `GROWTHS`.
+    assert wide[1] / wide[0] == pytest.approx([5.0**0.5] * 2, rel=0.25)
     for level in (0.0, 1.0, float("nan")):
         with pytest.raises(InvalidValueError, match="level must be between 0 and 1"):
             sized.radii(moved, level)
@@ -834,9 +829,8 @@ def test_a_check_has_half_axes_in_order_and_shares_of_ends(cases, monkeypatch):
     model = contactnets.TossModel(
         sized=EndRegions(sizes=np.stack([sizes, 2.0 * sizes], axis=1))
     )
-    region = (
-        np.array([[5.0, 3.0, 0.0], [3.0, 5.0, 0.0], [0.0, 0.0, 400.0]]) * 1e-6
-    )  # 2 and 8 mm^2 along diagonals
+    # 2 and 8 mm^2 along diagonals.
+    region = np.array([[5.0, 3.0, 0.0], [3.0, 5.0, 0.0], [0.0, 0.0, 400.0]]) * 1e-6
     far = np.linspace(0.05, 0.85, 9)[:, None] * [1.0, 4.0]
     monkeypatch.setattr(
         contactnets.TossModel,

@@ -71,9 +71,8 @@ def test_in_hand_with_changing_pressure(kind):
     if kind == "d":
         model = pf.DistributedModel(soft, ELASTIC)
     else:
-        surface = pf.LimitSurfaceTablePublished(
-            soft, normal_force=6.0
-        )  # from 5.36 N on the radius is at its cap
+        # From 5.36 N on the radius is at its cap.
+        surface = pf.LimitSurfaceTablePublished(soft, normal_force=6.0)
         model = pf.ReducedModelPublished(
             soft, ELASTIC, surface=surface, on_load_change="rescale"
         )
@@ -120,9 +119,8 @@ def test_elasto_plastic_plateaus_are_exact(load):
     model = pf.DistributedModel(patch("Circle", 0.05), ELASTIC)
     solution = pf.simulate(pf.scenes.drift(model, load=load), t_end=1.0)
     stiffness = ELASTIC.sigma_0 * 9.81
-    assert float(solution.data.x[-1]) == pytest.approx(
-        1.0 / stiffness, rel=1e-6
-    )  # asked: 1e-4
+    # Asked: 1e-4.
+    assert float(solution.data.x[-1]) == pytest.approx(1.0 / stiffness, rel=1e-6)
     if load == "normal":
         theta = 0.03 / (stiffness * model.patch.second_moment())
         assert theta == pytest.approx(1.067983e-5, rel=1e-6)

@@ -160,9 +160,8 @@ def second(source, a):
 )
 def test_small_steps_agree(name):
     truth = TRUTHS[name]
-    assert second(truth.source, truth.given) == pytest.approx(
-        truth.value, abs=5e-5
-    )  # of a step of 50 us at 1 m/s
+    # Of a step of 50 us at 1 m/s.
+    assert second(truth.source, truth.given) == pytest.approx(truth.value, abs=5e-5)
 
 
 def cells(a, count=30):
@@ -212,9 +211,8 @@ def moved(a):
             - arm[1] * push[0]
         )
         slower = twist + dt * np.array([*(pulls.sum(0) + push), torque]) / masses
-        if (
-            not push.any() and np.hypot(*twist[:2]) < 5e-3
-        ):  # the rest of the way is below 1e-5 m
+        # The rest of the way is below 1e-5 m.
+        if not push.any() and np.hypot(*twist[:2]) < 5e-3:
             break
         pose = pose + 0.5 * dt * (twist + slower)
         twist = slower
@@ -291,9 +289,8 @@ def test_a_plate_ends_in_the_hand_where_a_sum_over_cells_says():
         bears = 2.0 * a["mu"] * (a["load"] + a["rate"] * (i + 0.5) * dt)
         arms = points - place
         moves = velocity + spin * np.stack([-arms[:, 1], arms[:, 0]], axis=1)
-        if (
-            i > 400 and np.sqrt((moves**2).mean()) < 2e-3
-        ):  # the rest of the way is below 1e-5 m
+        # The rest of the way is below 1e-5 m.
+        if i > 400 and np.sqrt((moves**2).mean()) < 2e-3:
             break
         pulls = (
             -bears
@@ -869,12 +866,13 @@ def test_the_view_of_simulators(monkeypatch, capsys, tmp_path):
         if "case" in line or "stri" in line
     )
     assert heading == ["case", "A", "A, best", "A, patches"]
+    # 9, 0.5 and 0 times the 2.6 mm that are allowed.
     assert row == [
         "stribeck",
         "23 mm",
         "1.3 mm",
         "< 0.001 nm",
-    ]  # 9, 0.5 and 0 times the 2.6 mm that are allowed
+    ]
 
 
 class StubbedNewton:

@@ -115,9 +115,8 @@ class Made:
 @pytest.fixture
 def made(monkeypatch):
     """Two made-up experiments instead of the real ones."""
-    for name in reversed(
-        list(experiments.EXPERIMENTS)
-    ):  # put back in their order, the last one first
+    # Put back in their order, the last one first.
+    for name in reversed(list(experiments.EXPERIMENTS)):
         monkeypatch.delitem(experiments.EXPERIMENTS, name)
     pair = Made("first"), Made("second")
     for each in pair:
@@ -130,12 +129,13 @@ def test_results_are_stored_and_not_done_again(made, tmp_path):
     assert [record["name"] for record in reproduction.run()] == ["first", "second"]
     assert sorted(made[0].done) == ["a", "b"]
     files = {path.name for path in (tmp_path / "first").iterdir()}
+    # Pieces are gone.
     assert files == {
         "line.png",
         "line.svg",
         "curves.nc",
         "result.json",
-    }  # pieces are gone
+    }
     assert len(list(reproduction.run())) == 2
     assert sorted(made[0].done) == ["a", "b"]
     list(reproduction.run(["first"], again=True))

@@ -63,9 +63,8 @@ def test_every_converged_curve_and_box_belongs_to_a_comparison():
 
 def test_box_comparisons_of_two_shapes(result):
     rows = [row for row in result.comparisons if row.quantity.startswith("error of")]
-    assert len(rows) == 2 * 4 * (
-        5 + 6
-    )  # shapes, boxes of each, published and converged columns
+    # Shapes, boxes of each, published and converged columns.
+    assert len(rows) == 2 * 4 * (5 + 6)
 
 
 def test_steady_slide_and_spin(result):

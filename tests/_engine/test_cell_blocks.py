@@ -35,10 +35,11 @@ def test_cells_are_spread_evenly_in_whole_vectors(count):
         and lanes % VECTOR == 0
     )
     assert blocks * lanes - count < blocks * VECTOR
+    # That of what is filled up.
     assert divided.py_func(blocks * lanes) == (
         blocks,
         lanes,
-    )  # that of what is filled up
+    )
 
 
 def patch_of(positions: np.ndarray, weights: np.ndarray) -> pf.ContactPatch:

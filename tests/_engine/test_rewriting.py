@@ -27,9 +27,8 @@ def test_threads_see_twins_whose_globals_are_there():
     def finish(twin):
         if twin.__name__ == "middle":  # outer has begun, and has no global yet
             half.set()
-            asked.wait(
-                0.2
-            )  # as long as the other thread has to get hold of outer too soon
+            # As long as the other thread has to get hold of outer too soon.
+            asked.wait(0.2)
         return twin
 
     twins = Rewriting([(inner, lambda: "twin")], finished=finish)

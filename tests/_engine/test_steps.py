@@ -80,9 +80,8 @@ def test_derivatives_of_a_bristle(law):
             return 0.0  # exactly against each other: rounding decides on which side of its bound the decay lies
         return misfit(BRISTLE, (law, z, u, v, 1.0 / h, GRIP, _far(rng) / (v * GRIP)))
 
-    assert (
-        _worst(draw) < 1e-8
-    )  # digits that `z . u` loses where the two are nearly at right angles, in long steps
+    # Digits that `z . u` loses where the two are nearly at right angles, in long steps.
+    assert _worst(draw) < 1e-8
 
 
 @laws

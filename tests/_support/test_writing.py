@@ -200,10 +200,11 @@ def test_permissions_stay_and_new_files_have_those_of_any_new_file(tmp_path):
 def test_links_stay_links(tmp_path):
     (tmp_path / "data").mkdir()
     (tmp_path / "link").symlink_to(Path("data") / "run.nc")
+    # The first one makes the file that the link points to.
     for text in (
         "first",
         "second",
-    ):  # the first one makes the file that the link points to
+    ):
         write_text(tmp_path / "link", text)
         assert (tmp_path / "link").is_symlink()
         assert (tmp_path / "data" / "run.nc").read_text() == text

@@ -286,9 +286,8 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
     rest = given, own[run.friction._parts["axes"]], own[run.friction._parts["answers"]]
     asked = run.friction._asking.step(np.zeros(6), *before, *rest)
-    np.testing.assert_allclose(
-        asked.twists, -given, atol=2e-6
-    )  # pulled back, but for what bristles give
+    # Pulled back, but for what bristles give.
+    np.testing.assert_allclose(asked.twists, -given, atol=2e-6)
 
 
 def test_answers_that_lead_away_are_forgotten():

@@ -252,9 +252,8 @@ def _check(made: Turning, spin: float, dt: float, seconds: float, start: float) 
     path = made.path(seconds)
     times, radius, around, own = path[path[:, 0] > start - 1e-9].T
     lasts = times[-1] - times[0]
-    elastic = (
-        2.0 * spin**2 / 9.81 / LAW.sigma_0
-    )  # m, where the load is the weight of the part
+    # M, where the load is the weight of the part.
+    elastic = 2.0 * spin**2 / 9.81 / LAW.sigma_0
     assert np.ptp(radius) < 1.5 * radius[0] * spin**4 * dt**3 * lasts / 8.0 + elastic
     assert np.ptp(around) < 1.5 * spin**3 * dt**2 * lasts / 6.0 + elastic / radius[0]
     assert np.ptp(own) < 1.5 * spin**3 * dt**2 * lasts / 6.0 + elastic / radius[0]

@@ -129,9 +129,8 @@ def wheel(
 def test_a_wheel_thrown_without_spin_rolls_on(shape, frame):
     """v = v0/(1 + I/(m r^2)): 5/7 for a sphere, 2/3 for a solid cylinder."""
     position, velocity = wheel(shape, frame, [1.0, 0.0, 0.0])
-    arm = (
-        RADIUS + 0.5 * position[1]
-    )  # Drake's contact points lie between the surfaces, which overlap
+    # Drake's contact points lie between the surfaces, which overlap.
+    arm = RADIUS + 0.5 * position[1]
     share = SHAPES[shape][2] * (RADIUS / arm) ** 2
     assert velocity[0] == pytest.approx(1.0 / (1.0 + share), rel=1e-3)
     assert -velocity[2] * arm == pytest.approx(velocity[0], rel=1e-3)

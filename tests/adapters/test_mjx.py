@@ -161,9 +161,8 @@ def test_a_disc_slides_and_spins_to_rest_where_theory_says(discs, e):
     qpos = discs.path[-1, e]
     assert abs(np.asarray(discs.end.qvel[e])).max() < 1e-6
     # less the stepper's own v dt/2
-    assert qpos[0] + 0.5 * DT * speed == pytest.approx(
-        stop.distance, rel=1e-3
-    )  # of a few discs
+    # Of a few discs.
+    assert qpos[0] + 0.5 * DT * speed == pytest.approx(stop.distance, rel=1e-3)
     assert qpos[3] + 0.5 * DT * spin == pytest.approx(stop.angle, rel=2e-3)
 
 

@@ -51,13 +51,11 @@ def test_outline_arrow_and_centre_of_rotation_are_where_they_belong():
     )
     away = rim - FRAME[0]
     assert away[:, 0] == pytest.approx(0.0, abs=1e-12)  # in the plane
-    assert np.linalg.norm(away, axis=1) == pytest.approx(
-        0.02, rel=0.02
-    )  # the polygon of a circle
+    # The polygon of a circle.
+    assert np.linalg.norm(away, axis=1) == pytest.approx(0.02, rel=0.02)
     assert arrow[0] == pytest.approx(FRAME[0])
-    assert arrow[1] == pytest.approx(
-        [0.0, 0.0, -0.2], abs=1e-6
-    )  # -2 N along the frame's y, the world's z
+    # -2 N along the frame's y, the world's z.
+    assert arrow[1] == pytest.approx([0.0, 0.0, -0.2], abs=1e-6)
     # (-vy, vx)/omega = (-5 mm, 0) along the world's y
     assert centre[0][1:] == pytest.approx([2.0 - 0.005, 3.0], abs=1e-12)
 
@@ -72,9 +70,8 @@ def test_a_patch_is_drawn_larger_but_not_its_arrow_and_centre():
     )
     assert np.linalg.norm(rim - FRAME[0], axis=1) == pytest.approx(0.05, rel=0.02)
     assert arrow[1] == pytest.approx([0.0, 0.3, 0.0], abs=1e-6)
-    assert centre[0][1:] == pytest.approx(
-        [2.0, 3.005], abs=1e-12
-    )  # vx/omega = 5 mm along the frame's y
+    # Vx/omega = 5 mm along the frame's y.
+    assert centre[0][1:] == pytest.approx([2.0, 3.005], abs=1e-12)
 
 
 @pytest.mark.parametrize("twist", [(0.0, 0.0, 0.0), (1e-9, 0.0, 1e-7), (0.1, 0.0, 0.1)])

@@ -124,12 +124,10 @@ def test_rollouts_of_many_models_on_threads_have_friction_of_their_own():
             models, [mujoco.MjData(friction.m) for _ in range(2)], start, nstep=60
         )
     alone = np.array([_slid(friction, m).qpos for m in models])
-    np.testing.assert_allclose(
-        path[:, -1, 1:8], alone, atol=1e-8
-    )  # the solver starts elsewhere
-    assert (
-        np.corrcoef(path[:, -1, 1], drawn["mu_c"])[0, 1] < -0.8
-    )  # less far with more friction
+    # The solver starts elsewhere.
+    np.testing.assert_allclose(path[:, -1, 1:8], alone, atol=1e-8)
+    # Less far with more friction.
+    assert np.corrcoef(path[:, -1, 1], drawn["mu_c"])[0, 1] < -0.8
 
 
 def test_parameters_may_change_between_steps():

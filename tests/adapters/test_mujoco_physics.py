@@ -71,9 +71,8 @@ def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(
 def test_a_gripper_of_four_bar_linkages_holds():
     scene = linkage()
     m, d, friction = scene.ours()
-    held = scene.run(m, d, lambda: step_checked(friction, d, 1e-8))[
-        100:, -7:
-    ]  # its fingers have yielded to the weight
+    # Its fingers have yielded to the weight.
+    held = scene.run(m, d, lambda: step_checked(friction, d, 1e-8))[100:, -7:]
     assert np.ptp(held[:, :3], axis=0).max() <= 1e-8
     assert 2.0 * np.degrees(np.ptp(held[:, 4:], axis=0).max()) <= 1e-6
     assert friction.report(d).converged

@@ -199,9 +199,8 @@ def test_a_belt_takes_along_what_lies_on_it(thrown):
     slips = (speed - thrown) / (mu * G)
     end = 0.5 * (speed + thrown) * slips + speed * (time - slips)
     body = pf.Body(0.1, 1e-4, velocity=(thrown, 0.0, 0.0), gravity=(0.0, 0.0))
-    dry = pf.LuGre(
-        mu_c=mu, sigma_0=1e6, sigma_1=10.0, sigma_2=0.0
-    )  # damping takes sigma_1 mu g / sigma_0 off at once
+    # Damping takes sigma_1 mu g / sigma_0 off at once.
+    dry = pf.LuGre(mu_c=mu, sigma_0=1e6, sigma_1=10.0, sigma_2=0.0)
     sole = pf.ReducedModel(pf.ContactPatch.rectangle(0.1), dry)
     belt = pf.Contact(
         sole, 0.1 * G, mounted_on="body", support_velocity=(speed, 0.0, 0.0)

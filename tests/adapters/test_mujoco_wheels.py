@@ -70,9 +70,8 @@ def test_a_wheel_thrown_without_spin_rolls_on(shape, site):
         ):
             thrown(shape, site)
     d, friction = thrown(shape, site, centre="contact" if told else "auto")
-    arm = 0.5 * (
-        RADIUS + d.qpos[2]
-    )  # MuJoCo's contact points lie between the surfaces, which overlap
+    # MuJoCo's contact points lie between the surfaces, which overlap.
+    arm = 0.5 * (RADIUS + d.qpos[2])
     near = 2e-2 if shape == "mesh" else 5e-4
     assert d.qvel[0] == pytest.approx(
         1.0 / (1.0 + share * (RADIUS / arm) ** 2), rel=near

@@ -91,9 +91,8 @@ def test_friction_is_continuous_while_points_drop_out(centre):
     bearing = []
     d.qvel[0] = 3.0
     for k in range(300):
-        share = 0.6 * min(
-            k / 280.0, 1.0
-        )  # of the way to the corner; the diagonal is at 0.5
+        # Of the way to the corner; the diagonal is at 0.5.
+        share = 0.6 * min(k / 280.0, 1.0)
         d.xfrc_applied[1, 3:] = share * weight * 0.03, -share * weight * 0.05, 0.0
         friction.step(d)
         wrench = friction.wrenches(d)[0].copy()
@@ -105,11 +104,12 @@ def test_friction_is_continuous_while_points_drop_out(centre):
         force.append(wrench / (PLATE.mu * weight))
         bearing.append(int((d.efc_force > 1e-6 * weight).sum()))
     assert bearing[20] == 4 and bearing[-1] == 3
+    # Torques by the half width.
     steps = abs(np.diff(force[20:], axis=0)) / (
         1.0,
         1.0,
         0.03,
-    )  # torques by the half width
+    )
     assert steps.max() < 0.01
 
 

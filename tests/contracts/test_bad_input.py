@@ -582,9 +582,8 @@ def test_limits_are_stated_before_memory_is_asked_for(call, message):
     try:
         with pytest.raises(InvalidValueError, match=message):
             call()
-        assert (
-            tracemalloc.get_traced_memory()[1] < 2e6
-        )  # bytes: the patch of a scene and NumPy's own tables
+        # Bytes: the patch of a scene and NumPy's own tables.
+        assert tracemalloc.get_traced_memory()[1] < 2e6
     finally:
         tracemalloc.stop()
 

@@ -326,9 +326,10 @@ def test_compiled_functions_stand_in_folders_that_the_digest_covers():
         assert [
             each for each in using if f"{each}.".startswith(f"planarfriction.{name}.")
         ], name
+    # Hands them on.
     assert [module for module in using if not _is_compiled(module)] == [
         "planarfriction.extend"
-    ]  # hands them on
+    ]
 
 
 def test_compiled_code_depends_on_nothing_outside_the_digest():
@@ -338,9 +339,8 @@ def test_compiled_code_depends_on_nothing_outside_the_digest():
         *(f"planarfriction.{name}" for name in COMPILED),
     }
     for module, tree in _sources():
-        if _is_compiled(module) and not module.endswith(
-            "compiler.machine_code"
-        ):  # nothing of it is compiled
+        # Nothing of it is compiled.
+        if _is_compiled(module) and not module.endswith("compiler.machine_code"):
             for target in _imports(tree, nested=True):
                 inside = any(f"{target}.".startswith(f"{name}.") for name in compiled)
                 assert inside or not target.startswith("planarfriction"), (

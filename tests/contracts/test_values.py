@@ -259,9 +259,8 @@ def _radius(radius: float) -> float:
 
 
 def test_a_bad_parameter_in_a_worker_arrives():
-    spawned = multiprocessing.get_context(
-        "spawn"
-    )  # forks copy the threads of other tests
+    # Forks copy the threads of other tests.
+    spawned = multiprocessing.get_context("spawn")
     with spawned.Pool(1) as pool:
         result = pool.map_async(_radius, [0.01, -1.0, 0.02])
         with pytest.raises(

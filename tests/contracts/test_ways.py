@@ -154,10 +154,11 @@ def _rooms(frame: FrameType | None) -> list[str]:
             file.relative_to(HOME) if file.is_relative_to(HOME) else Path("elsewhere")
         )
         room = inside.parts[0].removesuffix(".py")
+        # The latter is no room of a call.
         if inside.parts[:2] in (
             ("_engine", "records"),
             ("_engine", "compiler"),
-        ):  # the latter is no room of a call
+        ):
             room = inside.parts[1]
         if inside.name in READERS:
             found.clear()

@@ -138,9 +138,8 @@ def test_gradients_are_finite_at_every_kink(kind, law):
     z = np.array([4e-7, -3e-7, 2e-7 * r])
     rotation = 0.5
     (x, y) = model.shape_at(LOAD).centre_of_pressure
-    spin = np.array(
-        [rotation * y, -rotation * x, rotation]
-    )  # about the centre of pressure: the axis of the tables
+    # About the centre of pressure: the axis of the tables.
+    spin = np.array([rotation * y, -rotation * x, rotation])
     twists = [
         np.zeros(3),
         spin,
@@ -151,9 +150,8 @@ def test_gradients_are_finite_at_every_kink(kind, law):
         [0, 1e-3, 0],
         [1e-3, 1e-3, 0],
     ]
-    back = (
-        -z / DT / np.array([1.0, 1.0, r * r])
-    )  # takes the ellipsoid's bristle exactly to zero
+    # Takes the ellipsoid's bristle exactly to zero.
+    back = -z / DT / np.array([1.0, 1.0, r * r])
     twists.append([back[0] + y * back[2], back[1] - x * back[2], back[2]])
     states = [np.zeros(3), z, 1e-300 * z, 1e-160 * z, -z, 1e4 * z]
     for state in states:

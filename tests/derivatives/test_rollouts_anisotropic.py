@@ -112,9 +112,8 @@ def test_jax_has_the_same_numbers_and_gradients(kind, patch):
         else:
             pytree = pj.ReducedModel(PATCHES[patch], LAW)
         state, twists, loads = drive(model)
-        step = jax.jit(
-            lambda *given: pytree.step(*given, DT)
-        )  # one program instead of one for each operation
+        # One program instead of one for each operation.
+        step = jax.jit(lambda *given: pytree.step(*given, DT))
         for got, want in zip(
             step(state, twists[3], loads[3]),
             model.step(state, twists[3], loads[3], DT),

@@ -384,9 +384,8 @@ def test_kept_states_and_several_threads_change_nothing(name):
     case = CASES[name]
     model = case.model
     (state, twists, loads) = drive(case, steps=500)
-    scales = np.linspace(0.5, 1.0, 90)[
-        :, None, None
-    ]  # 45,000 steps: enough for more than one thread
+    # 45,000 steps: enough for more than one thread.
+    scales = np.linspace(0.5, 1.0, 90)[:, None, None]
     bar = np.ones((500, 3))
     states = derivatives.rollout_states(model, state, scales * twists, loads, DT).states
     kept = derivatives.rollout_vjp(

@@ -40,9 +40,8 @@ def model_of(kind: str, mu: float = 1.0, r: float = 1.0, law: pf.LuGre = LAW):
         [[0.01, 0.0], [-0.008, 0.009], [-0.006, -0.01], [0.002, 0.004]]
     )
     patch = pf.ContactPatch.points(r * positions, [1.0, 2.0, 1.5, 0.5])
-    if (
-        kind == "table" or "reduced" in kind
-    ):  # of a smooth limit surface: that of four points has facets
+    # Of a smooth limit surface: that of four points has facets.
+    if kind == "table" or "reduced" in kind:
         patch = pf.ContactPatch.disc(r * 0.012, cells=9)
     if "reduced" in kind:
         law = (

@@ -243,7 +243,6 @@ def test_gradients_of_random_scenes_cost_few_runs(steps, capsys):
         shares["against the derivatives forwards"],
         shares["against differences"],
     ):
-        assert (
-            np.percentile(errors, 90) < 1e-4
-        )  # a slip that barely happens is more sensitive than differences tell
+        # A slip that barely happens is more sensitive than differences tell.
+        assert np.percentile(errors, 90) < 1e-4
         assert max(errors) < 5e-2

@@ -44,9 +44,8 @@ def slides(count: int = 8) -> pd.DataFrame:
         )
         data = pf.simulate(scene, save_every=1.0 / RATE / 4, rtol=1e-4, atol=0.1).data
         time = np.arange(round((0.08 if toss == 0 else 0.35) * RATE)) / RATE
-        turn = random.uniform(
-            -np.pi, np.pi
-        )  # the whole slide, so that cubes start at any yaw
+        # The whole slide, so that cubes start at any yaw.
+        turn = random.uniform(-np.pi, np.pi)
         at = {
             name: np.interp(time, data.time, data[name])
             for name in ("x", "y", "theta", "vx", "vy", "omega")
@@ -100,14 +99,12 @@ def test_friction_radius_and_ends_come_out(example, tmp_path, monkeypatch, capsy
     case = example.Case(
         "square", example.SQUARE, pf.DistributedModel, ("mu_c", "contact_radius")
     )
-    tosses = [example.as_slide(toss) for toss in example.measured.read(tmp_path)][
-        1:
-    ]  # the first does not stop
+    # The first does not stop.
+    tosses = [example.as_slide(toss) for toss in example.measured.read(tmp_path)][1:]
     rows = example.run(tosses[:4], tosses[4:], [case], 0)
     told = dict(part.split(" ± ")[0].split(" ") for part in rows[0][3].split(", "))
-    assert float(told["mu_c"]) == pytest.approx(
-        MU, rel=5e-3
-    )  # bristles start relaxed: 1e-3 of the way
+    # Bristles start relaxed: 1e-3 of the way.
+    assert float(told["mu_c"]) == pytest.approx(MU, rel=5e-3)
     assert float(told["contact_radius"]) == pytest.approx(
         example.SQUARE.contact_radius(), rel=2e-2
     )

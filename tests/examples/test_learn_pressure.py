@@ -55,9 +55,8 @@ def test_torques_about_a_line_do_not_distinguish_mirror_images(example):
         ]
         about_c = [wrench[2] - c * wrench[1] for wrench in wrenches]
         assert about_c[0] == pytest.approx(about_c[1], rel=1e-12)
-        assert (
-            abs(wrenches[0][0] + wrenches[1][0]) < 1e-12 < abs(wrenches[0][0])
-        )  # the force across the line does
+        # The force across the line does.
+        assert abs(wrenches[0][0] + wrenches[1][0]) < 1e-12 < abs(wrenches[0][0])
 
 
 def test_it_draws(example, tmp_path, capsys):

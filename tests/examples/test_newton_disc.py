@@ -12,10 +12,11 @@ wp = pytest.importorskip("warp", reason="needs the extra [mujoco-warp]")
 pytest.importorskip("mujoco_warp", reason="needs the extra [mujoco-warp]")
 pytest.importorskip("newton", reason="needs newton")
 
+# Kernels of three packages compile for minutes.
 pytestmark = [
     pytest.mark.mujoco_warp,
     pytest.mark.slow,
-]  # kernels of three packages compile for minutes
+]
 
 
 def test_disc_comes_to_rest_where_theory_says(monkeypatch):

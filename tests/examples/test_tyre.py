@@ -24,9 +24,10 @@ def test_the_closed_form_is_the_integral_over_the_patch(tyre):
     for slope in (0.01, 0.06, 0.12, 0.2):
         line = np.minimum(tyre.STIFFNESS * slope * (a - x), limit)
         expected = [np.trapezoid(line, x), -np.trapezoid(line * x, x)]
+        # Trapezoids of 6 um.
         assert tyre.brush(np.array(slope)) == pytest.approx(
             expected, rel=1e-6, abs=1e-4
-        )  # trapezoids of 6 um
+        )
 
 
 def test_its_docstring_states_what_it_prints(tyre, tmp_path, capsys):
@@ -55,9 +56,8 @@ def test_a_step_of_the_bristles_is_that_of_the_distributed_model(tyre):
             z, velocity, np.full(patch.cells, dt), tyre.LawNumbers(*law.numbers)
         )
         state, _ = pf.DistributedModel(patch, law).step(state, twist, 1.0, dt)
-        assert (
-            np.abs(z - state).max() < 1e-14 * np.abs(state).max() * 100.0
-        )  # rounding, of a few operations
+        # Rounding, of a few operations.
+        assert np.abs(z - state).max() < 1e-14 * np.abs(state).max() * 100.0
 
 
 def test_the_force_builds_up_over_the_length_of_the_patch(tyre):
@@ -67,9 +67,8 @@ def test_the_force_builds_up_over_the_length_of_the_patch(tyre):
     expected = (
         tyre.STIFFNESS * np.tan(1e-4) * (2.0 * tyre.HALF_LENGTH * way - 0.5 * way**2)
     )
-    assert -rolling.wrenches[:, 0, 1] == pytest.approx(
-        expected, rel=0.02
-    )  # a column, and the edge of the rear slides
+    # A column, and the edge of the rear slides.
+    assert -rolling.wrenches[:, 0, 1] == pytest.approx(expected, rel=0.02)
 
 
 def test_a_tyre_that_brakes_holds_as_one_that_slips_sideways(tyre):

@@ -255,12 +255,10 @@ def test_the_section_follows_the_friction_on_the_page(visitor):
         f"{plot}.map(({{data_source: {{data}}}}) => [data.force, data.torque])"
     )
     fx, fy, torque = visitor.numbers()[0]
-    assert np.ravel(friction) == pytest.approx(
-        [np.hypot(fx, fy), torque], abs=1e-4
-    )  # four digits are shown
-    assert [np.max(each[0]) for each in curves] == pytest.approx(
-        [1.0, 1.0], abs=1e-3
-    )  # N, of mu_c f_N
+    # Four digits are shown.
+    assert np.ravel(friction) == pytest.approx([np.hypot(fx, fy), torque], abs=1e-4)
+    # N, of mu_c f_N.
+    assert [np.max(each[0]) for each in curves] == pytest.approx([1.0, 1.0], abs=1e-3)
 
 
 def test_a_brush_paints_and_an_eraser_takes_away(visitor):
@@ -359,9 +357,8 @@ def test_the_ladder_of_the_models_follows_what_is_on_the_screen(visitor):
     ] == list(RUNGS)
     after = visitor.ladder_after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0)), before)
     visitor.choose("law", "coulomb-stribeck")
-    while (
-        float(after.splitlines()[-1].split("\t")[2]) < 2.0
-    ):  # error of the published model, 1 % with the law before
+    # Error of the published model, 1 % with the law before.
+    while float(after.splitlines()[-1].split("\t")[2]) < 2.0:
         after = visitor.ladder_after(lambda: None, after)
     assert [float(row.split("\t")[2]) < 2.0 for row in after.splitlines()[2:]] == [
         True
@@ -373,9 +370,8 @@ def test_the_ladder_of_the_models_follows_what_is_on_the_screen(visitor):
 def test_a_drag_is_not_held_up_by_the_ladder(visitor):
     visitor.page.get_by_text("Models", exact=True).click()
     visitor.page.locator("#ladder").wait_for(timeout=120_000)
-    for step in range(
-        4
-    ):  # each begins in the pause in which the models of a new law are made
+    # Each begins in the pause in which the models of a new law are made.
+    for step in range(4):
         visitor.fill("sigma_0", str(2e5 + step))
         visitor.page.wait_for_timeout(400)
         visitor.after(lambda step=step: visitor.drag((0.0, 10.0), (3.0, 5.0 - step)))
@@ -454,9 +450,8 @@ def test_a_link_opens_what_was_on_the_screen_and_another_one_replaces_it(
     visitor.page.wait_for_function("location.hash.length > 100")
     other = Visitor(browser, visitor.address)
     first = other.text()
-    other.after(
-        lambda: other.page.goto(visitor.page.url)
-    )  # an address of the same page: no new visit
+    # An address of the same page: no new visit.
+    other.after(lambda: other.page.goto(visitor.page.url))
     assert (
         other.says("pf.Dahl(", "from_pressure(")
         and (other.numbers() == visitor.numbers()).all()
@@ -595,9 +590,8 @@ def test_the_lesson_has_the_numbers_of_the_library_offline(browser):
         abs=1e-3,
     )
     time, speed, spin = page.evaluate("rest(shown, [0.01, 0, 2], 1)").pop()
-    assert (
-        max(speed, spin) < 0.02 * 0.02 and 1.0 < 9.81 * time / 0.01 < 3.0
-    )  # later than v/(mu g), as it spins
+    # Later than v/(mu g), as it spins.
+    assert max(speed, spin) < 0.02 * 0.02 and 1.0 < 9.81 * time / 0.01 < 3.0
     page.close()
     assert errors == [] and len(asked) == 1
 

@@ -58,9 +58,8 @@ def test_what_stands_on_the_page_is_the_answer_to_what_is_set(page):
         1.0,
         1e3,
     ]
-    np.testing.assert_allclose(
-        shown(page), wrenches, atol=5e-5
-    )  # four digits are shown
+    # Four digits are shown.
+    np.testing.assert_allclose(shown(page), wrenches, atol=5e-5)
     assert (
         f"{found.force_error:.3f}" in page.numbers.object
         and f"{found.angle_error:.1f}°" in page.numbers.object
@@ -134,10 +133,11 @@ def test_a_refused_value_is_told_at_its_field_beside_pale_results(page):
         and "mu_c=2.0" in page.controls.parameters[0].stylesheets[0]
     )
     page._try(lambda: page._follow_to(0.003, -0.004))
+    # Those of the results.
     assert [each.value for each in page.controls.parameters[:2]] == [
         1.0,
         1.2,
-    ]  # those of the results
+    ]
     assert page.controls.parameters[0].stylesheets == [] and not any(
         each.css_classes for each in page.cards
     )
@@ -276,10 +276,11 @@ def test_undo_goes_back_step_by_step_and_a_drag_is_one(page):
                 page._dragged(x, 0.0)
             else:
                 page._follow()
+                # Which `_dragged` leaves to be followed in the next tick.
                 page._pointer = (
                     x,
                     0.0,
-                )  # which `_dragged` leaves to be followed in the next tick
+                )
         page._released()
 
     states = [page.state]

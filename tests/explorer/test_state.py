@@ -44,9 +44,8 @@ def test_the_map_of_a_published_patch_presses_as_the_patch_does(name):
 
 def test_a_brush_paints_cells_in_its_radius_and_copies_the_drawing():
     before = Drawing(np.zeros((5, 7)), 1e-3)
-    after = before.painted(
-        0.002, 0.001, radius=1.01e-3, pressure=0.5
-    )  # a cell and its four neighbours
+    # A cell and its four neighbours.
+    after = before.painted(0.002, 0.001, radius=1.01e-3, pressure=0.5)
     expected = np.zeros((5, 7))
     expected[1, 4:7] = expected[0, 5] = expected[2, 5] = (
         0.5  # row 0 is the top, y = 2 mm
@@ -141,9 +140,8 @@ def test_the_friction_is_that_of_a_model_that_has_slid_for_long(drawing, law):
     model = pf.DistributedModel(drawing.patch, law)
     bristles = model.rest()
     wrench = np.zeros(3)
-    for _ in range(
-        200
-    ):  # 0.02 s: the slowest loaded cell slides by many times the 1 um that a bristle bends
+    # 0.02 s: the slowest loaded cell slides by many times the 1 um that a bristle bends.
+    for _ in range(200):
         bristles, wrench = model.step(bristles, state.twist, 2.0, 1e-4)
     np.testing.assert_allclose(answer(state).friction, wrench, rtol=1e-4, atol=2e-7)
 
@@ -164,15 +162,13 @@ def test_coulomb_friction_lies_on_the_limit_surface_of_its_cells():
 def test_the_ellipsoid_is_exact_in_pure_spin_and_within_its_stated_error():
     circle = State(Drawing.published("Circle"))
     centred = answer(circle.changed(twist=(0.0, 0.0, 2.0)))
-    assert (
-        centred.force_error < 3e-3 and centred.angle_error < 1e-6
-    )  # its radius: see above
+    # Its radius: see above.
+    assert centred.force_error < 3e-3 and centred.angle_error < 1e-6
     worst = circle.drawing.largest_errors
     shares = np.linspace(-2.0, 2.0, 9)
     found = [answer(circle.changed(twist=(0.01 * share, 0.0, 1.0))) for share in shares]
-    assert (
-        0.1 < max(each.force_error for each in found) < 1.05 * worst[0]
-    )  # 100 directions miss little of the largest
+    # 100 directions miss little of the largest.
+    assert 0.1 < max(each.force_error for each in found) < 1.05 * worst[0]
     assert 5.0 < max(each.angle_error for each in found) < 1.05 * worst[1]
 
 
@@ -198,9 +194,10 @@ def test_any_load_has_the_same_points_and_the_models_the_same_errors(load):
     one = answer(State())
     other = answer(State(normal_force=load))
     np.testing.assert_array_equal(other.points, one.points)
+    # 5e-324 is the last digit.
     np.testing.assert_allclose(
         other.friction, load * one.friction, rtol=1e-12, atol=1e-323
-    )  # 5e-324 is the last digit
+    )
     assert other.force_error == one.force_error and all(
         each.error < 1.0 for each in climb(State(normal_force=load))
     )
@@ -244,9 +241,8 @@ def test_what_does_not_press_has_no_answer():
 def test_the_picture_of_the_map_has_its_top_row_at_the_top():
     drawing = Drawing(np.array([[2.0, 0.0], [1.0, 1.0], [1.0, 1.0]]), 1e-3)
     columns = pictures.pressure_image(drawing)
-    np.testing.assert_array_equal(
-        columns["image"][0][-1], [1.0, np.nan]
-    )  # rows run upwards
+    # Rows run upwards.
+    np.testing.assert_array_equal(columns["image"][0][-1], [1.0, np.nan])
     assert [columns[key][0] for key in ("x", "y", "dw", "dh")] == [-1.0, -1.5, 2.0, 3.0]
 
 
@@ -257,18 +253,18 @@ def test_arrows_of_slip_turn_about_the_centre_on_loaded_cells():
     along = np.stack([x1 - x0, y1 - y0])
     lever = np.stack([x0 - 2.0, y0 - 1.0])
     assert len(x0) > 2 and np.abs(y0).max() < 1.5
-    step = (
-        2e3 * state.drawing.cell_size
-    )  # every second of 21 columns has an arrow, and the fastest one is as long
+    # Every second of 21 columns has an arrow, and the fastest one is as long.
+    step = 2e3 * state.drawing.cell_size
     np.testing.assert_allclose(
         along,
         step * np.stack([-lever[1], lever[0]]) / np.hypot(*lever).max(),
         atol=1e-12,
     )
     assert np.diff(np.unique(x0.round(9))).min() == pytest.approx(step)
+    # 0 points up.
     np.testing.assert_allclose(
         np.sin(arrows["angle"]), -along[0] / np.hypot(*along), atol=1e-12
-    )  # 0 points up
+    )
     np.testing.assert_allclose(
         np.cos(arrows["angle"]), along[1] / np.hypot(*along), atol=1e-12
     )
@@ -291,9 +287,10 @@ def test_the_force_is_drawn_as_it_acts_and_the_mark_where_nothing_moves():
     )
     wide = State(Drawing(np.ones((4, 6)), 2e-3), twist=(0.01, 0.02, 0.0))
     arrows = pictures.wrench_arrows(wide, answer(wide))
+    # Of 12 mm x 8 mm.
     np.testing.assert_allclose(
         np.hypot(arrows["x1"], arrows["y1"])[1:], 0.4 * 12.0, rtol=1e-9
-    )  # of 12 mm x 8 mm
+    )
     assert pictures.points_of_interest(state) == {
         "x": [pytest.approx(2.0)],
         "y": [pytest.approx(-6.0)],
@@ -313,9 +310,8 @@ def test_moving_the_twist_leaves_the_drawn_surface_as_it_is():
         for each in moved["data"]
         if each.get("showlegend", each["type"] != "surface")
     ]
-    assert (
-        named[:2] == ["limit surface", "ellipsoid"] and len(named) == 5
-    )  # plotly leaves surfaces out by itself
+    # Plotly leaves surfaces out by itself.
+    assert named[:2] == ["limit surface", "ellipsoid"] and len(named) == 5
     for trace, point in zip(moved["data"][2:], answer(state).points, strict=True):
         assert [trace[axis][1] for axis in "xyz"] == pytest.approx(point.tolist())
 
@@ -332,9 +328,8 @@ def test_the_surface_is_that_of_the_map_and_the_wires_are_a_sphere(quick):
     )
     np.testing.assert_array_equal(shell["surfacecolor"], shell["z"])
     points = np.stack([wires[each] for each in "xyz"], -1)
-    rings, spokes = np.split(
-        points, [7 * 74]
-    )  # 7 circles of 73 points and a gap, 13 half circles of 37
+    # 7 circles of 73 points and a gap, 13 half circles of 37.
+    rings, spokes = np.split(points, [7 * 74])
     assert len(spokes) == 13 * 38
     np.testing.assert_allclose(
         np.linalg.norm(points[np.isfinite(points[:, 0])], axis=1), 1.0, atol=1e-9
@@ -404,9 +399,8 @@ def test_the_section_of_a_disc_ends_at_its_force_and_its_torque():
     for angle in (0.0, 0.7):  # as a disc has no direction
         right, top, left, bottom = pictures.section(surface, angle)[:-1:30]
         torque = 0.01 * 2.0 / 3.0  # of an even pressure
-        np.testing.assert_allclose(
-            [right, left], [[1.0, 0.0], [-1.0, 0.0]], atol=1e-5
-        )  # sums over 0.01 mm
+        # Sums over 0.01 mm.
+        np.testing.assert_allclose([right, left], [[1.0, 0.0], [-1.0, 0.0]], atol=1e-5)
         np.testing.assert_allclose(
             [top, bottom], [[0.0, torque], [0.0, -torque]], rtol=1e-4, atol=1e-6
         )
@@ -425,9 +419,10 @@ def test_every_point_of_a_section_lies_on_its_surface():
     wrenches = np.stack([force * np.cos(angle), force * np.sin(angle), torque], axis=1)
     wrenches = pf.geometry.wrench_at(wrenches, -surface.centre_of_pressure)
     apart = wrenches - surface.wrench(surface.twist(wrenches))
+    # `CERTIFIED`.
     np.testing.assert_allclose(
         apart / [1.0, 1.0, patch.contact_radius()], 0.0, atol=1e-5
-    )  # `CERTIFIED`
+    )
 
 
 @pytest.mark.parametrize(
@@ -478,9 +473,10 @@ def test_the_code_gives_the_numbers_on_the_screen(origin, tmp_path, monkeypatch)
     for line, wrench in zip(
         surfaces, (expected.surface, expected.ellipsoid), strict=True
     ):
+        # Eight digits are printed.
         np.testing.assert_allclose(
             np.fromstring(line.strip("[]"), sep=" "), wrench, atol=1e-8
-        )  # eight digits are printed
+        )
     np.testing.assert_allclose(
         np.fromstring(friction, sep=" "), expected.friction, rtol=1e-4, atol=2e-7
     )
@@ -561,9 +557,8 @@ def test_the_error_of_a_rung_is_a_distance_in_units_of_the_limit():
         runs.append(np.array(wrenches))
     scale = 0.5 * 3.0 * np.array([1.0, 1.0, state.drawing.surface.contact_radius])
     expected = np.sqrt((((runs[1] - runs[0]) / scale) ** 2).sum(axis=1).mean())
-    assert found.error == pytest.approx(
-        expected, rel=0.05
-    )  # wrenches in the middle of steps of a millisecond
+    # Wrenches in the middle of steps of a millisecond.
+    assert found.error == pytest.approx(expected, rel=0.05)
 
 
 def test_models_are_compared_with_the_distributed_one():
@@ -574,9 +569,10 @@ def test_models_are_compared_with_the_distributed_one():
     }
     assert list(rungs) == list(RUNGS) and rungs["distributed"].error == 0.0
     assert [each.states for each in rungs.values()] == [36, 54, 54, 24, 3]
+    # Of mu_c f_N.
     assert (
         0.0 < rungs["reduced"].error < 0.02 < rungs["reduced, as published"].error < 0.2
-    )  # of mu_c f_N
+    )
 
 
 def test_a_scene_is_run_with_the_contact_on_the_screen():

@@ -115,9 +115,8 @@ def test_jacobians(loaded):
             step(state, *given[:2], given[2] * (1.0 + sign * 1e-4), params)[1].full()
             for sign in (1.0, -1.0)
         ]
-        noise = (
-            1e-8 * np.abs(ends[0]).max() / given[2]
-        )  # of differences of equal wrenches
+        # Of differences of equal wrenches.
+        noise = 1e-8 * np.abs(ends[0]).max() / given[2]
         difference = (ends[0] - ends[1]) / (2e-4 * given[2])
         np.testing.assert_allclose(
             by_dt, difference, rtol=1e-2, atol=1e-4 * np.abs(difference).max() + noise

@@ -76,9 +76,8 @@ def test_no_load_and_hardly_any(name, precision):
         -9.0, 0.0, (400, 1, 1)
     )
     twist = rng.normal(size=(400, 3)) * 10.0 ** rng.uniform(-6.0, 2.0, (400, 1))
-    state[200:] = made.model.step(0.0 * state[200:], -twist[200:], 1.0, 1e-3)[
-        0
-    ]  # reversals
+    # Reversals.
+    state[200:] = made.model.step(0.0 * state[200:], -twist[200:], 1.0, 1e-3)[0]
     inputs = [
         each.astype(made.kind).astype(float)
         for each in (state, twist, load, np.full(400, 1e-3))
@@ -87,9 +86,8 @@ def test_no_load_and_hardly_any(name, precision):
     found, pressed, slopes = run(made, inputs, slopes=True)
     assert all(np.isfinite(slopes[field]).all() for field in slopes.dtype.names)
     assert not found[::5].any() and not pressed[::5].any()
-    near = (
-        1e-12 if precision == "double" else 1e-3
-    )  # as other steps in single precision
+    # As other steps in single precision.
+    near = 1e-12 if precision == "double" else 1e-3
     assert np.all(
         np.abs(found - new).max(axis=(1, 2))[:200]
         <= near * np.abs(new).max(axis=(1, 2))[:200]

@@ -104,9 +104,8 @@ def test_samples(name, tmp_path):
         own[i, 1:] = np.frombuffer(found, float, 5)[3:]
         wanted[i, 0] = hold.update(Measurement(each[0], wrench, each[4], velocity))
         wanted[i, 1:] = hold.estimate.mu_c, hold.estimate.mu_s
-    assert (
-        abs(wanted[2999, 1] / 0.7 - 1.0) < 0.1 and np.ptp(wanted[:, 0]) > 5.0
-    )  # it learnt, and changed its grip
+    # It learnt, and changed its grip.
+    assert abs(wanted[2999, 1] / 0.7 - 1.0) < 0.1 and np.ptp(wanted[:, 0]) > 5.0
 
     np.testing.assert_allclose(own, wanted, rtol=1e-9)
 

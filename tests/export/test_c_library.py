@@ -159,9 +159,8 @@ def test_slopes(name):
         )
         scale = scale.reshape(-1, *[1] * (own.ndim - 1))
         wanted = by_cell(field, getattr(exact, field), own.shape) * scale
-        near = (
-            1e-6 if name in FIXED and field.endswith("_load") else 1e-9
-        )  # Python has differences there
+        # Python has differences there.
+        near = 1e-6 if name in FIXED and field.endswith("_load") else 1e-9
         assert np.abs(own * scale - wanted).max() < near * np.abs(wanted).max(), field
 
 

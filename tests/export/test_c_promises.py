@@ -138,17 +138,17 @@ def test_calls_and_memory(name):
     kinds = symbols(folder)
     called = {each for each, kind in kinds.items() if kind == "U"}
     assert called <= MATH
+    # No data that can be written.
     assert {kind.lower() for kind in kinds.values()} <= {
         "u",
         "t",
         "r",
-    }  # no data that can be written
+    }
     frames = [
         line.split("\t") for line in (folder / "alone.su").read_text().splitlines()
     ]
-    assert all(
-        kind in ("static", "dynamic,bounded") for *_, kind in frames
-    )  # bounded: aligned for vectors
+    # Bounded: aligned for vectors.
+    assert all(kind in ("static", "dynamic,bounded") for *_, kind in frames)
     if name in REDUCED:
         slopes = stack_of(frames, "slopes")
         asked = stack_of(frames, "twist|holding|search|try_|find_|tilt|moments")

@@ -89,9 +89,8 @@ def test_bad_wrenches():
         code, found = call(hold, made.kind, load, mu, count=1)
         assert code == 2 and found == 7.0
     assert call(hold, made.kind, [0.0] * 3, 0.5, count=1) == (0, 0.0)
-    code, found = call(
-        hold, made.kind, [1.0, 0.0, 0.0], 5e-324, count=1
-    )  # beyond the largest number
+    # Beyond the largest number.
+    code, found = call(hold, made.kind, [1.0, 0.0, 0.0], 5e-324, count=1)
     assert code == 2 and found == 7.0
 
 

@@ -54,9 +54,8 @@ def called(target: legal.Target, **changed: Any) -> Any:
         use(result)
     finally:
         plt.close("all")
-        for family, members in zip(
-            FAMILIES, before, strict=True
-        ):  # what was registered is forgotten
+        # What was registered is forgotten.
+        for family, members in zip(FAMILIES, before, strict=True):
             family._members = members
     return (result,)
 
@@ -97,12 +96,13 @@ def test_one_wrong_argument(place, drawn) -> None:
     target = targets()[name]
     compiled(name)
     names = tuple(each for each in target.arguments if each != "self")
+    # Messages name the file or the key instead.
     if argument in (
         "path",
         "folder",
         "data",
         "make_scene",
-    ):  # messages name the file or the key instead
+    ):
         names = ()
     try:
         with folder():

@@ -94,9 +94,8 @@ def walk(name: str, draw: random.Random) -> None:
         tensor, force = judge(f"steps: {name}", step, compiles=True)
         got = plain((tensor, force))
         finite(tuple(got), f"a step of {name}")
-        damped = (
-            ours.law.numbers.sigma_1 * load * np.abs(twist).max()
-        )  # the rate is a difference of speeds
+        # The rate is a difference of speeds.
+        damped = ours.law.numbers.sigma_1 * load * np.abs(twist).max()
         for mine, its, small in zip(
             (state, wrench), got, (1e-30, ROUNDING * damped), strict=True
         ):

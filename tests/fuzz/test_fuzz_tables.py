@@ -105,7 +105,6 @@ def test_pressure_maps(draw: random.Random) -> None:
         )
         if made is not None:
             finite((made.weights(), made.contact_radius()), "the patch")
-            if (
-                abs(made.weights().sum() - 1.0) > 1e-9
-            ):  # rounding of a sum over at most 1e5 cells
+            # Rounding of a sum over at most 1e5 cells.
+            if abs(made.weights().sum() - 1.0) > 1e-9:
                 raise Broken("the weights of the map do not add up to one")

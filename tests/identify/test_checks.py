@@ -491,9 +491,8 @@ def test_run_writes_logs_that_identify_reads(solution, tmp_path, capsys):
     }
     write_csv(two, columns | other | {"other.t": columns["time"] + 1.0})
     double = Log.from_csv(two, contact="other")
-    assert (
-        np.array_equal(double.twist, 2 * direct.twist) and double.time[0] == 1.0
-    )  # a contact may have its own clock
+    # A contact may have its own clock.
+    assert np.array_equal(double.twist, 2 * direct.twist) and double.time[0] == 1.0
     start = [
         f"--start={name}={getattr(LAW, name)}"
         for name in ("mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")

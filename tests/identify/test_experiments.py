@@ -83,18 +83,16 @@ def test_errors_are_those_that_a_fit_has():
     fit = fitted(log, PATCH, model="reduced-published", starts=1)
     found = design_experiment(PATCH, LAW, motions=log, noise=fit.noise)
     ratio = fit.standard_errors / found.errors[0]
-    assert (ratio > 0.9).all() and (ratio < 1.4).all(), (
-        ratio
-    )  # the fit's own noise and place move them by a few percent
+    # The fit's own noise and place move them by a few percent.
+    assert (ratio > 0.9).all() and (ratio < 1.4).all(), ratio
 
 
 def test_information_adds_up_in_any_order(motions):
     first, second = (plan(motions.values()).motions[i] for i in (0, 3))
     one = plan([second], logs=first).errors[0]
     other = plan([first], logs=second).errors[0]
-    assert one == pytest.approx(
-        other, rel=1e-3
-    )  # both rest on sums of 1e4 products that cancel in part
+    # Both rest on sums of 1e4 products that cancel in part.
+    assert one == pytest.approx(other, rel=1e-3)
     assert (one <= plan([first]).errors[0] * (1.0 + 1e-9)).all()
 
 
@@ -307,6 +305,5 @@ def test_a_plan_says_errors_as_shares_and_names_the_least_certain():
     )
     assert "Next motion to measure: slide 1." in said
     assert "slide 1 3.3 mu_c, 10 % slide 2 1.0 sigma_1, 15 %" in said
-    assert (
-        "mu_c 0.5 unknown 10 % -" in said and "centre_x 0 0.002 0.001 m" in said
-    )  # beyond a half; no share of zero
+    # Beyond a half; no share of zero.
+    assert "mu_c 0.5 unknown 10 % -" in said and "centre_x 0 0.002 0.001 m" in said

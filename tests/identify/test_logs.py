@@ -136,9 +136,8 @@ def test_a_wrapped_angle_gives_the_same_estimates_and_says_so(spun):
         Log.from_motion(spun.time, motion, spun.wrench, LOAD) for motion in (pose, seen)
     ]
     assert [log.turns for log in logs] == [0, 4]
-    assert (
-        np.abs(logs[1].twist - logs[0].twist).max() < 1e-8 * 25.0
-    )  # slopes of what is 1e-15 rad apart, over 1 ms
+    # Slopes of what is 1e-15 rad apart, over 1 ms.
+    assert np.abs(logs[1].twist - logs[0].twist).max() < 1e-8 * 25.0
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1}
     smooth, jumping = (identify(log, PATCH, **options) for log in logs)
     for name in ("mu_c", "contact_radius"):

@@ -213,9 +213,8 @@ def test_a_load_cell_that_drifts_is_found_and_makes_friction_uncertain(log):
     options = {"starts": 1, "model": "reduced-published"}
     found, fixed = (fitted(each, PATCH, **options) for each in (seen, noisy(log, 3)))
     drift = rig(found)["load_drift"]
-    assert drift.value == pytest.approx(
-        -0.025, abs=4.0 * drift.error
-    )  # half of the change
+    # Half of the change.
+    assert drift.value == pytest.approx(-0.025, abs=4.0 * drift.error)
     low, high = found.intervals()["mu_c"]
     assert low < LAW.mu_c < high
     assert found.errors["mu_c"] > 2.0 * fixed.errors["mu_c"]
@@ -266,10 +265,11 @@ def test_the_model_that_made_the_data_is_chosen(chosen):
     assert chosen.chosen == "distributed" and isinstance(
         chosen.model, pf.DistributedModel
     )
+    # The best of each.
     scores = {
         each.model: each
         for each in sorted(chosen.scores, key=lambda each: -each.held_out)
-    }  # the best of each
+    }
     assert set(scores) == {"reduced-published", "distributed", "reduced"}
     assert (
         scores["distributed"].held_out

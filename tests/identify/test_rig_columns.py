@@ -88,12 +88,13 @@ def test_sensors_show_factor_and_zeros_of_their_own_log(rig, i):
 
 def test_a_scale_is_as_wide_as_the_drift_lets_it_be(rig):
     values = np.zeros(len(rig.columns))
+    # Scale, drifts of both logs, and a zero of the first.
     values[[1, 8, 17, 2]] = (
         0.012,
         0.03,
         -0.06,
         -0.6,
-    )  # scale, drifts of both logs, and a zero of the first
+    )
     wide = np.hypot(0.005, 0.06 / 1.5)
     assert rig.with_drift(values)[1] == pytest.approx(wide)
     assert np.delete(rig.with_drift(values), 1) == pytest.approx(

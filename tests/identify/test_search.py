@@ -36,9 +36,8 @@ def test_a_search_finds_the_minimum_and_keeps_the_best_point():
 @pytest.mark.parametrize("promised", [1e-3, 1e-4])
 def test_a_search_ends_where_a_promised_gain_is_not_there(promised):
     descent, tried = descend(promised)
-    assert (
-        abs(descent.x[0] - 1.0) <= 2.0 * LEFT * promised
-    )  # where the promise would be kept
+    # Where the promise would be kept.
+    assert abs(descent.x[0] - 1.0) <= 2.0 * LEFT * promised
     assert 0.5 * LEFT**2 <= descent.cost <= 0.5 * LEFT**2 * (1.0 + 10.0 * SHARE)
     assert len(tried) <= 4
 

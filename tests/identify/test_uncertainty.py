@@ -69,9 +69,8 @@ def test_held_out_errors_count_by_what_noise_explains():
     fit = SimpleNamespace(problem=problem, values=np.zeros(2))
     found, unseen = _held_out(fit, residual, slopes, np.zeros((2, 2)))
     assert np.sqrt(np.mean(unseen**2)) > 3.0
-    assert found == pytest.approx(
-        np.ones(FOLDS), abs=0.2
-    )  # four standard deviations of chance
+    # Four standard deviations of chance.
+    assert found == pytest.approx(np.ones(FOLDS), abs=0.2)
     assert (_held_out(fit, 3.0 * residual, slopes, np.zeros((2, 2)))[0] > 2.4).all()
 
 

@@ -98,9 +98,10 @@ def test_soft_finger_moments_in_closed_form(k, radius, second):
             soft_finger_moments(finger, 3.0, {name: value + s * change})
             for s in (1.0, -1.0)
         )
+        # Differences.
         assert r_slopes[name] == pytest.approx(
             (high[0][0] - low[0][0]) / (2 * change), rel=1e-7
-        )  # differences
+        )
         assert m_slopes[name] == pytest.approx(
             (high[1][0] - low[1][0]) / (2 * change), rel=1e-7
         )
@@ -180,9 +181,8 @@ def test_errors_are_honest_for_a_hundred_seeds():
 def test_noise_is_estimated_from_the_residuals(log):
     found = identify(noisy(log, 3), PATCH, starts=1)
     spread = 0.01 * np.sqrt(np.mean(log.wrench**2, axis=0))
-    assert found.noise == pytest.approx(
-        spread, rel=4.0 / np.sqrt(2.0 * len(log.time))
-    )  # four of its standard errors
+    # Four of its standard errors.
+    assert found.noise == pytest.approx(spread, rel=4.0 / np.sqrt(2.0 * len(log.time)))
     assert np.std(np.concatenate(found.residuals)[1:]) == pytest.approx(1.0, rel=0.02)
 
 

@@ -73,9 +73,8 @@ def test_without_a_drive_off_only_the_ratio_is_known():
     fit = identify_joint(servo_logs(SERVO, off=False), PENDULUM, terms=())
     assert "only kt/R = 0.1" in words(fit) and "cannot be told apart" in words(fit)
     assert "back_emf" not in fit.values
-    assert fit.values["sigma_2"] == pytest.approx(
-        0.035, rel=0.05
-    )  # viscous friction and back-EMF
+    # Viscous friction and back-EMF.
+    assert fit.values["sigma_2"] == pytest.approx(0.035, rel=0.05)
 
 
 def test_a_log_that_stands_at_full_duty_is_named():
@@ -131,18 +130,15 @@ def test_a_term_must_gain_more_than_its_scatter():
     base = trial([1.0, 2.0, 1.0, 3.0])
     assert improves(trial([0.8, 1.7, 0.8, 2.4]), base)
     assert not improves(trial([0.5, 2.4, 0.6, 3.3]), base)  # two better, two worse
-    assert not improves(
-        trial([0.9, 1.8, 0.9, 2.7]), base
-    )  # evenly, but as little as a wrong term may
-    assert not improves(
-        trial([0.8, 1.7, 0.8, 2.4], first=[0.9, 1.9]), base
-    )  # little where the last two were fitted
+    # Evenly, but as little as a wrong term may.
+    assert not improves(trial([0.9, 1.8, 0.9, 2.7]), base)
+    # Little where the last two were fitted.
+    assert not improves(trial([0.8, 1.7, 0.8, 2.4], first=[0.9, 1.9]), base)
 
 
 def test_spreads_intervals_and_words_have_their_numbers(monkeypatch):
-    monkeypatch.setattr(
-        "planarfriction.joints.goal_fit.UNRELATED", np.inf
-    )  # a joint that hardly moves
+    # A joint that hardly moves.
+    monkeypatch.setattr("planarfriction.joints.goal_fit.UNRELATED", np.inf)
     t = 0.01 * np.arange(400)
     values = SERVO | {"sigma_0": 100.0, "sigma_1": 3.0}
     log = JointLog(
@@ -161,9 +157,8 @@ def test_spreads_intervals_and_words_have_their_numbers(monkeypatch):
     ]
     errors = np.array([1.0, 1.0, 1.0])
     less = np.exp([0.2, 0.3, 0.4])
-    again = values | {
-        "sigma_2": 0.006
-    }  # the same but for one, that is shifted by 0.001
+    # The same but for one, that is shifted by 0.001.
+    again = values | {"sigma_2": 0.006}
     kept = Trial(
         Problem((log,), PENDULUM, None, ("bristles",)),
         values,
@@ -176,9 +171,8 @@ def test_spreads_intervals_and_words_have_their_numbers(monkeypatch):
     # jackknife: sqrt((n - 1)/n sum of squares); 4.30265 and 2.91999 are quantiles 0.975 and 0.95 of Student's t
     assert kept.jackknife["mu_c"] == pytest.approx(0.02 / np.sqrt(3.0), rel=1e-12)
     far = 4.30265 * 0.02 / np.sqrt(3.0)
-    assert kept.interval("mu_c", 0.0) == pytest.approx(
-        (1e-9, 0.02 + far), rel=1e-5
-    )  # not below the least value
+    # Not below the least value.
+    assert kept.interval("mu_c", 0.0) == pytest.approx((1e-9, 0.02 + far), rel=1e-5)
     assert kept.interval("mu_c", 0.03)[1] == pytest.approx(
         0.02 + np.hypot(far, 4.30265 * 0.03), rel=1e-5
     )
@@ -204,9 +198,8 @@ def test_spreads_intervals_and_words_have_their_numbers(monkeypatch):
     # the load was rejected: the other level that it goes with says nothing about this one
     assert fit.spread["mu_c"] == pytest.approx(0.02 / np.sqrt(3.0), rel=1e-12)
     said = words(fit)
-    assert (
-        "kt/R = 0.1 N m/V; with the drive off: kt = 0.3 N m/A, R = 3 Ohm" in said
-    )  # 0.03/0.1 and 0.03/0.1^2
+    # 0.03/0.1 and 0.03/0.1^2.
+    assert "kt/R = 0.1 N m/V; with the drive off: kt = 0.3 N m/A, R = 3 Ohm" in said
     assert "all torques grow by 1.2 % for each 10 g" in said  # half of 10 g over 400 g
     # 0.58 of its value is too much for sigma_0: its term is not shown, and reaches no law
     assert (
@@ -295,9 +288,8 @@ def test_logs_with_the_gains_of_others_are_refused_or_named():
 @pytest.mark.parametrize("offset", [1.5, -2.5])
 def test_a_pendulum_may_hang_at_any_angle(offset):
     fit = identify_joint(servo_logs(SERVO | {"offset": offset}), PENDULUM, terms=())
-    assert fit.values["offset"] == pytest.approx(
-        offset, abs=0.1
-    )  # by friction of some degrees
+    # By friction of some degrees.
+    assert fit.values["offset"] == pytest.approx(offset, abs=0.1)
 
 
 REFUSED = {

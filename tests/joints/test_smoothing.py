@@ -33,9 +33,8 @@ def test_a_parabola_far_from_zero_keeps_its_derivatives(rate):
     # the angle gains 0.7 times the kernel's variance, which its grid changes by less than 1e-3
     np.testing.assert_allclose(angle[inner], (log.angle + 0.7e-4)[inner], atol=1e-7)
     np.testing.assert_allclose(speed[inner], (2.0 + 1.4 * t)[inner], rtol=1e-6)
-    np.testing.assert_allclose(
-        acceleration[inner], 1.4, rtol=1e-3
-    )  # 3000 rad over 1e-16, twice over 5e-4 s
+    # 3000 rad over 1e-16, twice over 5e-4 s.
+    np.testing.assert_allclose(acceleration[inner], 1.4, rtol=1e-3)
 
 
 def test_variances_of_smoothed_noise_are_those_of_the_formulas():
@@ -44,9 +43,8 @@ def test_variances_of_smoothed_noise_are_those_of_the_formulas():
     width = 5e-3
     _, speed, acceleration = derivatives(log, width)
     power = 1e-6 * log.dt
-    assert speed.var() == pytest.approx(
-        speed_noise(power, width), rel=0.03
-    )  # 2 % by chance
+    # 2 % by chance.
+    assert speed.var() == pytest.approx(speed_noise(power, width), rel=0.03)
     assert acceleration.var() == pytest.approx(
         acceleration_noise(power, width), rel=0.03
     )
@@ -99,9 +97,8 @@ def test_slow_motion_is_smoothed_longer_and_turns_round_at_the_same_time():
     inner = rows.fitted
     true = np.interp(rows.time, t, speed)
     sure = inner[np.abs(true[inner]) > limits.slow]
-    assert (
-        np.mean(np.abs(true[sure]) < limits.noisy) > 0.6
-    )  # what the first kernel alone would not know
+    # What the first kernel alone would not know.
+    assert np.mean(np.abs(true[sure]) < limits.noisy) > 0.6
     assert np.mean(np.sign(rows.speed[sure]) == np.sign(true[sure])) > 0.99
 
 

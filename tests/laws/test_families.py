@@ -84,9 +84,10 @@ def test_dahl_moved_to_and_fro_closes_its_loop():
     model = pf.DistributedModel(POINT, DAHL)
     state, _ = held(model, 0.1, 1.0, 1)
     _, wrench = held(model, -0.1, 1e-4, 3, state)
+    # Rounding.
     assert -wrench[0] == pytest.approx(
         0.4 * LOAD * (2.0 * math.exp(-2e4 * 1e-5 / 0.4) - 1.0), rel=1e-12
-    )  # rounding
+    )
 
 
 def test_regularised_coulomb_is_the_curve_over_speed():
@@ -95,9 +96,8 @@ def test_regularised_coulomb_is_the_curve_over_speed():
     expected = g * speed / (speed + 1e-4) + 0.3 * speed
     assert CREEPING.steady_friction(speed) == pytest.approx(expected, rel=1e-15)
     for v, friction in zip(speed, expected, strict=True):
-        _, wrench = held(
-            pf.DistributedModel(POINT, CREEPING), v, 1.0, 1
-        )  # 200 relaxation times
+        # 200 relaxation times.
+        _, wrench = held(pf.DistributedModel(POINT, CREEPING), v, 1.0, 1)
         assert -wrench[0] == pytest.approx(friction * LOAD, rel=1e-12)  # rounding
 
 
@@ -106,9 +106,8 @@ def test_regularised_coulomb_relaxes_at_rest_within_its_time():
     state, before = held(model, 0.1, 1.0, 1)
     _, after = held(model, 0.0, 5e-3, 4, state)
     viscous = 0.3 * 0.1 * LOAD
-    assert after[0] / (before[0] + viscous) == pytest.approx(
-        math.exp(-1.0), rel=1e-13
-    )  # rounding
+    # Rounding.
+    assert after[0] / (before[0] + viscous) == pytest.approx(math.exp(-1.0), rel=1e-13)
 
 
 def creeping_block(share: float) -> pf.Scene:
@@ -125,17 +124,15 @@ def creeping_block(share: float) -> pf.Scene:
 def test_regularised_coulomb_creeps_under_a_held_force(share):
     """`v = v_c F/(mu f_N - F)`"""
     data = pf.simulate(creeping_block(share), rtol=1e-8).data
-    assert float(data.vx[-1]) == pytest.approx(
-        1e-4 * share / (1.0 - share), rel=1e-4
-    )  # of the solver
+    # Of the solver.
+    assert float(data.vx[-1]) == pytest.approx(1e-4 * share / (1.0 - share), rel=1e-4)
 
 
 def test_the_creep_of_a_scene_has_the_slope_of_its_closed_form():
     """`dv/d(log mu) = -v_c F mu f_N/(mu f_N - F)^2`"""
     found = pf.derivatives.scene_sensitivities(creeping_block(0.6), ("mu", "load"))
-    assert found.d_motion[-1, 0] == pytest.approx(
-        -1e-4 * 0.6 / 0.4**2, rel=1e-4
-    )  # of the solver
+    # Of the solver.
+    assert found.d_motion[-1, 0] == pytest.approx(-1e-4 * 0.6 / 0.4**2, rel=1e-4)
 
 
 # ---------------------------------------------------------------------- one bristle without a patch
@@ -149,9 +146,10 @@ def test_a_single_bristle_is_a_patch_of_one_cell(law):
     v = 1e-3 * rng.normal(size=(20, 2))
     twist = np.concatenate([v, np.zeros((20, 1))], axis=1)
     wide = z[..., None]
+    # Rounding.
     assert law.rate(z, v, axis=-1) == pytest.approx(
         model.rate(wide, twist, LOAD)[..., 0], rel=1e-12
-    )  # rounding
+    )
     assert law.force(z, v, LOAD, axis=-1) == pytest.approx(
         model.wrench(wide, twist, LOAD)[:, :2], rel=1e-12
     )
@@ -165,10 +163,11 @@ def test_a_bristle_on_a_line_is_one_in_the_plane_that_keeps_to_it(law):
     plane = law.force(
         np.stack([z, flat]), np.stack([v, flat]), np.full(4, LOAD), axis=0
     )
+    # Rounding.
     assert (
         law.force(z, v, LOAD) == pytest.approx(plane[0], rel=1e-13)
         and not plane[1].any()
-    )  # rounding
+    )
     assert law.rate(z, v) == pytest.approx(
         law.rate(np.stack([z, flat]), np.stack([v, flat]), axis=0)[0], rel=1e-13
     )
@@ -180,9 +179,8 @@ def test_steady_friction_is_where_the_bristle_stays(law):
     deflection = (
         law.steady_friction(speed) - law.numbers.sigma_2 * speed
     ) / law.numbers.sigma_0
-    assert (
-        np.abs(law.rate(deflection, speed)).max() < 1e-13
-    )  # rounding of speeds up to 0.1 m/s
+    # Rounding of speeds up to 0.1 m/s.
+    assert np.abs(law.rate(deflection, speed)).max() < 1e-13
     assert law.force(deflection, speed, LOAD) == pytest.approx(
         -LOAD * law.steady_friction(speed), rel=1e-9
     )
@@ -258,9 +256,8 @@ def test_a_disc_that_slides_straight_has_the_friction_of_its_law(law):
         data = pf.simulate(scene, rtol=1e-8).data
         friction = LOAD * float(law.steady_friction(5e-3))
         end = [float(data[name][-1, 0]) for name in ("fx", "fy")]
-        assert end == pytest.approx(
-            [-0.6 * friction, -0.8 * friction], rel=1e-6
-        )  # of the solver
+        # Of the solver.
+        assert end == pytest.approx([-0.6 * friction, -0.8 * friction], rel=1e-6)
 
 
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
@@ -398,8 +395,7 @@ def test_jax_takes_a_law_by_its_numbers_and_refuses_creep():
         reference = pf.DistributedModel(DISC, law)
         _, wrench = model.step(model.rest(), jax.numpy.asarray(twist), LOAD, 1e-2)
         expected = reference.step(reference.rest(), twist, LOAD, 1e-2)[1]
-        assert np.asarray(wrench) == pytest.approx(
-            expected, rel=1e-4, abs=1e-6
-        )  # single precision
+        # Single precision.
+        assert np.asarray(wrench) == pytest.approx(expected, rel=1e-4, abs=1e-6)
     with pytest.raises(InvalidValueError, match="law must have no creep_speed"):
         pj.DistributedModel(DISC, CREEPING)

@@ -52,9 +52,8 @@ def test_steady_force_is_the_stribeck_curve_with_its_viscous_term(
     model = one_cell(gamma=gamma, elasto_plastic=elasto_plastic)
     speed = 2e-3 * np.array([0.01, 0.3, 1.0, 2.0, 10.0, 1000.0])
     twist = np.stack([speed, 0 * speed, 0 * speed], -1)
-    _, wrench = model.step(
-        model.rest(), twist, LOAD, 1e3
-    )  # a step long enough for the slowest, g/(sigma_0 v) = 0.5 s
+    # A step long enough for the slowest, g/(sigma_0 v) = 0.5 s.
+    _, wrench = model.step(model.rest(), twist, LOAD, 1e3)
     g = 0.6 + 0.3 * np.exp(-((speed / 2e-3) ** gamma))
     # Nothing is left of the start (exp(-2000)); the rounding of zdot, 1e-16 of v = 2 m/s, meets sigma_1 = 300.
     assert -wrench[:, 0] == pytest.approx((g + 0.4 * speed) * LOAD, rel=1e-12)
@@ -87,13 +86,13 @@ def test_a_point_resists_no_spin():
 
 def test_bristle_is_a_spring_and_a_damper_at_first():
     model = one_cell(elasto_plastic=pf.ElastoPlastic(0.9))
-    state = np.array(
-        [[2e-6], [0.0]]
-    )  # a third of the steady deflection: purely elastic
+    # A third of the steady deflection: purely elastic.
+    state = np.array([[2e-6], [0.0]])
     wrench = model.wrench(state, (1e-4, 0.0, 0.0), LOAD)
+    # Rounding.
     assert -wrench[0] == pytest.approx(
         (1e5 * 2e-6 + 300.0 * 1e-4 + 0.4 * 1e-4) * LOAD, rel=1e-14
-    )  # rounding
+    )
 
 
 def test_breakaway_force():
@@ -105,12 +104,10 @@ def test_breakaway_force():
     # Up to the share s_ba of that the force is exactly the spring's.
     held = -forces < 0.9 * 0.9 * 0.9 * LOAD
     displacement = 5e-8 * np.arange(1, 3001)
-    assert held.sum() == pytest.approx(
-        0.9 * 0.9 * 9e-6 / 5e-8, abs=1
-    )  # 0.81 z_max, in whole steps
-    assert -forces[held] == pytest.approx(
-        1e5 * displacement[held] * LOAD, rel=1e-12
-    )  # 800 additions
+    # 0.81 z_max, in whole steps.
+    assert held.sum() == pytest.approx(0.9 * 0.9 * 9e-6 / 5e-8, abs=1)
+    # 800 additions.
+    assert -forces[held] == pytest.approx(1e5 * displacement[held] * LOAD, rel=1e-12)
 
 
 def test_hysteresis_loop_in_pre_sliding():
@@ -153,9 +150,10 @@ def test_dahl_unloading_from_full_friction():
     full = np.array([[6e-6], [0.0]])
     forces, _ = pulled(model, np.full(300, -1e-4), 1e-3, full)
     x = 1e-7 * np.arange(1, 301)
+    # 300 roundings.
     assert -forces == pytest.approx(
         0.6 * LOAD * (2.0 * np.exp(-x / 6e-6) - 1.0), abs=1e-12
-    )  # 300 roundings
+    )
 
 
 # ---------------------------------------------------------------------- drift
@@ -216,15 +214,15 @@ def test_coulomb_wrench_is_the_surface_scaled():
     twist = np.array([[0.1, 0.2, 3.0], [0.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     load = np.array([2.0, 3.0, 0.0])
     wrench = pf.Coulomb(0.3).wrench(surface, twist, load)
-    assert wrench[0] == pytest.approx(
-        0.6 * surface.wrench(twist[0]), rel=1e-15
-    )  # rounding
+    # Rounding.
+    assert wrench[0] == pytest.approx(0.6 * surface.wrench(twist[0]), rel=1e-15)
     assert not wrench[1].any()  # at rest
     assert not wrench[2].any()  # without load
+    # Batch axes broadcast.
     assert pf.Coulomb(0.3).wrench(surface, twist[0], load).shape == (
         3,
         3,
-    )  # batch axes broadcast
+    )
     assert pf.Coulomb(0.3).wrench(surface, (0.1, 0.0, 0.0), 1.0) == pytest.approx(
         [-0.3, 0.0, 0.0], rel=1e-15, abs=1e-16
     )

@@ -294,9 +294,8 @@ def test_a_law_that_was_used_goes_to_another_process():
     law = BoucWen()
     rate = law.rate(1e-6, 0.1)
     steady = law.steady_friction(0.1)
-    assert not any(
-        isinstance(each, np.ndarray) for each in vars(law).values()
-    )  # no address of this process
+    # No address of this process.
+    assert not any(isinstance(each, np.ndarray) for each in vars(law).values())
     again = pickle.loads(pickle.dumps(law))
     assert again == law
     assert again.rate(1e-6, 0.1) == rate

@@ -51,9 +51,8 @@ def test_the_direction_alone_makes_the_ellipsoid(patch):
         [TWISTS, [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 1.0]]]
     )
     wrenches = library.wrench(twists)
-    assert own.wrench(twists) == pytest.approx(
-        wrenches, rel=1e-13, abs=1e-16
-    )  # rounding
+    # Rounding.
+    assert own.wrench(twists) == pytest.approx(wrenches, rel=1e-13, abs=1e-16)
     assert own.dissipation(twists) == pytest.approx(
         library.dissipation(twists), rel=1e-13
     )
@@ -87,9 +86,8 @@ def test_a_superellipsoid_has_its_shape_its_normals_and_its_slopes(exponent):
     wrench = surface.wrench(TWISTS)
     force = np.linalg.norm(wrench[:, :2], axis=1)
     torque = np.abs(wrench[:, 2]) / RADIUS
-    assert force**exponent + torque**exponent == pytest.approx(
-        1.0, rel=1e-13
-    )  # rounding
+    # Rounding.
+    assert force**exponent + torque**exponent == pytest.approx(1.0, rel=1e-13)
     found = surface.twist(wrench)
     assert found == pytest.approx(
         TWISTS / surface.dissipation(TWISTS)[:, None], rel=1e-7, abs=1e-9
@@ -101,9 +99,10 @@ def test_a_superellipsoid_has_its_shape_its_normals_and_its_slopes(exponent):
         expected = (surface.wrench(TWISTS + step) - surface.wrench(TWISTS - step)) / (
             2.0 * h[i]
         )
+        # Of these differences.
         assert slope[:, :, i] == pytest.approx(
             expected, abs=1e-3 * np.abs(expected).max()
-        )  # of these differences
+        )
 
 
 def test_models_store_it_as_a_table_that_gets_finer():
@@ -127,9 +126,8 @@ def test_a_model_slides_with_it_and_its_step_agrees_with_its_rate():
     model = pf.ReducedModelPublished(LEANING, law, surface=surface)
     twist = np.array([0.01, 0.004, 1.0])
     state, wrench = model.step(model.rest(), twist, 2.0, 10.0)
-    assert wrench == pytest.approx(
-        surface.wrench(twist), rel=5e-3
-    )  # of the table; mu f_N = 1
+    # Of the table; mu f_N = 1.
+    assert wrench == pytest.approx(surface.wrench(twist), rel=5e-3)
     assert model.wrench(state, twist, 2.0) == pytest.approx(wrench, rel=5e-3)
 
 

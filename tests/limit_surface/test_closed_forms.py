@@ -231,9 +231,8 @@ def test_soft_finger_radius(k, ratio):
 )
 def test_contact_radius_as_published(name, radius):
     surface = pf.LimitSurfaceTablePublished(PUBLISHED_PATCHES[name]())
-    assert surface.contact_radius * 1e3 == pytest.approx(
-        radius, abs=0.5e-8
-    )  # half a unit of the last printed digit
+    # Half a unit of the last printed digit.
+    assert surface.contact_radius * 1e3 == pytest.approx(radius, abs=0.5e-8)
 
 
 @pytest.mark.parametrize(
@@ -246,12 +245,10 @@ def test_contact_radius_as_published(name, radius):
 @pytest.mark.parametrize("spin", [1e-3, 1.0, 50.0])
 def test_torque_plateaus_of_the_published_line(surface, plateau, spin):
     wrench = surface(PUBLISHED_PATCHES["Line"]()).wrench((0.0, 0.0, spin))
-    assert wrench[2] == pytest.approx(
-        plateau, abs=0.5e-9
-    )  # half a unit of the last printed digit
-    assert wrench[:2] == pytest.approx(
-        [0.0, 0.0], abs=1e-15
-    )  # sums of 21 terms that cancel
+    # Half a unit of the last printed digit.
+    assert wrench[2] == pytest.approx(plateau, abs=0.5e-9)
+    # Sums of 21 terms that cancel.
+    assert wrench[:2] == pytest.approx([0.0, 0.0], abs=1e-15)
 
 
 # ---------------------------------------------------------------------- signs
@@ -394,9 +391,10 @@ def test_smooth_table_at_the_spin_axis(name):
     r = surface.contact_radius
     x, y = surface.centre_of_pressure
     spin = np.array([y, -x, 1.0])
+    # A node.
     assert surface.wrench(spin) / (1.0, 1.0, r) == pytest.approx(
         exact.wrench(spin) / (1.0, 1.0, r), abs=1e-7
-    )  # a node
+    )
     for distance in (1e-3, 1e-5, 1e-7, 1e-9, 0.0):
         for angle in (0.3, 2.0, 4.0):
             nearby = spin + distance * r * np.array(
@@ -453,10 +451,11 @@ def test_a_single_point_has_no_limit_surface(kind):
     shrunk = pf.ContactPatch.rectangle(
         0.02, cells=21, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
     )
+    # Only the middle cell is left, and it has a size.
     if kind in (
         pf.LimitSurfaceExact,
         pf.LimitSurfaceTable,
-    ):  # only the middle cell is left, and it has a size
+    ):
         assert kind(shrunk, normal_force=1e-9).contact_radius == pytest.approx(
             0.3826 * 0.02 / 21, rel=1e-4
         )

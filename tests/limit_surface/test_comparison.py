@@ -42,9 +42,10 @@ def test_two_spheres_of_different_radius():
         assert spread.largest == pytest.approx(values.max(), rel=1e-9), name
         assert spread.mean == pytest.approx(values.mean(), rel=1e-9), name
         assert spread.rms == pytest.approx(np.sqrt(np.mean(values**2)), rel=1e-9), name
+    # At tan = c.
     assert found.angle.largest == pytest.approx(
         np.degrees(np.arctan2(ratio - 1 / ratio, 2.0)), abs=0.01
-    )  # at tan = c
+    )
 
 
 @pytest.mark.parametrize("patch", [PATCH, FEET], ids=["square", "feet"])
@@ -73,9 +74,8 @@ def test_does_not_depend_on_the_origin():
     )
     assert there.force.rms == pytest.approx(here.force.rms, rel=1e-9)
     assert there.radius.largest == pytest.approx(here.radius.largest, rel=1e-9)
-    assert there.angle.mean == pytest.approx(
-        here.angle.mean, rel=1e-6
-    )  # kinks are rounded off by 1e-10
+    # Kinks are rounded off by 1e-10.
+    assert there.angle.mean == pytest.approx(here.angle.mean, rel=1e-6)
 
 
 def test_directions_are_even():

@@ -60,9 +60,8 @@ def test_friction_of_one_disc_is_within_a_hundredth_of_the_closed_form():
         each @ np.array([ONE.positions[0, 1], -ONE.positions[0, 0], 1.0])
         for each in (one, exact)
     )
-    assert (
-        np.abs((one - exact)[:, :2]).max() < 0.0085
-    )  # as published for the fit of the mean speed
+    # As published for the fit of the mean speed.
+    assert np.abs((one - exact)[:, :2]).max() < 0.0085
     assert np.abs(torque - other).max() < 0.0085 * R
     assert exact[0] @ [0.0, 0.0, 1.0] == pytest.approx(-2.0 / 3.0 * R, rel=1e-12)
 
@@ -172,9 +171,8 @@ def test_dissipation_is_convex():
     for name, patch in PATCHES.items():
         for surface in surfaces(patch):
             jacobian = surface.jacobian(some_twists(patch)) * SCALE[:, None] * SCALE
-            assert (np.linalg.eigvalsh(-jacobian) > -1e-3).all(), (
-                name
-            )  # the fit of a disc leaves -1e-4
+            # The fit of a disc leaves -1e-4.
+            assert (np.linalg.eigvalsh(-jacobian) > -1e-3).all(), name
 
 
 # ---------------------------------------------------------------------- what discs stand for

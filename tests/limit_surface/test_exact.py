@@ -370,9 +370,8 @@ def test_table_of_a_pressure_map_is_convex():
     pressure = np.random.default_rng(1).uniform(size=(21, 21))
     table = pf.LimitSurfaceTable(pf.ContactPatch.from_pressure(pressure, 0.001))
     slopes = scaled_jacobian(table, twists(table, 500))
-    assert (
-        np.linalg.eigvalsh(0.5 * (slopes + np.swapaxes(slopes, 1, 2))).max() < 1e-8
-    )  # rounding at twists 1e-20 from the axis
+    # Rounding at twists 1e-20 from the axis.
+    assert np.linalg.eigvalsh(0.5 * (slopes + np.swapaxes(slopes, 1, 2))).max() < 1e-8
 
 
 # ---------------------------------------------------------------------- outlines and errors

@@ -98,9 +98,8 @@ def test_power_sign_and_scale(kind, name):
         phi = surface.dissipation(twist)
         # Rounding: the frame's offset (0.1 m against r of 4 cm) costs a few digits of 1e-16.
         assert -wrench @ twist == pytest.approx(phi, rel=1e-12)
-        assert (
-            phi > 0.1 * speed
-        )  # far from zero in every direction: w of the cells that move
+        # Far from zero in every direction: w of the cells that move.
+        assert phi > 0.1 * speed
         assert surface.wrench(-twist) / scales(surface) == pytest.approx(
             -wrench / scales(surface), abs=1e-11
         )
@@ -224,9 +223,10 @@ def test_mirror_symmetry(kind, name):
         assume(kind not in SUMS or lowest_speed(at_home, twist) > 1e-3)
         got = mirrored.wrench(twist * (-1.0, 1.0, -1.0))
         expected = at_home.wrench(twist) * (-1.0, 1.0, -1.0)
+        # Rounding over 1e-3.
         assert got / scales(at_home) == pytest.approx(
             expected / scales(at_home), abs=1e-11
-        )  # rounding over 1e-3
+        )
 
     check()
 
@@ -269,9 +269,8 @@ def test_jacobian_is_symmetric(kind, name):
         jacobian = jacobian / np.outer(scales(surface), scales(surface))
         # Rounding, times the largest entry: one cell near the centre of rotation weighs w/|v|.
         assert jacobian == pytest.approx(jacobian.T, abs=1e-11 * np.abs(jacobian).max())
-        if (
-            kind is not TABLE
-        ):  # a table of few cells curves both ways where one of them stands in the centre of rotation
+        # A table of few cells curves both ways where one of them stands in the centre of rotation.
+        if kind is not TABLE:
             assert np.linalg.eigvalsh(jacobian).max() <= 1e-11 * np.abs(jacobian).max()
 
     check()
@@ -395,9 +394,8 @@ def test_every_wrench_has_a_twist(kind, name):
             surface.wrench(twist), surface.centre_of_pressure
         ) / scales(surface)
         if kind is not CELLS:
-            assert missing == pytest.approx(
-                np.zeros(3), abs=1e-9
-            )  # balance of 1e-12, over |h| of 0.1 and more
+            # Balance of 1e-12, over |h| of 0.1 and more.
+            assert missing == pytest.approx(np.zeros(3), abs=1e-9)
             continue
         x, y = (surface.patch.positions - surface.centre_of_pressure).T
         vx, vy, omega = geometry.twist_at(twist, surface.centre_of_pressure)
@@ -435,6 +433,5 @@ def test_facets_of_a_three_legged_object(foot, spin, share):
         assert found * scales(surface) == pytest.approx(
             expected * scales(surface), abs=1e-7
         )
-        assert -wrench @ found == pytest.approx(
-            1.0, abs=1e-7
-        )  # on the facet all wrenches dissipate alike
+        # On the facet all wrenches dissipate alike.
+        assert -wrench @ found == pytest.approx(1.0, abs=1e-7)

@@ -75,12 +75,10 @@ def test_the_ellipsoid_is_a_quartic(name):
     """Its square, with the Hessian `4 |x|^2 + 8 x x'` >= 4 |x|^2."""
     ellipsoid = pf.LimitSurfaceEllipsoid(PATCHES[name])
     quartic = pf.LimitSurfaceQuartic(PATCHES[name], surface=ellipsoid)
-    assert quartic.quartic == pytest.approx(
-        ELLIPSOID, abs=1e-12
-    )  # least squares, to rounding
-    assert quartic.convexity == pytest.approx(
-        4.0, abs=1e-6
-    )  # tolerance of the conic solver
+    # Least squares, to rounding.
+    assert quartic.quartic == pytest.approx(ELLIPSOID, abs=1e-12)
+    # Tolerance of the conic solver.
+    assert quartic.convexity == pytest.approx(4.0, abs=1e-6)
     for twist in samples(quartic, 5):
         assert quartic.wrench(twist) == pytest.approx(
             ellipsoid.wrench(twist), rel=1e-10, abs=1e-12
@@ -145,9 +143,8 @@ def test_certificate_is_the_hessian():
 @names
 def test_convex_homogeneous_dissipative(name):
     surface = fitted(name)
-    assert (
-        surface.convexity >= 0.99 * quartic_fit.MARGIN
-    )  # the constraint, to the solver's tolerance
+    # The constraint, to the solver's tolerance.
+    assert surface.convexity >= 0.99 * quartic_fit.MARGIN
 
     @given(twists, twists, st.floats(1e-3, 1e3))
     @checked
@@ -223,9 +220,8 @@ def test_a_known_quartic_comes_back_from_pairs(velocity_weight):
     found = pf.LimitSurfaceQuartic.fit(
         known.wrench(twist), 3.0 * twist, patch=FEET, velocity_weight=velocity_weight
     )
-    assert found.quartic == pytest.approx(
-        KNOWN, rel=1e-9, abs=1e-9
-    )  # least squares, to rounding
+    # Least squares, to rounding.
+    assert found.quartic == pytest.approx(KNOWN, rel=1e-9, abs=1e-9)
     # the patch that scales the fit does not shape it
     other = pf.ContactPatch.disc(0.03, cells=5)
     found = pf.LimitSurfaceQuartic.fit(

@@ -169,9 +169,10 @@ def test_many_twists_share_the_wrench_of_a_line_that_slides_across_itself():
     for kind in (pf.LimitSurfaceExact, pf.LimitSurfaceTable, pf.LimitSurfaceCells):
         surface = kind(line)
         found = surface.twist(-across)
+        # CERTIFIED.
         assert surface.wrench(found) * [1.0, 1.0, 100.0] == pytest.approx(
             -across, abs=1e-5
-        )  # CERTIFIED
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -281,9 +282,8 @@ def test_a_fingertip_smaller_than_its_hole_loads_the_cells_beside_it():
     ring = pf.ContactPatch.ring(0.004, 0.01, 21, pressure=pf.SoftFinger(c=0.002, k=2.0))
     surface = pf.LimitSurfaceExact(ring)
     cells = pf.LimitSurfaceCells(ring)
-    assert surface.contact_radius == pytest.approx(
-        cells.contact_radius, rel=0.01
-    )  # of a cell of 1 mm, at 4 mm
+    # Of a cell of 1 mm, at 4 mm.
+    assert surface.contact_radius == pytest.approx(cells.contact_radius, rel=0.01)
     wrench = np.array([1.0, 0.2, 0.001])
     assert (
         angles(surface, surface.wrench(surface.twist(wrench))[None], wrench[None])

@@ -155,9 +155,8 @@ def numbers_of_scene(model: Any) -> dict[str, list[float]]:
     )
     end = pf.simulate(scene)
     numbers = {"end": [float(end.histories[name].values[-1]) for name in MOTION]}
-    if not isinstance(
-        model, pf.ReducedModelPublished
-    ):  # slopes of tables jump, so steps do
+    # Slopes of tables jump, so steps do.
+    if not isinstance(model, pf.ReducedModelPublished):
         with contextlib.suppress(pf.FrictionError):
             by_start = derivatives.scene_sensitivities(
                 scene, (), initial=("vx", "omega")

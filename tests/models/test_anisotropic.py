@@ -139,9 +139,8 @@ def test_easier_one_way_than_the_other():
 
 
 def test_a_line_spins_against_its_coefficient_across():
-    line = dataclasses.replace(
-        pf.ContactPatch.line(0.02, 9, direction="x"), radii=None
-    )  # points
+    # Points.
+    line = dataclasses.replace(pf.ContactPatch.line(0.02, 9, direction="x"), radii=None)
     grained = line.with_friction_metric(pf.friction_metric(0.0, 0.3, 0.7))
     assert grained.contact_radius() == pytest.approx(
         0.7 * line.contact_radius(), rel=1e-14
@@ -156,9 +155,8 @@ def test_a_line_spins_against_its_coefficient_across():
         (pf.DistributedModel(grained, viscous), grained.contact_radius()),
         (stored, stored.surface.contact_radius),
     )
-    assert stored.surface.contact_radius == pytest.approx(
-        0.7 * 0.02 / 4.0, rel=1e-13
-    )  # of the segment itself
+    # Of the segment itself.
+    assert stored.surface.contact_radius == pytest.approx(0.7 * 0.02 / 4.0, rel=1e-13)
     for model, radius in radii:
         torque = model.step(model.rest(), (0.0, 0.0, 3.0), 1.0, 1e3)[1][2]
         assert torque == pytest.approx(
@@ -323,9 +321,8 @@ def test_a_half_sphere_and_three_numbers_are_exact_for_all_directions(name):
             else pf.LimitSurfaceExact(patch).wrench(twist)
         )
         np.testing.assert_allclose(wrench, wanted, rtol=1e-7, atol=1e-9)
-        assert (
-            np.abs(wrench + back).max() > 0.1 * np.abs(wrench).max()
-        )  # h(-V) is not -h(V)
+        # H(-V) is not -h(V).
+        assert np.abs(wrench + back).max() > 0.1 * np.abs(wrench).max()
     fixed = -2.0 * np.einsum(
         "n,nij,ni->j", patch.weights(), patch.levers(), patch.asymmetries()
     )

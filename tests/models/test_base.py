@@ -133,9 +133,8 @@ def test_distributed_steady_state_is_coulomb_of_every_cell(polar, azimuth, speed
     expected = [*force.sum(axis=1), (x * force[1] - y * force[0]).sum()]
     # Rounding of zdot times sigma_1 = 8e2.
     assert wrench == pytest.approx(expected, abs=1e-12 + 1e-12 * speed)
-    assert state == pytest.approx(
-        g * v / size / 1e6, rel=1e-9, abs=1e-15
-    )  # exp(-1e6 s grip v) is nothing
+    # Exp(-1e6 s grip v) is nothing.
+    assert state == pytest.approx(g * v / size / 1e6, rel=1e-9, abs=1e-15)
 
 
 @given(polars, angles, speeds)
@@ -151,9 +150,8 @@ def test_slow_and_fast_steady_states_are_coulomb_on_the_cells_surface(
     expected = pf.Coulomb(0.8).wrench(
         pf.LimitSurfaceCells(FEET), twist_towards(FEET, polar, azimuth, speed), LOAD
     )
-    assert wrench == pytest.approx(
-        expected, abs=1e-12 + 1e-12 * speed
-    )  # rounding, as above
+    # Rounding, as above.
+    assert wrench == pytest.approx(expected, abs=1e-12 + 1e-12 * speed)
 
 
 @pytest.mark.parametrize("kind", SURFACES)
@@ -173,13 +171,13 @@ def test_reduced_steady_state(kind, polar, azimuth, speed):
     )
     g = formulas.stribeck(np, v_n, model.law)
     expected = (g * surface.wrench(twist) - viscous) * LOAD
+    # Of compiled loops and of NumPy.
     for got in (
         wrench,
         model.wrench(state, twist, LOAD),
-    ):  # of compiled loops and of NumPy
-        assert got == pytest.approx(
-            expected, abs=1e-11 + 1e-12 * speed
-        )  # rounding, as above, through the offset
+    ):
+        # Rounding, as above, through the offset.
+        assert got == pytest.approx(expected, abs=1e-11 + 1e-12 * speed)
 
 
 def test_pre_sliding_stiffness():
@@ -204,9 +202,10 @@ def test_pre_sliding_stiffness():
             wrench = geometry.wrench_at(
                 model.wrench(state, (0, 0, 0), LOAD), PATCH.centre_of_pressure()
             )
+            # Elastic: rounding.
             assert wrench[index] == pytest.approx(
                 -LOAD * 1e6 * stiffness * tiny, rel=1e-9
-            )  # elastic: rounding
+            )
 
 
 # ---------------------------------------------------------------------- covariance
@@ -280,9 +279,8 @@ def test_turning_everything_turns_the_wrench_and_nothing_else(kind, law):
         )
         (end, wrench) = model.step(*arguments, 1e-4)
         (turned_end, turned_wrench) = turned.step(*turned_arguments, 1e-4)
-        assert turned_end == pytest.approx(
-            turn(end), abs=1e-15
-        )  # a nanometre's millionth
+        # A nanometre's millionth.
+        assert turned_end == pytest.approx(turn(end), abs=1e-15)
         assert turned_wrench == pytest.approx(
             geometry.rotate(wrench, angle), abs=1e3 * allowed
         )
@@ -352,9 +350,8 @@ def check_slopes(model, state, twist):
             lambda z, of=of: of(z, twist, LOAD), state, state_scale(model)
         )
         by_twist = differences(lambda v, of=of: of(state, v, LOAD), twist, twist_steps)
-        if (
-            model.state_shape != (3,) and name == "rate"
-        ):  # cell by cell: no other cell matters
+        # Cell by cell: no other cell matters.
+        if model.state_shape != (3,) and name == "rate":
             assert np.count_nonzero(by_state) <= 4 * model.patch.cells
             cells = np.arange(model.patch.cells)
             by_state = by_state[:, cells, :, cells].transpose(1, 2, 0)
@@ -367,9 +364,10 @@ def check_slopes(model, state, twist):
             by_twist, rel=1e-4, abs=3e-4 * np.abs(by_twist).max()
         )
     assert not got.rate_load.any()
+    # Linear: rounding.
     assert got.wrench_load * LOAD == pytest.approx(
         model.wrench(state, twist, LOAD), rel=1e-12
-    )  # linear: rounding
+    )
 
 
 @every_model

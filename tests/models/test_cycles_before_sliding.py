@@ -33,9 +33,8 @@ def run(model):
     twists = np.tile(np.repeat(cycle(), STEPS, axis=0), (CYCLES, 1))
     end, wrenches = pf.derivatives.rollout(model, None, twists, 1.0, DT)
     wrenches = np.concatenate([np.zeros((1, 3)), wrenches])
-    work = (
-        -0.5 * np.einsum("ti,ti->t", wrenches[1:] + wrenches[:-1], twists) * DT
-    )  # exact: forces are linear in time
+    # Exact: forces are linear in time.
+    work = -0.5 * np.einsum("ti,ti->t", wrenches[1:] + wrenches[:-1], twists) * DT
     work = work.reshape(CYCLES, -1)
     return end, work.sum(1) / np.abs(work).sum(1)
 

@@ -114,9 +114,8 @@ def test_a_held_contact_keeps_its_force_when_it_is_pressed_harder(patch):
     )
     state, _ = fixed.step(fixed.rest(), [1e-4, 5e-5, 2e-3], REFERENCE, 1e-3)
     still, first = fixed.step(state, np.zeros(3), REFERENCE, 1e-3)
-    tiny = (
-        1e-15 * np.abs(state).max() if patch.asymmetric else 0.0
-    )  # rounding of the middle of the limit
+    # Rounding of the middle of the limit.
+    tiny = 1e-15 * np.abs(state).max() if patch.asymmetric else 0.0
     np.testing.assert_allclose(still, state, rtol=0.0, atol=tiny)
     harder, pull = fixed.step(state, np.zeros(3), 2.0 * REFERENCE, 1e-3)
     np.testing.assert_allclose(harder, state, rtol=1e-15, atol=tiny)

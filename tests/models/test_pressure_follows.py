@@ -114,9 +114,10 @@ def test_jacobians_are_those_of_differences_at_the_moments(model):
     found = slopes.wrench_state[(..., slice(None), *place)]
     np.testing.assert_allclose(found, wrench, rtol=1e-4, atol=1e-6 * abs(wrench).max())
     wrench = model.step(state, twist, load, dt, moments=moments)[1]
+    # At a held pressure.
     np.testing.assert_allclose(
         slopes.wrench_load * load[:, None], wrench, rtol=1e-12, atol=1e-15
-    )  # at a held pressure
+    )
 
 
 def test_rates_go_where_short_steps_go(model):

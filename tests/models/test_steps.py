@@ -114,9 +114,8 @@ def test_wrench_of_a_step_is_that_of_its_end(kind, law):
     model = model_of(kind, law)
     for seed in range(5):
         end, wrench = model.step(some_state(model, seed, 7e-7), TWIST, LOAD, 1e-4)
-        assert wrench == pytest.approx(
-            model.wrench(end, TWIST, LOAD), abs=1e-10
-        )  # rounding
+        # Rounding.
+        assert wrench == pytest.approx(model.wrench(end, TWIST, LOAD), abs=1e-10)
 
 
 @every_model
@@ -408,9 +407,10 @@ def test_rescale_lets_only_the_radius_follow():
     # A spin, elastic: torque sigma_0 r^2 theta of the radius that follows.
     state, _ = model.step(model.rest(), (0, 0, 1.0), 0.5, 1e-9)
     torque = model.wrench(state, (0, 0, 0), 0.5)[2]
+    # Decay over 1e-9 s: 1e6 r dt.
     assert torque == pytest.approx(
         -0.5 * 1e6 * small.contact_radius**2 * 1e-9, rel=1e-4
-    )  # decay over 1e-9 s: 1e6 r dt
+    )
 
 
 def test_keep_keeps_all():

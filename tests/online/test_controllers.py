@@ -34,9 +34,8 @@ def test_parts_are_held_with_less_grip_than_by_the_rule():
     assert np.hypot(*ours["later"][:, :2].T).max() < 1e-3  # taps and a tilt
     assert np.abs(ours["slip"][:, 2]).max() < np.radians(15.0)  # the exploration
     assert np.isfinite(ours["first"]).all()
-    assert (
-        np.abs(ours["first"][:, :, 0]).max() < 0.3
-    )  # errors of the logs of mu_c, mu_s and radius
+    # Errors of the logs of mu_c, mu_s and radius.
+    assert np.abs(ours["first"][:, :, 0]).max() < 0.3
     assert (ours["late"] <= 0.02).all()
 
 
@@ -423,9 +422,10 @@ def test_a_hinge_releases_what_does_not_hang_yet(observer, torque, falls):
     first = gripped(hinge, sample, found=1.0, force=1.0, torque=torque, since=0.2)
     for _ in range(100):
         hinge._grip(hinge.state, found(**sample), *hinge._settings)
+    # Or one sample of 100 later.
     assert hinge.state["grip"] / first == pytest.approx(
         np.exp(-0.1) if falls else 1.0, rel=2e-3
-    )  # or one sample of 100 later
+    )
 
 
 def test_a_slip_velocity_is_the_mean_since_the_one_before(observer):

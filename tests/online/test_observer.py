@@ -66,11 +66,12 @@ def test_a_slip_in_many_directions_determines_friction_and_radius():
     found = taken(observer(), sliding())
     assert found.mu_c == pytest.approx(0.7, rel=0.01)
     assert found.radius == pytest.approx(1.1 * SURFACE.contact_radius, rel=0.02)
+    # Mu_s shows at the beginning of a slip alone.
     assert found.determined.tolist() == [
         True,
         False,
         True,
-    ]  # mu_s shows at the beginning of a slip alone
+    ]
     assert found.slip > 0.95
     low, high = found.interval()[0]
     assert low < 0.7 < high < 0.75
@@ -129,9 +130,8 @@ def test_gauge_is_what_the_holding_load_says():
             observer(), [Measurement(1e-3 * k, wrench, 5.0) for k in range(60)]
         )
         expected = pf.planning.holding_load(wrench, PATCH, mu=1.0) / 5.0
-        assert found.gauge == pytest.approx(
-            expected, rel=3e-3
-        )  # planes around the surface
+        # Planes around the surface.
+        assert found.gauge == pytest.approx(expected, rel=3e-3)
 
 
 def bad_samples():
@@ -255,9 +255,8 @@ def test_a_clock_that_fails_leaves_the_period_of_the_samples(name):
         assert (found["flags"] & 2 > 0) == (
             k >= 200 and (name != "set back" or k < 210)
         )
-    assert sum(steps[200:]) == pytest.approx(
-        0.4, abs=0.025
-    )  # ten samples are left out, until the fault is certain
+    # Ten samples are left out, until the fault is certain.
+    assert sum(steps[200:]) == pytest.approx(0.4, abs=0.025)
 
 
 def test_a_pause_is_not_a_clock_that_fails():
@@ -451,23 +450,20 @@ def test_an_empty_hand_gives_the_bias():
     load = np.array([0.0, 1.0, 0.0])
     for k in range(100):
         own.update(Measurement(1e-3 * k, bias, 0.0))
-        own.update(
-            Measurement(1e-3 * k + 5e-4, bias + 1.5 * load, 0.0)
-        )  # holds something: it cannot be empty
+        # Holds something: it cannot be empty.
+        own.update(Measurement(1e-3 * k + 5e-4, bias + 1.5 * load, 0.0))
     for k in range(100, 200):
         found, other = (
             each.update(Measurement(1e-3 * k, bias + load, 4.0))
             for each in (own, plain)
         )
     assert own.bias == pytest.approx(bias, rel=1e-2)
-    freed = own._take(Measurement(1.0, bias + load, 4.0))[
-        "wrench"
-    ]  # as controllers see it
+    # As controllers see it.
+    freed = own._take(Measurement(1.0, bias + load, 4.0))["wrench"]
     assert freed == pytest.approx(load, abs=1e-2 * np.abs(bias).max())
     assert found.gauge == pytest.approx(0.25, rel=5e-3)
-    assert (
-        abs(other.gauge / 0.25 - 1.0) > 0.02
-    )  # without an empty hand the bias is load
+    # Without an empty hand the bias is load.
+    assert abs(other.gauge / 0.25 - 1.0) > 0.02
 
 
 def test_a_slip_in_the_gripper_is_seen_and_its_friction_found():

@@ -206,9 +206,8 @@ def test_refined_patches_keep_their_load_and_come_closer_to_the_continuum():
             exact[name] - p.tile_weights() @ (p.positions**2).sum(1)
             for p in (patch, fine)
         ]
-        assert error[0] / error[1] == pytest.approx(
-            9.0, rel=1e-6
-        )  # the midpoint rule is of second order
+        # The midpoint rule is of second order.
+        assert error[0] / error[1] == pytest.approx(9.0, rel=1e-6)
         assert fine.second_moment() == pytest.approx(exact[name], rel=1e-12)
     assert (line.refined(3).positions[:, 0] == 0.0).all()
 

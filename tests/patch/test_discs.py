@@ -109,12 +109,10 @@ def test_shapes_by_name_keep_the_second_moment_of_their_points():
 def test_each_cell_is_the_disc_of_its_own_second_moment():
     square = SHAPES["square"].discs()
     line = SHAPES["line"].discs()
-    assert square.radii == pytest.approx(
-        0.02 / 21 / np.sqrt(3.0), rel=1e-14
-    )  # a^2/2 = h^2/6
-    assert line.radii == pytest.approx(
-        0.02 / 40 / np.sqrt(6.0), rel=1e-14
-    )  # a^2/2 = h^2/12
+    # A^2/2 = h^2/6.
+    assert square.radii == pytest.approx(0.02 / 21 / np.sqrt(3.0), rel=1e-14)
+    # A^2/2 = h^2/12.
+    assert line.radii == pytest.approx(0.02 / 40 / np.sqrt(6.0), rel=1e-14)
     assert SHAPES["points"].discs() is SHAPES["points"]
     cut = DISC.discs()
     assert cut.radii == pytest.approx(np.sqrt(DISC.areas / 3.0), rel=1e-14)
@@ -296,9 +294,8 @@ def test_shares_change_without_jumps():
         np.abs(np.diff(patch.weights(loads), axis=0)).sum(axis=1)
         for patch in (FINGER, few)
     )
-    assert (
-        moved.max() < 3.0 * whole.max()
-    )  # a cell that comes in moves its whole share at once in both
+    # A cell that comes in moves its whole share at once in both.
+    assert moved.max() < 3.0 * whole.max()
 
 
 @pytest.mark.parametrize("loads", [(1.0, 2.0), (1e7, 2e7)])

@@ -47,9 +47,8 @@ def test_a_spin_of_a_square_shows_what_the_points_miss():
         float(spin @ each.twist(-spin) / each.dissipation(each.twist(-spin)))
         for each in surfaces
     )
-    assert (
-        error.breakaway >= 0.8 * abs(cells / exact - 1.0) > 0.0
-    )  # no direction is that of a spin alone
+    # No direction is that of a spin alone.
+    assert error.breakaway >= 0.8 * abs(cells / exact - 1.0) > 0.0
 
 
 @pytest.mark.parametrize(

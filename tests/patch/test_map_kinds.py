@@ -261,9 +261,8 @@ def test_forms_of_files(tmp_path, form):
         )
     else:
         found = read(kind, path, **options)
-        np.testing.assert_allclose(
-            found, given.reshape(found.shape), rtol=1e-8
-        )  # nine digits are written
+        # Nine digits are written.
+        np.testing.assert_allclose(found, given.reshape(found.shape), rtol=1e-8)
 
 
 def read(kind, path, names=("time", "fx"), **options):

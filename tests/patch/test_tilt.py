@@ -44,9 +44,8 @@ def test_beyond_the_kern_an_edge_lifts():
         edge - 3.0 * (edge - x_c), abs=size
     )
     peak = weights.max() / weights[pressing].mean()
-    assert peak == pytest.approx(
-        2.0, rel=2e-2
-    )  # of a triangle; the last cell's middle is half a cell from the edge
+    # Of a triangle; the last cell's middle is half a cell from the edge.
+    assert peak == pytest.approx(2.0, rel=2e-2)
 
 
 @pytest.mark.parametrize(

@@ -70,9 +70,8 @@ def test_a_plate_turns_by_thirty_degrees_slides_little_and_is_held():
     assert plan.report.angle == pytest.approx(end["theta"], abs=1e-9)
     assert plan.report.speed < 1e-9
     assert plan.scene.contacts[0].normal_force == plan.signal
-    assert (
-        plan.report.jacobians <= 6 and plan.report.simulations <= 100
-    )  # it ends when nothing more is gained
+    # It ends when nothing more is gained.
+    assert plan.report.jacobians <= 6 and plan.report.simulations <= 100
     assert plan.signal.values[-1] >= 1.5 * plan.report.holding * (1 - 1e-9)
     assert (
         plan.signal.values[:3] < load_and_level(plan.scene)[1]
@@ -200,9 +199,8 @@ def test_ends_and_loads_of_a_scene_that_is_seen_turned_are_turned(mounted_on):
     assert abs(ends[0][5]) > 1e-3 and np.hypot(*ends[0][3:5]) > 1e-4
     assert loads[1] == pytest.approx(loads[0], abs=1e-9)
     away = np.array(body.position) - grip_position(pf.Scene(body, for_one, 0.1), 0)
-    arm = pf.geometry.rotate(away, 0.2) + np.array(
-        [0.004, -0.002]
-    )  # the pad stays where it is
+    # The pad stays where it is.
+    arm = pf.geometry.rotate(away, 0.2) + np.array([0.004, -0.002])
     if mounted_on == "world":  # half the weight, about the pad, in its axes
         force = pf.geometry.rotate(np.array([0.0, -0.981]), -for_one.angle)
         assert loads[0] == pytest.approx([*force, -0.981 * arm[0]], abs=1e-9)

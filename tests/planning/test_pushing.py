@@ -58,18 +58,18 @@ def test_motion_cone_of_an_ellipsoid_is_the_closed_form():
     matrix = np.eye(2) + np.array([[y * y, -x * y], [-x * y, x * x]]) / c**2
     edges = np.array([[1.0, -MU], [1.0, MU]]) @ matrix
     expected = edges / np.hypot(*edges.T)[:, None]
+    # Rounding.
     np.testing.assert_allclose(
         motion_cone(surface, at, (2.0, 0.0), MU), expected, atol=1e-12
-    )  # rounding
+    )
 
 
 @pytest.mark.parametrize("kind", SURFACES)
 def test_the_edges_of_a_motion_cone_are_in_order_and_wider_than_nothing(kind):
     for y in (-0.03, 0.0, 0.02):
         right, left = motion_cone(SURFACES[kind], (-HALF, y), (1.0, 0.0), MU)
-        assert (
-            right[0] * left[1] - right[1] * left[0] > -1e-9
-        )  # a facet of feet has one velocity for many forces
+        # A facet of feet has one velocity for many forces.
+        assert right[0] * left[1] - right[1] * left[0] > -1e-9
         assert right[0] > 0.0 and left[0] > 0.0
 
 
@@ -95,9 +95,8 @@ def test_the_edges_of_the_friction_cone_vote_on_the_turn(kind, mu):
 @pytest.mark.parametrize("mu", [0.0, MU])
 def test_a_push_through_the_centre_does_not_turn(kind, mu):
     found = push(slider(kind), Pusher(mu), straight((-0.06, 0.0), (0.04, 0.0)))
-    np.testing.assert_allclose(
-        found.end, [0.04 + HALF, 0.0, 0.0], rtol=0.0, atol=1e-6
-    )  # 10 times rtol
+    # 10 times rtol.
+    np.testing.assert_allclose(found.end, [0.04 + HALF, 0.0, 0.0], rtol=0.0, atol=1e-6)
 
 
 # ---------------------------------------------------------------------- along a path
@@ -145,9 +144,8 @@ def test_a_rough_pusher_sticks_and_a_smooth_one_slides():
     smooth = push(slider(), Pusher(0.0), path)
     assert set(smooth.mode) <= {"slide left", "slide right", "free"}
     assert np.abs(smooth.place[-1, 1] - 0.01) > 2e-3
-    np.testing.assert_allclose(
-        smooth.place[1:, 0], -HALF, rtol=0.0, atol=1e-7
-    )  # on the edge all the way
+    # On the edge all the way.
+    np.testing.assert_allclose(smooth.place[1:, 0], -HALF, rtol=0.0, atol=1e-7)
 
 
 def test_a_stuck_pusher_turns_the_slider_as_the_ellipsoid_says():
@@ -173,9 +171,8 @@ def test_order_of_convergence():
         np.abs(push(slider(), Pusher(MU), path, rtol=rtol, samples=2).end - best).max()
         for rtol in (1e-4, 1e-8)
     ]
-    assert (
-        errors[1] < 3e-7 and errors[0] < 3e-3
-    )  # errors follow the tolerance, changes of mode included
+    # Errors follow the tolerance, changes of mode included.
+    assert errors[1] < 3e-7 and errors[0] < 3e-3
 
 
 def test_contact_is_kept_and_never_entered():
@@ -224,9 +221,8 @@ def test_a_face_beside_the_centre_turns_about_its_end():
         Pusher(1.0, 0.02),
         straight((-0.06, 0.034, 0.0), (0.0, 0.034, 0.0)),
     )
-    assert (
-        found.end[2] < -0.2
-    )  # a narrow face at the corner cannot keep the slider straight
+    # A narrow face at the corner cannot keep the slider straight.
+    assert found.end[2] < -0.2
     wide = push(
         slider("exact"), Pusher(1.0, 0.09), straight((-0.06, 0.0, 0.0), (0.0, 0.0, 0.0))
     )
@@ -308,9 +304,8 @@ def test_a_report_of_a_push_is_in_millimetres_and_degrees():
     ],
 )
 def test_a_face_turns_about_its_end_or_about_the_corner_within(width, left, right):
-    path = np.array(
-        [[-HALF, 0.0, 0.0], [0.0, 0.0, 0.0]]
-    )  # flush with edge 3, which leads from corner 3 down to 0
+    # Flush with edge 3, which leads from corner 3 down to 0.
+    path = np.array([[-HALF, 0.0, 0.0], [0.0, 0.0, 0.0]])
     scenery = Scenery(slider(), Pusher(MU, width=width), np.array([0.0, 1.0]), path)
     assert flush_after(scenery, Touch(FACE, 3), 0.0, np.zeros(3), 1) == left
     assert flush_after(scenery, Touch(FACE, 3), 0.0, np.zeros(3), -1) == right
@@ -461,9 +456,8 @@ def test_a_flush_face_that_slides_pushes_along_the_edge_of_its_friction_cone(
 
 
 def test_polygons_with_an_edge_along_an_axis_are_sliders_and_stars_are_not():
-    corners = 0.05 * np.exp(
-        2j * np.pi * (np.arange(5) - 0.5) / 5
-    )  # one edge stands upright on the right
+    # One edge stands upright on the right.
+    corners = 0.05 * np.exp(2j * np.pi * (np.arange(5) - 0.5) / 5)
     corners = np.stack([corners.real, corners.imag], -1)
     assert Slider(SURFACES["exact"], corners).inward[0] == pytest.approx(
         [-1.0, 0.0], abs=1e-12

@@ -156,9 +156,8 @@ def field(displacements: np.ndarray, cells: int = 21):
 def test_a_patch_that_is_pushed_sticks_up_to_breakaway_and_slips_beyond():
     _, (bent, slips) = field([[1e-5, 0.0, 0.0]] * 30)
     way = 1e-5 * np.arange(31)
-    assert bent[:9, 0] == pytest.approx(
-        way[:9] / 1e-4, rel=1e-6
-    )  # elastic: the bristle takes up all of the way
+    # Elastic: the bristle takes up all of the way.
+    assert bent[:9, 0] == pytest.approx(way[:9] / 1e-4, rel=1e-6)
     assert not slips[:9].any()
     assert slips[13:].all()  # 0.13 mm: past the 0.1 mm that the bristles can bend
     assert bent[-1] == pytest.approx(np.ones_like(bent[-1]), rel=1e-3)
@@ -191,9 +190,8 @@ def test_at_first_slips_what_moves(speed):
 
 
 def test_what_stops_does_not_slip():
-    _, (bent, slips) = field(
-        [[1e-5, 0.0, 0.0]] * 30 + [[1e-9, 0.0, 0.0]] * 3
-    )  # creeps by 1e-5 of a full deflection
+    # Creeps by 1e-5 of a full deflection.
+    _, (bent, slips) = field([[1e-5, 0.0, 0.0]] * 30 + [[1e-9, 0.0, 0.0]] * 3)
     assert slips[30].all() and not slips[31:].any()
     assert bent[-1] == pytest.approx(np.ones_like(bent[-1]), rel=1e-3)
 
@@ -361,9 +359,8 @@ def test_the_wrench_is_drawn_with_its_shadow_and_its_tail():
     fx, fy, _ = head = panel.points[30]
     names = [float(run.data[name][150, 0]) for name in ("fx", "fy", "tau")]
     radius = run.scene.contacts[0].model.patch.contact_radius()
-    assert head == pytest.approx(
-        np.array(names) / 2.0 / [1.0, 1.0, radius], rel=2e-3
-    )  # exact radius, of cells here
+    # Exact radius, of cells here.
+    assert head == pytest.approx(np.array(names) / 2.0 / [1.0, 1.0, radius], rel=2e-3)
     assert np.ravel(panel.head.get_data_3d()) == pytest.approx(head)
     assert pytest.approx(panel.points[5:31]) == np.asarray(panel.tail.get_data_3d()).T
     assert (
@@ -663,9 +660,8 @@ def test_frequent_colours_are_kept_and_rare_ones_are_near(tmp_path):
                 - coloured(number).astype(int)
             )
             assert off[:50].max() == 0
-            assert (
-                off.reshape(-1, 3)[2000:2030].mean() < 30.0
-            )  # 22: medians of 256 boxes
+            # 22: medians of 256 boxes.
+            assert off.reshape(-1, 3)[2000:2030].mean() < 30.0
 
 
 def test_an_html_file_plays_by_itself(tmp_path):
@@ -727,9 +723,8 @@ def test_ctrl_c_leaves_what_was_there(tmp_path, kind):
 
     def stop(time: float) -> None:
         calls.append(time)
-        if (
-            len(calls) == 9
-        ):  # the colours are chosen from 6 frames before the first is written
+        # The colours are chosen from 6 frames before the first is written.
+        if len(calls) == 9:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

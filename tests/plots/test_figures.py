@@ -138,9 +138,8 @@ def test_the_poles_close_over_a_cell_in_the_centre_of_pressure():
         surface, np.array([[0.0], [np.pi]]), np.linspace(0.0, 2 * np.pi, 7)[None, :]
     )
     assert (points == points[:, :1]).all()
-    assert (
-        np.abs(points[..., :2]).max() <= 1 / 21 + 1e-12
-    )  # anywhere on the facet of the middle cell, whose weight it is
+    # Anywhere on the facet of the middle cell, whose weight it is.
+    assert np.abs(points[..., :2]).max() <= 1 / 21 + 1e-12
 
 
 def test_samples_are_about_the_origin_of_the_contact_frame():
@@ -171,10 +170,11 @@ def test_the_ellipsoid_beside_the_surface_is_a_sphere_in_equal_limits(monkeypatc
     soft = pf.ContactPatch.disc(
         0.02, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01)
     )
+    # Both at its load.
     assert (
         len(plots.plot_limit_surface(pf.LimitSurfaceCells(soft, normal_force=2.0)).axes)
         == 2
-    )  # both at its load
+    )
     for axes in figure.axes:
         assert (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()) == (
             own.get_xlim(),
@@ -235,9 +235,8 @@ def test_the_surface_to_be_turned_has_the_numbers_of_the_picture(beside):
     assert mesh[7, 11] == pytest.approx(
         wrench / [1.0, 1.0, surface.contact_radius], abs=1e-5
     )
-    assert isinstance(
-        own.customdata[7][11], list
-    )  # an array of three dimensions shows nothing under the pointer
+    # An array of three dimensions shows nothing under the pointer.
+    assert isinstance(own.customdata[7][11], list)
     low, high = figure.layout.scene.zaxis.range
     assert low < mesh.min() and mesh.max() < high
 
@@ -771,10 +770,11 @@ def test_a_body_that_is_tiny_beside_its_path_is_drawn_larger_and_says_so():
     assert np.ptp(plate, axis=0) == pytest.approx(
         times * np.array([150.0, 80.0]), rel=1e-6
     )
+    # 30 km along x, and less along y.
     assert labels(figure.axes[0]) == {
         "x [km]",
         "y [km]",
-    }  # 30 km along x, and less along y
+    }
     assert plots.plot_motion(synthetic.solution()).axes[0].get_title(loc="left") == ""
     assert (
         plots.plot_motion(resting()).axes[0].get_title(loc="left") == "it does not move"

@@ -74,9 +74,8 @@ def test_the_covered_part_of_a_disc_is_that_in_its_polygon(corners):
         )
         (x, y) = random.uniform(-1.0, 1.0, 2)
         radius = random.uniform(0.05, 1.0)
-        disc = shapely.Point(x, y).buffer(
-            radius, quad_segs=2000
-        )  # a polygon: its area is right to 1e-7
+        # A polygon: its area is right to 1e-7.
+        disc = shapely.Point(x, y).buffer(radius, quad_segs=2000)
         part = shapely.intersection(disc, shapely.Polygon(outline))
         share, mx, my = _covered(place_of(outline), corners, x, y, radius)
         assert share == pytest.approx(part.area / disc.area, abs=1e-6)
@@ -209,9 +208,10 @@ def test_no_energy_comes_from_the_edge(velocity):
     for model in (square(9), PADS[-1]):
         data = pf.simulate(slide(model, velocity, 0.5, **place)).data
         energy = 0.1 * (data.vx**2 + data.vy**2) + 2.4e-4 * data.omega**2
+        # What bristles give back.
         assert (
             float(energy.diff("time").max()) < 0.5 * MU * LOAD * LAW.largest_deflection
-        )  # what bristles give back
+        )
 
 
 def test_the_motion_converges_in_few_steps():
@@ -245,9 +245,8 @@ def test_it_is_the_same_in_all_frames_and_for_a_friction_metric_of_ones(patch):
     plain = slide(
         pf.DistributedModel(patch, LAW), (*velocity, 9.0), 0.05, position=place
     )
-    metric = patch.with_friction_metric(
-        np.diag([1.0, 1.0 + 1e-12])
-    )  # of ones it is none
+    # Of ones it is none.
+    metric = patch.with_friction_metric(np.diag([1.0, 1.0 + 1e-12]))
     turned = {
         "position": rotation @ place + 0.3,
         "angle": turn,

@@ -141,9 +141,8 @@ def test_a_map_in_a_file_has_its_top_row_first(tmp_path):
     end = GOOD.index("[contact.law]")
     table = 'shape = "pressure-map"\nfile = "map.csv"\ncell_size = 0.002\n'
     patch = read(tmp_path, GOOD[:start] + table + GOOD[end:]).contacts[0].model.patch
-    assert patch.centre_of_pressure() == pytest.approx(
-        [0.0, 0.0005], abs=1e-18
-    )  # (3 - 1)/4 of 1 mm, upwards
+    # (3 - 1)/4 of 1 mm, upwards.
+    assert patch.centre_of_pressure() == pytest.approx([0.0, 0.0005], abs=1e-18)
 
 
 @pytest.mark.parametrize(
@@ -207,10 +206,11 @@ def test_the_drift_example_is_the_published_experiment():
         ready.t_end,
     )
     patch = scene.contacts[0].model.patch
+    # 0.05 m wide.
     assert (patch.cells, patch.second_moment()) == (
         317,
         pytest.approx(6.25 * 4.5815e-5, rel=1e-6),
-    )  # 0.05 m wide
+    )
 
 
 def test_the_driven_example_has_the_published_velocity():

@@ -139,9 +139,8 @@ def test_a_body_follows_a_pad_that_holds_it_and_turns():
     np.testing.assert_allclose(
         run.data.y, at[1] + way[:, 1] + arm[:, 1], rtol=0.0, atol=1e-4
     )
-    assert (
-        np.abs(run.contact_twist("pad")[:, :2]).max() < 1e-3
-    )  # bristles move, the pad does not slip
+    # Bristles move, the pad does not slip.
+    assert np.abs(run.contact_twist("pad")[:, :2]).max() < 1e-3
 
 
 def test_order_with_something_that_moves():
@@ -236,18 +235,16 @@ def test_nothing_rests_while_something_moves():
 
 def test_what_is_pulled_comes_round_and_what_is_pushed_swings_away():
     small = dataclasses.replace(LAW, mu_c=0.3, mu_s=0.3)
-    pad = pf.DistributedModel(
-        pf.ContactPatch.disc(2e-3, cells=3), small
-    )  # turns nearly freely
+    # Turns nearly freely.
+    pad = pf.DistributedModel(pf.ContactPatch.disc(2e-3, cells=3), small)
     turns = []
     for side in (-0.05, 0.05):
         scene = pushed(
             MODELS["reduced"], pad=pad, normal_force=4.0, position=(side, 0.01)
         )
         turns.append(np.degrees(pf.simulate(scene).data.theta.values))
-    line = np.degrees(
-        np.arctan2(0.01, 0.05)
-    )  # from the line of motion to the centre of mass
+    # From the line of motion to the centre of mass.
+    line = np.degrees(np.arctan2(0.01, 0.05))
     assert turns[0][-1] < -2.0 * line  # pushed: further and further
     assert -line < turns[1][-1] < -0.5 * line  # pulled: towards the line
 

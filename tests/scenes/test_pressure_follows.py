@@ -70,9 +70,8 @@ def reference(twist) -> np.ndarray:
         s = np.sin(angle)
         u = c * vx + s * vy - omega * y
         v = c * vy - s * vx + omega * x
-        pull = (
-            -MU / np.sqrt(u**2 + v**2 + 1e-10) * np.stack([u, v])
-        )  # Coulomb friction, smooth below 1e-5 m/s
+        # Coulomb friction, smooth below 1e-5 m/s.
+        pull = -MU / np.sqrt(u**2 + v**2 + 1e-10) * np.stack([u, v])
         balance = np.stack([np.ones(1600), x + HEIGHT * pull[0], y + HEIGHT * pull[1]])
         press = (
             MASS * GRAVITY * np.linalg.solve(balance @ plane.T, [1.0, 0.0, 0.0]) @ plane
@@ -231,9 +230,8 @@ def test_friction_takes_energy_while_the_pressure_moves(name):
     )
     power = -(np.hstack([data.fx, data.fy, data.tau]) * twist).sum(axis=1)
     taken = np.append(0.0, np.cumsum(0.5e-3 * (power[1:] + power[:-1])))
-    stored = (
-        4.0 * MASS * GRAVITY * MU**2 / (2.0 * LAW.sigma_0)
-    )  # a metric of 2 asks for bristles twice as long
+    # A metric of 2 asks for bristles twice as long.
+    stored = 4.0 * MASS * GRAVITY * MU**2 / (2.0 * LAW.sigma_0)
     assert (np.maximum.accumulate(taken) - taken).max() < stored
     assert taken[-1] > 0.05
 

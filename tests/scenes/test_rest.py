@@ -147,9 +147,8 @@ def test_a_load_that_vanishes_later_is_waited_for():
         )
         assert solution.status == "success"
         assert float(solution.data.vy[-1]) == pytest.approx(-0.1, rel=1e-2)
-        ramp = pf.Signal.sampled(
-            [0.0, 10.0], [G, 0.0], hold="linear"
-        )  # still falling at the end
+        # Still falling at the end.
+        ramp = pf.Signal.sampled([0.0, 10.0], [G, 0.0], hold="linear")
         assert (
             run(pf.DistributedModel(PATCH, each), level(), ramp, 0.2).status
             == "success"

@@ -153,9 +153,8 @@ def test_breaks_are_those_of_all_signals_and_rounding_makes_no_new_ones():
     force = Signal.sampled(np.cumsum(np.full(9, 0.1)), np.outer(steps, [1.0, 0.0, 0.0]))
     assert (load.times != force.times).any()
     scene = a_scene(contacts=[Contact(stand_in(), load)], force=force)
-    assert scene.breaks() == pytest.approx(
-        [0.0, *(steps[1:] * 0.1), 1.0], abs=1e-12
-    )  # SAME_TIME
+    # SAME_TIME.
+    assert scene.breaks() == pytest.approx([0.0, *(steps[1:] * 0.1), 1.0], abs=1e-12)
     assert scene.breaks(0.45) == pytest.approx([0.0, 0.2, 0.3, 0.4, 0.45], abs=1e-12)
     assert a_scene().breaks().tolist() == [0.0, 1.0]
     for signal in (load, force):
@@ -171,9 +170,8 @@ def test_in_hand_is_the_published_experiment():
     body = scene.body
     (fingers,) = scene.contacts
     assert body.mass == 0.2
-    assert body.inertia == pytest.approx(
-        4.816667e-4, rel=1e-6
-    )  # printed with seven digits
+    # Printed with seven digits.
+    assert body.inertia == pytest.approx(4.816667e-4, rel=1e-6)
     assert (body.position, body.velocity, body.gravity) == (
         (0.002, 0.0),
         (0.0, 0.0, 0.0),
@@ -196,9 +194,8 @@ def test_in_hand_is_the_published_experiment():
     t = np.arange(200) * 0.01
     expected = 1.73 + 0.91 * np.sin(4 * np.pi * t)
     assert np.abs(fingers.normal_force(t) - expected).max() < ROUNDING
-    assert (
-        np.abs(fingers.normal_force(t + 0.0099) - expected).max() < ROUNDING
-    )  # held to the end of each sample
+    # Held to the end of each sample.
+    assert np.abs(fingers.normal_force(t + 0.0099) - expected).max() < ROUNDING
 
 
 def test_in_hand_takes_its_options():
@@ -330,9 +327,8 @@ def test_driven_puts_the_named_point_where_the_velocity_is():
     scene = driven(stand_in(patch))
     assert scene.velocity == published_velocity()
     assert scene.contacts[0].mounted_on == "body"
-    assert scene.contacts[0].position == pytest.approx(
-        (0.0, -3.174603e-3), abs=5e-10
-    )  # printed with seven digits
+    # Printed with seven digits.
+    assert scene.contacts[0].position == pytest.approx((0.0, -3.174603e-3), abs=5e-10)
     assert driven(stand_in(patch), at="origin").contacts[0].position == (0.0, 0.0)
     assert driven(stand_in(patch), twist=(0, 0, 1)).velocity == Signal.constant(
         [0.0, 0.0, 1.0]

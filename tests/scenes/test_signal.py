@@ -89,22 +89,19 @@ def test_samples_that_change_nothing_are_no_breaks():
 @settings(deadline=None, max_examples=50)
 def test_pieces_give_the_signal_back(values, hold, extra, start):
     signal = Signal.sampled(start + 0.1 * np.arange(len(values)), values, hold)
-    assert (
-        signal(signal.times).tolist() == signal.values.tolist()
-    )  # exact at the samples, held or linear
+    # Exact at the samples, held or linear.
+    assert signal(signal.times).tolist() == signal.values.tolist()
     own = signal.breaks
-    extra = [
-        t for t in extra if all(abs(t - other) > 1e-6 for other in own)
-    ]  # no pieces too short to tell apart
+    # No pieces too short to tell apart.
+    extra = [t for t in extra if all(abs(t - other) > 1e-6 for other in own)]
     breaks = np.unique(np.concatenate([own, extra, [-2.0, 3.0]]))
     first, slope = signal.pieces(breaks)
     assert first.shape == slope.shape == (len(breaks) - 1,)
     if hold == "previous":
         assert (slope == 0.0).all()
         assert (first == signal(breaks[:-1])).all()
-    scale = (
-        np.abs(values).max() + np.abs(slope).max() * 6.0
-    )  # rounding of slope * (up to 6 s)
+    # Rounding of slope * (up to 6 s).
+    scale = np.abs(values).max() + np.abs(slope).max() * 6.0
     middle = 0.5 * (breaks[1:] + breaks[:-1])
     for t in (breaks[:-1], middle):
         assert (
@@ -171,9 +168,8 @@ def test_signals_are_immutable_and_compare_by_content():
     assert signal == same
     assert hash(signal) == hash(same)
     assert signal != Signal.sampled([0, 1], [1, 2], hold="linear")
-    assert hash(Signal.constant(0.0)) == hash(
-        Signal.constant(-0.0)
-    )  # equal, so equal hashes
+    # Equal, so equal hashes.
+    assert hash(Signal.constant(0.0)) == hash(Signal.constant(-0.0))
     assert signal.breaks.tolist() == [1.0]
     with pytest.raises(ValueError, match="read-only"):
         signal.breaks[0] = 3.0

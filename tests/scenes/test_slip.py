@@ -55,9 +55,8 @@ def test_each_push_beyond_friction_is_one_slip_and_one_below_is_none():
     events = pf.simulate(scene, bristles="all").slip_events()
     assert len(events) == 2
     for event, begin, end in zip(events, (0.02, 0.07), (0.05, 0.1), strict=True):
-        assert (
-            begin < event.onset < begin + 0.005
-        )  # after a few milliseconds the bristles are full
+        # After a few milliseconds the bristles are full.
+        assert begin < event.onset < begin + 0.005
         # 0.2 mu g for 30 ms less those, and then stopped by 0.7 mu g
         assert end < event.end < end + 0.03 * 0.2 / 0.7 + 1e-3
     shaken = dataclasses.replace(

@@ -199,9 +199,8 @@ def test_springs_in_files_come_back_to_the_last_bit(tmp_path):
         again = pf.Scene.from_file(tmp_path / f"a.{end}")
         assert again == scene(1.0) and again.digest() == scene(1.0).digest()
     assert scene(1.0, springs=()).digest() != scene(1.0).digest()
-    assert (
-        "spring" not in scene(1.0, springs=()).to_dict()
-    )  # digests of scenes without springs stay
+    # Digests of scenes without springs stay.
+    assert "spring" not in scene(1.0, springs=()).to_dict()
 
 
 def test_a_spring_is_one_table_in_a_file():
@@ -266,9 +265,8 @@ def test_a_body_in_equilibrium_with_its_springs_stays_in_place():
         sin * friction[0] + cos * friction[1],
         friction[2],
     )
-    np.testing.assert_allclose(
-        turned, -pull, rtol=1e-6
-    )  # contact frame at the centre of mass, turned with the body
+    # Contact frame at the centre of mass, turned with the body.
+    np.testing.assert_allclose(turned, -pull, rtol=1e-6)
 
 
 def test_a_body_does_not_rest_while_an_anchor_still_moves():

@@ -45,9 +45,8 @@ def test_the_part_turns_as_a_pendulum_with_the_friction_of_the_pads():
         cos = math.cos(angle)
         sin = math.sin(angle)
         left = 1.0
-        for _ in range(
-            3
-        ):  # what the pads hold of the weight and of its swing they lack in torque: an ellipse, nearly
+        # What the pads hold of the weight and of its swing they lack in torque: an ellipse, nearly.
+        for _ in range(3):
             rise = (left * held_torque(load) - MASS * G * ARM * cos) / about_pin
             along = spin**2 * ARM + G * -sin
             across = rise * ARM + G * cos
@@ -68,12 +67,10 @@ def test_the_part_turns_as_a_pendulum_with_the_friction_of_the_pads():
     solution = pf.simulate(scene)
     angle = float(solution.data.theta[-1])
     stays = solution.data.theta.sel(time=0.2, method="nearest")
-    assert (
-        abs(stays) < 1e-5 and angle < -1.0
-    )  # bristles of 10 um at a radius of 6 mm, and the tolerance
-    assert angle == pytest.approx(
-        expected, rel=0.02
-    )  # they slide by 1 mm, which a pin does not
+    # Bristles of 10 um at a radius of 6 mm, and the tolerance.
+    assert abs(stays) < 1e-5 and angle < -1.0
+    # They slide by 1 mm, which a pin does not.
+    assert angle == pytest.approx(expected, rel=0.02)
     slide = np.hypot(
         solution.data.x[-1] - ARM * math.cos(angle),
         solution.data.y[-1] - ARM * math.sin(angle),
@@ -142,9 +139,8 @@ def test_a_foot_walks_sideways_on_heel_and_forefoot():
     mirrored = pf.simulate(
         foot(model, torque=pf.Signal.sampled(turned.times, -turned.values[:, 2]))
     ).data
-    assert mirrored.y[-1] == pytest.approx(
-        -y[-1], rel=1e-3
-    )  # of the solver's tolerance
+    # Of the solver's tolerance.
+    assert mirrored.y[-1] == pytest.approx(-y[-1], rel=1e-3)
     assert mirrored.x[-1] == pytest.approx(x[-1], rel=1e-3)
 
 
@@ -242,12 +238,10 @@ def test_discs_and_rings_stop_sliding_and_turning_together(patch):
     final = terminal_ratio(gyration, inner)
     for start in (0.9, 1.0, 1.1):
         speed, ratio = ratios(patch, gyration, start * final, pf.DistributedModel)
-        late = ratio[speed > 0.02][
-            -1
-        ]  # LuGre is Coulomb down to there: bristles of 2 um
-        assert abs(late / final - 1.0) < 0.006 + 0.12 * abs(
-            start - 1.0
-        )  # 31 cells across stand for a disc
+        # LuGre is Coulomb down to there: bristles of 2 um.
+        late = ratio[speed > 0.02][-1]
+        # 31 cells across stand for a disc.
+        assert abs(late / final - 1.0) < 0.006 + 0.12 * abs(start - 1.0)
 
 
 @pytest.mark.parametrize("gyration", [0.4, 0.6, 0.9])
@@ -296,16 +290,13 @@ def test_a_stone_goes_as_far_and_turns_as_much_as_coulombs_equations_say():
     path, turn = ran.y[2:, -1]
     data = solution.data
     assert solution.status == "at rest"
-    assert float(data.x[-1]) == pytest.approx(
-        path, rel=2e-4
-    )  # the first micrometres, and a band of 6 mm
+    # The first micrometres, and a band of 6 mm.
+    assert float(data.x[-1]) == pytest.approx(path, rel=2e-4)
     assert float(data.theta[-1]) == pytest.approx(turn, rel=5e-3)
-    assert (
-        abs(float(data.y[-1])) < 2e-4 * path
-    )  # it does not curl: what is left is the lag of bristles that turn
-    assert (
-        float(data.vx[-3] / data.omega[-3]) < 0.5 * radius
-    )  # a heavy rim: at the end it turns on the spot
+    # It does not curl: what is left is the lag of bristles that turn.
+    assert abs(float(data.y[-1])) < 2e-4 * path
+    # A heavy rim: at the end it turns on the spot.
+    assert float(data.vx[-3] / data.omega[-3]) < 0.5 * radius
 
 
 # ---------------------------------------------------------------------- command line

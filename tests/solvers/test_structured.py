@@ -282,9 +282,8 @@ def test_samples_at_a_jump_are_left_limits():
     data = pf.simulate(scene, save_every=0.05).data
     jump = data.sel(time=0.1).squeeze()
     end = data.isel(time=-1).squeeze()
-    sliding = (
-        ELASTIC.mu_c + ELASTIC.sigma_2 * 0.01
-    )  # at ten times v_s nothing is left of mu_s
+    # At ten times v_s nothing is left of mu_s.
+    sliding = ELASTIC.mu_c + ELASTIC.sigma_2 * 0.01
     assert float(jump.normal_force) == 1.0
     assert float(jump.fx) == pytest.approx(-sliding, rel=1e-5)
     assert float(jump.fy) == pytest.approx(0.0, abs=1e-6)
@@ -347,13 +346,11 @@ def test_spinning_disc_stops_where_coulomb_says():
 
 def test_statistics_count():
     statistics = pf.simulate(smooth_scene()).statistics
-    assert (
-        statistics.jacobians == statistics.steps
-    )  # one linearisation for each accepted step
+    # One linearisation for each accepted step.
+    assert statistics.jacobians == statistics.steps
     trials = statistics.steps + statistics.rejections
-    assert (
-        statistics.evaluations >= statistics.jacobians + 5 * trials
-    )  # and what looking into steps takes
+    # And what looking into steps takes.
+    assert statistics.evaluations >= statistics.jacobians + 5 * trials
     assert statistics.wall_time > 0.0
 
 
@@ -481,9 +478,8 @@ def test_a_contact_that_loses_its_load_starts_again_from_rest(kind):
         save_every=0.05,
     ).data
     fx = data.fx.values[:, 0]
-    assert fx[3] == pytest.approx(
-        -1.0, abs=0.05
-    )  # at 0.15 s; mu_c, while the bristles relaxed a little
+    # At 0.15 s; mu_c, while the bristles relaxed a little.
+    assert fx[3] == pytest.approx(-1.0, abs=0.05)
     assert fx[5] == fx[-1] == 0.0
 
 

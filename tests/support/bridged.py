@@ -23,9 +23,8 @@ from tests.support.coupling_problems import random_bodies, random_run
 from tests.support.recorded import NUMBER, array
 from tests.support.walks import walk
 
-os.environ.setdefault(
-    "JAX_DISABLE_MOST_OPTIMIZATIONS", "1"
-)  # most of the time goes into compilation
+# Most of the time goes into compilation.
+os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
 
 LAW = pf.LuGre(
     mu_c=0.8, mu_s=1.1, v_s=2e-3, sigma_1=300.0, sigma_2=0.3, elasto_plastic=0.7
@@ -381,9 +380,8 @@ def drake() -> dict[str, Any]:
             )
             motion = run.plant.GetPositionsAndVelocities(run.context)
             report = run.friction.GetReport(run.own)
-            numbers = np.concatenate(
-                [motion, *(each.Eval(run.own) for each in ports)]
-            )  # twists at rest are rounding
+            # Twists at rest are rounding.
+            numbers = np.concatenate([motion, *(each.Eval(run.own) for each in ports)])
             told.append([numbers, run.friction.GetBristles(run.own), report.converged])
         found[name] = told
     return found

@@ -176,9 +176,10 @@ def samples(model: Any, kind: type, count: int, seed: int = 0) -> list[np.ndarra
         1.0,
         1e-3,
     )
+    # Off the bound of slip.
     state[1::2] *= rng.uniform(
         0.2, 1.1, (len(state[1::2]), *[1] * len(model.state_shape))
-    )  # off the bound of slip
+    )
     return [
         np.ascontiguousarray(each.astype(kind).astype(float))
         for each in (state, twist, load, dt)

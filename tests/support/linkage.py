@@ -40,6 +40,7 @@ def linkage() -> MujocoScene:
     body = f"""<option><flag multiccd="disable"/></option><worldbody>{fingers}
     <body name="block" pos="0 0 0.5"><freejoint/>{block}</body></worldbody>
     <equality>{loops}</equality><actuator>{motors}</actuator>"""
+    # Gravity begins after the settling time, and the fingers yield to it.
     return MujocoScene(
         body,
         held.mu,
@@ -48,4 +49,4 @@ def linkage() -> MujocoScene:
         held.model,
         lambda t: (TORQUE, TORQUE),
         time=10.0,
-    )  # gravity begins after the settling time, and the fingers yield to it
+    )

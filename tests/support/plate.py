@@ -50,9 +50,8 @@ class Plate(NamedTuple):
             u = c * twist[0] + s * twist[1] - twist[2] * y
             v = c * twist[1] - s * twist[0] + twist[2] * x
             speed = np.sqrt(u**2 + v**2 + _SMOOTH**2)
-            for _ in range(
-                2
-            ):  # friction h below the centre of mass moves the pressure by -h F/(m g)
+            # Friction h below the centre of mass moves the pressure by -h F/(m g).
+            for _ in range(2):
                 at = (self.centre_of_mass, 0.0) - force * self.height / load
                 pressed = (
                     -self.mu

@@ -240,9 +240,8 @@ def shared(one: Any, *others: Any) -> Any:
             )
         if "tolerance" in one:
             return one
-        timed = (
-            "baseline_value" in one
-        )  # a line of a benchmark, whose numbers may be times
+        # A line of a benchmark, whose numbers may be times.
+        timed = "baseline_value" in one
         each = {
             name: (value, *(other[name] for other in others))
             for name, value in one.items()
@@ -269,9 +268,8 @@ def shared(one: Any, *others: Any) -> Any:
             if within < MOST * abs(one)
             else None
         )
-    return (
-        one if all(one == other for other in others) else None
-    )  # such as a number of steps
+    # Such as a number of steps.
+    return one if all(one == other for other in others) else None
 
 
 def _same(one: float, *others: float) -> float | None:

@@ -90,9 +90,8 @@ def measured() -> dict[str, Any]:
             for side, count in zip(sides, few, strict=True)
             for case in _spread(side, count)
         ]
-    with changed(
-        contactnets, STEPS=2
-    ):  # further ones take other ways on other processors
+    # Further ones take other ways on other processors.
+    with changed(contactnets, STEPS=2):
         benchmark.run()
     tasks = benchmark.results
     found = to_dict(benchmark)

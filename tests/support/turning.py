@@ -92,9 +92,8 @@ def turning(support: str, w: float, dt: float, integrator: str = "Euler") -> Tur
     mu = 0.3 if support in ("surface", "table") else 1.0
     x = 0.5 if grip else min(0.25, 0.7 * mu * G / w**2)
     middle = np.zeros(2)
-    if (
-        support == "car"
-    ):  # on a circle of its own, about the axis from which the box is that far
+    # On a circle of its own, about the axis from which the box is that far.
+    if support == "car":
         middle = np.array([0.0, -0.6 * x])
         x = 0.8 * x
     body = {"surface": SURFACE, "table": TABLE, "car": CAR}.get(support, "") + ON_TOP

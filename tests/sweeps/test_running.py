@@ -127,9 +127,8 @@ def test_runs_of_different_length_share_their_instants():
     np.testing.assert_allclose(data.time, 0.01 * np.arange(21), atol=1e-12)
     fast = data.sel(speed=1.0, t_end=0.05)
     slow = data.sel(speed=0.1, t_end=0.2)
-    assert (
-        fast.status == "success" and fast.x.notnull().sum() == 6
-    )  # NaN where it has no instants
+    # NaN where it has no instants.
+    assert fast.status == "success" and fast.x.notnull().sum() == 6
     alone = pf.simulate(slide(0.1, 0.2)).data
     assert slow.status == "at rest" and len(alone.time) < 21
     # what is at rest stays there: the end of every run is in the last instant that it was to record
@@ -621,9 +620,8 @@ def test_batches_become_smaller_towards_the_end():
             executor=pool,
             measure=end,
         )
-    assert (
-        pool.batches[-1] <= 2 < max(pool.batches)
-    )  # two, if two are left: that hangs on how long the others took
+    # Two, if two are left: that hangs on how long the others took.
+    assert pool.batches[-1] <= 2 < max(pool.batches)
 
 
 class Silent(concurrent.futures.Executor):
@@ -647,9 +645,8 @@ class Silent(concurrent.futures.Executor):
             count = len(self.held)
             time.sleep(0.3)
         self.before = count
-        while (
-            not self.ended
-        ):  # what a slow machine leaves of a batch is handed out again
+        # What a slow machine leaves of a batch is handed out again.
+        while not self.ended:
             if self.held:
                 future, function, batch = self.held.pop(0)
                 future.set_result(function(batch))

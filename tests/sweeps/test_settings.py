@@ -54,9 +54,8 @@ def test_values_of_a_file_are_changed_before_it_is_read(file):
     make = Settable(file)
     plain = make()
     heavy = make(**{"body.mass": 0.4})
-    assert (
-        heavy.body.mass == 0.4 and heavy.body.inertia == 2.0 * plain.body.inertia
-    )  # by its size
+    # By its size.
+    assert heavy.body.mass == 0.4 and heavy.body.inertia == 2.0 * plain.body.inertia
     changed = make(
         **{
             "fingers.law.mu_c": 0.5,
@@ -154,9 +153,8 @@ def test_run_takes_values_of_files_and_of_ready_scenes(file):
     assert list(scenes) == ["distributed", "reduced"]
     for scene in scenes.values():
         plain = pf.scenes.in_hand(scene.contacts[0].model, mass=0.4)
-        assert (
-            scene.body == plain.body
-        )  # inertia too, which `body.mass` alone would leave
+        # Inertia too, which `body.mass` alone would leave.
+        assert scene.body == plain.body
         assert scene.contacts[0].count == 1 and scene.contacts[0].model.law.mu_c == 0.5
     by_label = build_scenes(file, [], settings=one_each(["fingers.model=distributed"]))
     assert list(by_label) == ["distributed"]
@@ -230,9 +228,8 @@ def test_the_command_sweeps_and_goes_on(file, capsys, monkeypatch):
     assert [row[:2] for row in rows] == values  # a row for each run
     drop = 1e6 * data.y.isel(time=-1).values.ravel()
     assert "y [µm]" in first.out
-    np.testing.assert_allclose(
-        [float(row[6]) for row in rows], drop, rtol=0.006
-    )  # three digits
+    # Three digits.
+    np.testing.assert_allclose([float(row[6]) for row in rows], drop, rtol=0.006)
     monkeypatch.setattr("planarfriction.cli.sweep.MOST_ROWS", 5)
     assert main(arguments) == 0
     ranges = capsys.readouterr().out

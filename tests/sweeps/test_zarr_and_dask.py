@@ -78,9 +78,8 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path):
             os.kill(killed[0], signal.SIGKILL)
 
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore"
-        )  # dask's own, about sockets and processes that end
+        # Dask's own, about sockets and processes that end.
+        warnings.simplefilter("ignore")
         with (
             distributed.LocalCluster(
                 n_workers=2, threads_per_worker=1, dashboard_address=None

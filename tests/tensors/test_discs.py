@@ -170,14 +170,12 @@ def test_slopes_are_those_of_numpy_and_finite_everywhere(front, kind):
     )
     found = [front.plain(each) for each in (*new, *wrench)]
     loaded = inputs[2] > 0.0
-    found[0] = np.einsum(
-        "tanbn->tabn", found[0]
-    )  # a bristle depends on its own start alone
+    # A bristle depends on its own start alone.
+    found[0] = np.einsum("tanbn->tabn", found[0])
     for got, want in zip(found, model.step_jacobians(*inputs, DT), strict=True):
         assert np.isfinite(got).all() and np.isfinite(want).all()
-        assert_close(
-            got[loaded], want[loaded], 1e-11
-        )  # rounding, through steep slopes of the slip fraction
+        # Rounding, through steep slopes of the slip fraction.
+        assert_close(got[loaded], want[loaded], 1e-11)
 
 
 @pytest.mark.parametrize("kind", ["discs", "turned discs"])

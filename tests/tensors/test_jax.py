@@ -125,9 +125,8 @@ def test_steady_sliding_depends_on_mu_c_and_the_load_alone():
         model.parameters, jnp.array([speed, 0.0, 0.0]), load
     )
     by_parameter = slopes[0]._asdict()
-    assert by_parameter.pop("mu_c") == pytest.approx(
-        -load, rel=1e-9
-    )  # rounding and what is left of the transient
+    # Rounding and what is left of the transient.
+    assert by_parameter.pop("mu_c") == pytest.approx(-load, rel=1e-9)
     assert by_parameter.pop("sigma_2") == pytest.approx(-speed * load, rel=1e-9)
     assert slopes[1][0] == pytest.approx(-0.2 * load, rel=1e-9)
     assert slopes[2] == pytest.approx(-(1.0 + 0.2 * speed), rel=1e-9)
@@ -299,10 +298,11 @@ def hard(model) -> tuple[np.ndarray, np.ndarray]:
             for name in ("centre_x", "centre_y", "contact_radius")
         )
     edges = np.array([*EDGES, *NEAR_THE_AXIS]) * (1.0, 1.0, 1.0 / r)
+    # These twists are scaled ones about the centre of pressure.
     edges[:, :2] += edges[:, 2:] * (
         y,
         -x,
-    )  # these twists are scaled ones about the centre of pressure
+    )
     slide = np.tile([0.05, 0.0, 0.0], (20, 1))
     motion = np.concatenate(
         [1e-3 * edges, np.zeros((3, 3)), 1e-200 * edges, 5e-4 * edges, slide]
@@ -322,9 +322,8 @@ def test_gradients_are_finite_at_kinks(kind, law):
         run = pj.rollout(model, state, motion, loads, 1e-4)
         return run.wrenches.sum() + run.state.sum()
 
-    full = (
-        jnp.zeros_like(model.rest()).at[0].set(1e-6)
-    )  # largest deflection of a slide far above v_s
+    # Largest deflection of a slide far above v_s.
+    full = jnp.zeros_like(model.rest()).at[0].set(1e-6)
     gradient = jax.jit(jax.grad(loss, argnums=(0, 1, 2, 3)))
     for state in (model.rest(), full):
         for part in jax.tree.leaves(gradient(model, state, *hard(model))):
@@ -561,9 +560,8 @@ def test_single_precision_stays_single(kind):
     for part in jax.tree.leaves(slopes):
         assert part.dtype == jnp.float32 and np.isfinite(part).all()
     expected = pj.rollout(model, None, sway(50, 1e-4), 1.0, 1e-4).wrenches.sum()
-    assert float(run) == pytest.approx(
-        float(expected), rel=1e-3
-    )  # 1e-7 in z is 0.1 of rounding times sigma_0
+    # 1e-7 in z is 0.1 of rounding times sigma_0.
+    assert float(run) == pytest.approx(float(expected), rel=1e-3)
 
 
 def test_wrong_input_is_named():

@@ -50,9 +50,8 @@ def test_steps_and_derivatives_are_those_of_numpy(kind):
     load = np.array([1.0, 2.0, 1.5])
     state = 1e-7 * rng.normal(size=(3, *model.state_shape))
     twist = rng.normal(size=(3, 3)) * (0.01, 0.01, 0.1)
-    moments = load[:, None] * np.array(
-        [(0.003, -0.005), (0.02, 0.03), (-0.1, 0.0)]
-    )  # kern, beyond it, beyond the edge
+    # Kern, beyond it, beyond the edge.
+    moments = load[:, None] * np.array([(0.003, -0.005), (0.02, 0.03), (-0.1, 0.0)])
     new, wrench = model.step(state, twist, load, 1e-3, moments=moments)
     found, pulled = ours.step(jnp.asarray(state), twist, load, 1e-3, moments=moments)
     np.testing.assert_allclose(found, new, rtol=1e-7, atol=1e-15)

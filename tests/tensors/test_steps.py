@@ -16,10 +16,9 @@ from planarfriction.tensors.steps import LAW, Contact
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAW_OF_TEST = pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7, elasto_plastic=0.7)
+# Which older NumPy does not call so.
 NUMPY = Namespace(
-    SimpleNamespace(
-        **{**vars(np), "pow": np.power}
-    ),  # which older NumPy does not call so
+    SimpleNamespace(**{**vars(np), "pow": np.power}),
     broadcast_arrays=np.broadcast_arrays,
     stop_gradient=lambda x: x,
     integers=lambda x: x.astype(int),

@@ -180,9 +180,8 @@ def test_a_patch_that_depends_on_the_load_keeps_its_surface_s_shape():
 @every_surface
 def test_float32_is_as_close_as_its_digits(surface):
     state, twist, load = samples(40, np.random.default_rng(5))
-    twist[9:] *= 0.1 / np.linalg.norm(
-        twist[9:], axis=1, keepdims=True
-    )  # off the steep part of the Stribeck curve
+    # Off the steep part of the Stribeck curve.
+    twist[9:] *= 0.1 / np.linalg.norm(twist[9:], axis=1, keepdims=True)
     single = reduced(surface=surface, dtype=torch.float32)
     z, wrench = single.step(*(tensor(a).float() for a in (state, twist, load)), 1e-4)
     assert z.dtype == wrench.dtype == torch.float32

@@ -158,9 +158,8 @@ def test_a_single_precision_model_is_rolled_out_with_its_own_numbers():
     model = module("reduced", dtype=torch.float32)
     model.load_state_dict(module("reduced", OTHER).state_dict())
     wanted = wrenches(module("reduced", OTHER), "adjoint")
-    torch.testing.assert_close(
-        wrenches(model, "adjoint"), wanted, rtol=1e-4, atol=1e-5
-    )  # a law and cells of 7 digits
+    # A law and cells of 7 digits.
+    torch.testing.assert_close(wrenches(model, "adjoint"), wanted, rtol=1e-4, atol=1e-5)
 
 
 @every_model
@@ -219,10 +218,11 @@ def test_single_precision_is_as_close_as_its_digits_however_stiff(kind):
     steps = [single.step(single.rest(), twist, 1.0, 1e-3)[1] for twist in fast]
     assert found.dtype == steps[0].dtype == torch.float32
     lever = torch.tensor([1.0, 1.0, double.lever.item()], dtype=torch.float64)
+    # A step of a millisecond forgets where it began.
     for each in (
         found,
         torch.stack(steps),
-    ):  # a step of a millisecond forgets where it began
+    ):
         assert (
             (each.double() - exact) / lever
         ).abs().max() < 2e-6  # parameters and results have 7 digits

@@ -70,9 +70,8 @@ def test_forward_mode_is_reverse_mode(kind):
     for there, back, eager in zip(forwards, backwards, recorded, strict=True):
         scale = back.abs().max().item()
         torch.testing.assert_close(there, back, rtol=1e-11, atol=1e-13 * scale)
-        torch.testing.assert_close(
-            there, eager, rtol=1e-8, atol=1e-9 * scale
-        )  # sums in another order, stiff steps
+        # Sums in another order, stiff steps.
+        torch.testing.assert_close(there, eager, rtol=1e-8, atol=1e-9 * scale)
 
 
 def test_forward_mode_goes_through_vmap_and_dual_numbers():

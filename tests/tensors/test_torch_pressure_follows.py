@@ -23,9 +23,8 @@ KINDS = {
     "published": (PATCH, "ReducedModelPublished", {}),
 }
 LOAD = np.array([1.0, 2.0, 1.5])
-MOMENTS = LOAD[:, None] * np.array(
-    [(0.003, -0.005), (0.02, 0.03), (-0.1, 0.0)]
-)  # kern, beyond it, beyond the edge
+# Kern, beyond it, beyond the edge.
+MOMENTS = LOAD[:, None] * np.array([(0.003, -0.005), (0.02, 0.03), (-0.1, 0.0)])
 
 
 def drawn(model):
@@ -69,9 +68,10 @@ def test_steps_rates_and_wrenches_are_those_of_numpy(kind):
         np.testing.assert_allclose(
             found.detach()[0], expected[0], rtol=1e-10, atol=1e-10 * scale
         )
+        # An edge: see SOFTNESS.
         np.testing.assert_allclose(
             found.detach(), expected, rtol=1e-7, atol=1e-7 * scale
-        )  # an edge: see SOFTNESS
+        )
 
 
 @pytest.mark.parametrize("kind", KINDS)

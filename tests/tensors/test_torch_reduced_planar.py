@@ -105,9 +105,8 @@ def test_the_interface_is_the_one_that_scripts_know():
     model = ReducedPlanarLuGre()
     for name, value in defaults.items():
         if name != "surface":
-            assert getattr(model, name).item() == pytest.approx(
-                value, rel=1e-6
-            )  # float32, PyTorch's default
+            # Float32, PyTorch's default.
+            assert getattr(model, name).item() == pytest.approx(value, rel=1e-6)
     assert len(list(model.parameters())) == 8
 
 
@@ -217,9 +216,8 @@ def test_the_steady_torque_of_a_spin_is_bounded(surface, radius):
     x, y = (0.0, 0.0) if surface is None else LOPSIDED.centre_of_pressure()
     for speed in (1e-4, 2e-3, 1.0):  # of the rim, r omega
         omega = speed / radius
-        spin = tensor([omega * y, -omega * x, omega]).expand(
-            60, 3
-        )  # about the centre of pressure
+        # About the centre of pressure.
+        spin = tensor([omega * y, -omega * x, omega]).expand(60, 3)
         fx, fy, tau = simulate(model, spin, f_n, 1.0)[-1].tolist()
         torque = tau - (x * fy - y * fx)
         assert abs(torque) <= 1.2 * f_n * radius * (1 + 1e-9)
@@ -235,9 +233,8 @@ def test_a_surface_keeps_its_size_unless_a_radius_is_given():
     surface = SURFACES["cells"]
     r = float(LOPSIDED.contact_radius())
     assert build(surface=surface).radius.item() == pytest.approx(r, rel=1e-12)
-    assert (
-        build(surface=surface, radius=0.05).radius.item() == 0.05
-    )  # as large as the default, but given
+    # As large as the default, but given.
+    assert build(surface=surface, radius=0.05).radius.item() == 0.05
     assert build().radius.item() == 0.05
 
 

@@ -274,9 +274,8 @@ def test_the_tracking_loss_is_a_mean_over_the_samples_with_load():
     assert tracking_loss(model, None, v, load, DT, off).item() == pytest.approx(
         0.25, rel=1e-12
     )
-    assert model.lever == pytest.approx(
-        PATCH.contact_radius(), rel=0.05
-    )  # the published table smooths it
+    # The published table smooths it.
+    assert model.lever == pytest.approx(PATCH.contact_radius(), rel=0.05)
 
 
 def test_second_derivatives_need_the_eager_roll_out():

@@ -208,9 +208,8 @@ def test_shapes():
         expected(2, models[1], rough),
     ]
     assert found() == pytest.approx(np.array(first), rel=1e-9)
-    friction.which.assign(
-        np.array([0, 1, 1], dtype=np.int32)
-    )  # the laws stay with the contacts
+    # The laws stay with the contacts.
+    friction.which.assign(np.array([0, 1, 1], dtype=np.int32))
     then = [
         expected(0, models[0], rough),
         expected(1, models[1], LAW),

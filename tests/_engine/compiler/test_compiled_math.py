@@ -81,9 +81,8 @@ def test_expm1(random):
     x = np.concatenate(
         [random.uniform(-1.0, 1.0, 100_000), tiny, -tiny, [0.4, 700.0, -800.0]]
     )
-    assert (
-        np.abs(expm1(x) / np.expm1(x) - 1.0).max() < 6e-16 + NUMPY
-    )  # the stated error
+    # The stated error.
+    assert np.abs(expm1(x) / np.expm1(x) - 1.0).max() < 6e-16 + NUMPY
     assert expm1([0.0])[0] == 0.0 and expm1([-math.inf])[0] == -1.0
 
 
@@ -101,9 +100,8 @@ def test_log_at_special_values():
     assert log(powers) == pytest.approx(
         np.log(2.0) * np.arange(-1022, 1024), rel=EPSILON
     )
-    assert log([0.0])[0] == pytest.approx(
-        -709.0, abs=1.0
-    )  # stated: about, not minus infinity
+    # Stated: about, not minus infinity.
+    assert log([0.0])[0] == pytest.approx(-709.0, abs=1.0)
 
 
 def test_sin_and_cos(random):
@@ -113,9 +111,8 @@ def test_sin_and_cos(random):
             [0.0, math.pi / 2, -math.pi / 2],
         ]
     )
-    assert (
-        np.abs(sin(x) - np.sin(x)).max() < 4e-16 + NUMPY / 2
-    )  # the stated absolute error; NumPy's, of values below 1
+    # The stated absolute error; NumPy's, of values below 1.
+    assert np.abs(sin(x) - np.sin(x)).max() < 4e-16 + NUMPY / 2
     assert np.abs(cos(x) - np.cos(x)).max() < 4e-16 + NUMPY / 2
     assert sin([0.0])[0] == 0.0 and cos([0.0])[0] == 1.0
 
@@ -125,13 +122,11 @@ def test_atan2(random):
     length = 10.0 ** random.uniform(-12, 3, angle.size)
     y = length * np.sin(angle)
     x = length * np.cos(angle)
-    assert (
-        np.abs(atan2(y, x) - np.arctan2(y, x)).max() < 1e-15 + 2 * NUMPY
-    )  # the stated error; angles reach pi
+    # The stated error; angles reach pi.
+    assert np.abs(atan2(y, x) - np.arctan2(y, x)).max() < 1e-15 + 2 * NUMPY
     small = 10.0 ** random.uniform(-300, -3, 1000)
-    assert atan2(small, 1.0) == pytest.approx(
-        np.arctan2(small, 1.0), rel=EPSILON
-    )  # relative, near the axis
+    # Relative, near the axis.
+    assert atan2(small, 1.0) == pytest.approx(np.arctan2(small, 1.0), rel=EPSILON)
 
 
 def test_atan2_on_the_axes():

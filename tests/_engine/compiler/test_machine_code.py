@@ -58,9 +58,8 @@ def sources(tmp_path, monkeypatch) -> Path:
     folder.mkdir()
     (folder / "own_formula.py").write_text(FORMULA)
     (folder / "own_loops.py").write_text(LOOPS)
-    monkeypatch.setattr(
-        sys, "dont_write_bytecode", True
-    )  # Python's own cache goes by time and size
+    # Python's own cache goes by time and size.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     monkeypatch.setattr(config, "CACHE_DIR", "")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
     monkeypatch.setattr(machine_code.MachineCode, "warned", False)
@@ -116,9 +115,8 @@ def test_machine_code_is_that_of_the_sources_wherever_it_is_kept(sources, place)
     assert again.outer(3.0) == 7.0 and was_read(again.outer)
     formula = sources / "own_formula.py"
     before = formula.stat()
-    formula.write_text(
-        FORMULA.replace("2.0", "5.0")
-    )  # an upgrade that keeps sizes and times
+    # An upgrade that keeps sizes and times.
+    formula.write_text(FORMULA.replace("2.0", "5.0"))
     os.utime(formula, ns=(before.st_atime_ns, before.st_mtime_ns))
     edited = imported(sources)
     assert edited.outer(3.0) == 16.0 and not was_read(edited.outer)
