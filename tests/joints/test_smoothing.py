@@ -4,16 +4,15 @@ import numpy as np
 import pytest
 
 from planarfriction.joints import JointLog
+from planarfriction.joints.log import runs
 from planarfriction.joints.smoothing import (
-    acceleration_noise,
     derivatives,
     encoder_step,
     evenly,
     kernel_width,
     rows_of,
-    runs,
     scales,
-    speed_noise,
+    smoothed_noise,
     white_noise,
 )
 
@@ -44,9 +43,9 @@ def test_variances_of_smoothed_noise_are_those_of_the_formulas():
     _, speed, acceleration = derivatives(log, width)
     power = 1e-6 * log.dt
     # 2 % by chance.
-    assert speed.var() == pytest.approx(speed_noise(power, width), rel=0.03)
+    assert speed.var() == pytest.approx(smoothed_noise(power, width, 1), rel=0.03)
     assert acceleration.var() == pytest.approx(
-        acceleration_noise(power, width), rel=0.03
+        smoothed_noise(power, width, 2), rel=0.03
     )
 
 
@@ -76,6 +75,9 @@ def test_a_coarse_encoder_gets_a_wider_kernel():
         for step in 2.0 * np.pi / 2.0 ** np.array([10, 13, 16])
     ]
     assert widths[0] > widths[1] > widths[2]
+    # at 16 bits, noise makes at most a thousandth of the mean square of the acceleration, a half of 4.5^2 and 12.1^2
+    power = 1e-3 * (2.0 * np.pi / 2.0**16) ** 2 / 12.0
+    assert smoothed_noise(power, widths[2], 2) < 1e-3 * 0.5 * (4.5**2 + 12.1**2)
 
 
 def test_slow_motion_is_smoothed_longer_and_turns_round_at_the_same_time():

@@ -9,19 +9,14 @@ one of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.joints.loops.runs import follow_path
+from planarfriction.joints.loops.balance import Balance, slide
+from planarfriction.joints.numbers import PARAMETERS, Values, least, slopes
 from planarfriction.joints.smoothing import DELAYS, NORMAL, Rows
-
-Values = Mapping[str, float]
-"""Numbers of the model by name."""
-
-ALWAYS = ("inertia", "mu_c", "sigma_2")
-"""Numbers of every model, beside an offset of the torque or an asymmetry."""
 
 TERMS: dict[str, tuple[str, ...]] = {
     "gravity": ("gravity_sin", "gravity_cos"),
@@ -32,99 +27,45 @@ TERMS: dict[str, tuple[str, ...]] = {
 }
 """Terms beside Coulomb and viscous friction, with their numbers."""
 
-FACTORS = ("v_s", "sigma_0")
-"""Numbers that are searched by their logarithm."""
-
-MOST_LOAD = 0.95
-"""Largest growth of the level with the torque: a joint of 1 would lock itself."""
-
-ROUNDS = 3
-"""Rounds in which a level that grows with the model's own torque converges."""
-
-FINE = 1e-5
-"""Share of the squared errors that a step of a search must gain, far below what one log more or less changes."""
-
 HUBER = 3.0
 """Error, in standard deviations, from which on it counts linearly."""
 
+STEPS = 12
+"""Most steps of a search."""
 
-def predict(
-    rows: Sequence[Rows], values: Values, terms: Sequence[str]
-) -> list[np.ndarray]:
+
+def predict(rows: Sequence[Rows], values: Values) -> list[np.ndarray]:
     """Compute the smoothed torque of each log at all of its rows, `[R]` [N m]."""
-    return [_predict(each, values, terms) for each in rows]
+    numbers = Balance(**values)
+    return [_predict(each, numbers) for each in rows]
 
 
-def errors(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> np.ndarray:
+def _predict(rows: Rows, numbers: Balance) -> np.ndarray:
+    level = np.full_like(rows.speed, numbers.mu_c)
+    if numbers.rise:
+        level += numbers.rise * np.exp(-((rows.speed / numbers.v_s) ** 2))
+    gravity = [numbers.gravity_sin, numbers.gravity_cos] @ rows.linear[2:]
+    viscous = [numbers.sigma_2, numbers.viscous_asymmetry] @ rows.linear[:2]
+    rest = numbers.inertia * rows.acceleration + viscous + gravity
+    weights = rows.weights
+    # The damping of bristles is a slope, which their smoothing takes as well.
+    if numbers.sigma_0:
+        weights = weights - numbers.sigma_1 / numbers.sigma_0 * rows.sloping
+    # the motor's torque less that of all else
+    driving = rest + gravity - 2.0 * rows.external
+    friction = slide(numbers, weights, rows.path, rows.direction, level, driving)
+    return numbers.torque_offset + rows.low_passed(rest + friction, numbers.low_pass)
+
+
+def errors(rows: Sequence[Rows], values: Values) -> np.ndarray:
     """Compute modelled less measured torque at the fitted rows of all logs [N m]."""
-    pairs = zip(predict(rows, values, terms), rows, strict=True)
+    pairs = zip(predict(rows, values), rows, strict=True)
     return np.concatenate(
         [
             torque[log.fitted] - log.measured(values.get("delay", 0.0))
             for torque, log in pairs
         ]
     )
-
-
-def miss(rows: Sequence[Rows], values: Values, terms: Sequence[str]) -> float:
-    """Compute the mean absolute error of the model [N m]."""
-    return float(np.abs(errors(rows, values, terms)).mean())
-
-
-def _predict(rows: Rows, values: Values, terms: Sequence[str]) -> np.ndarray:
-    speed = rows.speed
-    direction = rows.direction
-    gravity = np.zeros_like(speed)
-    if "gravity" in terms:
-        gravity = values["gravity_sin"] * np.sin(rows.angle) + values[
-            "gravity_cos"
-        ] * np.cos(rows.angle)
-    level = np.full_like(speed, values["mu_c"])
-    if "stribeck" in terms:
-        level += values["rise"] * np.exp(-((speed / values["v_s"]) ** 2))
-    viscous = values["sigma_2"] * speed
-    if "asymmetry" in terms:
-        viscous = viscous + values["viscous_asymmetry"] * np.abs(speed)
-    inertial = values["inertia"] * rows.acceleration
-    # torque of the motor less that of all else, but for friction
-    driving = inertial + 2.0 * (gravity - rows.external)
-    share = values["load"] if "load" in terms else 0.0
-    uneven = values.get("asymmetry", 0.0)
-    through = driving + direction * level + viscous
-    through = np.abs(through) / (
-        1.0 - share * np.clip(np.sign(through) * direction, -1.0, 1.0)
-    )
-    for _ in range(ROUNDS if share else 1):
-        even = level + share * through
-        friction = _bent(
-            rows, direction * even + uneven, even + direction * uneven, values, terms
-        )
-        through = (
-            np.abs(driving + rows.smoothed(friction + viscous)) if share else through
-        )
-    found = inertial + rows.smoothed(friction + viscous + gravity)
-    return values.get("torque_offset", 0.0) + rows.low_passed(
-        found, values.get("low_pass", 0.0)
-    )
-
-
-def _bent(
-    rows: Rows,
-    sliding: np.ndarray,
-    level: np.ndarray,
-    values: Values,
-    terms: Sequence[str],
-) -> np.ndarray:
-    """Compute the torque of bristles that follow sliding friction over the path, plus their damping."""
-    if "bristles" not in terms:
-        return sliding
-    stiffness = values["sigma_0"]
-    lagged = np.empty((len(sliding), 1))
-    follow_path(
-        sliding[:, None], rows.path * stiffness / np.maximum(level, 1e-9), lagged
-    )
-    torque = lagged[:, 0]
-    return torque + values["sigma_1"] / stiffness * np.gradient(torque, rows.spacing)
 
 
 class Refined(NamedTuple):
@@ -135,7 +76,7 @@ class Refined(NamedTuple):
     values: dict[str, float]
     """Estimates by name."""
     spread: dict[str, float]
-    """Standard errors by name, of logarithms for `FACTORS`."""
+    """Standard errors by name, of logarithms for those that are searched by them."""
     error: np.ndarray
     """Model less measured torque at the fitted rows of all logs [N m]."""
     freedom: int
@@ -151,63 +92,28 @@ class Refined(NamedTuple):
         return float(self.scores.sum())
 
 
-def names_of(terms: Sequence[str], late: str) -> list[str]:
+def names_of(terms: Sequence[str], late: str = "delay") -> list[str]:
     """Return the names of what is estimated; `late` is "delay" or "low_pass"."""
     offset = [] if "asymmetry" in terms else ["torque_offset"]
-    return [
-        *ALWAYS,
-        *offset,
-        late,
-        *(name for term in TERMS if term in terms for name in TERMS[term]),
-    ]
+    more = [name for term in TERMS if term in terms for name in TERMS[term]]
+    return ["inertia", "mu_c", "sigma_2", *offset, late, *more]
 
 
-class _Scaled:
-    """Numbers of a model as coordinates of similar size."""
+RANGES = {
+    "load": (-np.inf, PARAMETERS["load"].high),
+    "delay": (float(DELAYS[0]), float(DELAYS[-1])),
+}
+"""Ranges in which the errors change: beyond, an estimate is at its bound."""
 
-    def __init__(self, rows: Sequence[Rows], values: Values, names: Sequence[str]):
-        level = max(abs(values["mu_c"]), 1e-9)
-        fastest = max(np.abs(each.speed).max() for each in rows)
-        hardest = max(np.abs(each.acceleration).max() for each in rows)
-        offset = values.get("torque_offset", values.get("asymmetry", 0.0))
-        values = {"asymmetry": offset, "torque_offset": offset, **values}
-        least = {
-            "torque_offset": 0.1 * level, "asymmetry": 0.1 * level, "mu_c": level, "rise": 0.3 * level,
-            "gravity_sin": 0.3 * level, "gravity_cos": 0.3 * level, "delay": 1e-3, "low_pass": 1e-3, "load": 0.1,
-            "sigma_1": 0.005 * values.get("sigma_0", 1.0), "inertia": 0.1 * level / hardest,
-            "sigma_2": 0.1 * level / fastest, "viscous_asymmetry": 0.1 * level / fastest,
-        }  # fmt: skip
-        self.names = names
-        self.scale = np.array(
-            [
-                1.0 if each in FACTORS else max(abs(values[each]), least[each])
-                for each in names
-            ]
-        )
-        self.start = (
-            np.array(
-                [
-                    np.log(values[each]) if each in FACTORS else values[each]
-                    for each in names
-                ]
-            )
-            / self.scale
-        )
 
-    def values(self, x: np.ndarray) -> dict[str, float]:
-        """Return numbers by name, within their ranges."""
-        scaled = (x * self.scale).tolist()
-        found = {
-            name: float(np.exp(np.clip(value, -30.0, 30.0)))
-            if name in FACTORS
-            else value
-            for name, value in zip(self.names, scaled, strict=True)
-        }
-        if "load" in found:
-            found["load"] = min(found["load"], MOST_LOAD)
-        if "delay" in found:
-            found["delay"] = float(np.clip(found["delay"], DELAYS[0], DELAYS[-1]))
-        return found
+def limited(values: Values) -> dict[str, float]:
+    """Return numbers within `RANGES`."""
+    inside = {
+        name: min(max(values[name], low), high)
+        for name, (low, high) in RANGES.items()
+        if name in values
+    }
+    return {**values, **inside}
 
 
 def refine(
@@ -222,28 +128,63 @@ def refine(
     Rows near reversals and others count by the `scatter` of each, which is estimated unless it is given. Standard
     errors are those of a sandwich over blocks, whose errors may be correlated.
     """
-    from scipy.optimize import least_squares
-
-    scaled = _Scaled(rows, start, names_of(terms, late))
+    names = names_of(terms, late)
+    # an asymmetric level and an offset of the torque are one number
+    offset = start.get("torque_offset", start.get("asymmetry", 0.0))
+    values = {
+        name: ({"torque_offset": offset, "asymmetry": offset, "delay": 0.0} | start)[
+            name
+        ]
+        for name in names
+    }
     reversing = np.concatenate([each.reversing for each in rows])
+    sizes = np.ones(2) if scatter is None else scatter
 
-    def at(x: np.ndarray) -> np.ndarray:
-        return errors(rows, scaled.values(x), terms)
+    def weighted(values: Values) -> np.ndarray:
+        return errors(rows, limited(values)) / sizes[reversing]
 
-    x = scaled.start
     for _ in range(2 if scatter is None else 1):
-        sizes = _scatter(at(x), reversing) if scatter is None else scatter
-        weighted: Callable[[np.ndarray], Any] = lambda x: at(x) / sizes[reversing]  # noqa: B023
-        x = least_squares(
-            weighted,
-            x,
-            diff_step=1e-5,
-            max_nfev=12,
-            ftol=FINE,
-            loss="huber",
-            f_scale=HUBER,
-        ).x
-    return _judged(scaled, x, at, sizes, rows, tuple(terms))
+        if scatter is None:
+            sizes = _scatter(weighted(values) * sizes[reversing], reversing)
+        values = limited(
+            least(
+                weighted,
+                values,
+                names,
+                False,
+                loss="huber",
+                f_scale=HUBER,
+                max_nfev=STEPS,
+            )
+        )
+    error = weighted(values)
+    size = np.abs(error)
+    pull = np.minimum(1.0, HUBER / np.maximum(size, 1e-9))
+    jacobian = slopes(weighted, values, names, error)
+    norms = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
+    jacobian /= norms
+    inverse = np.linalg.pinv(jacobian.T @ (pull[:, None] * jacobian), rcond=1e-13)
+    begins = np.flatnonzero(np.diff(blocks_of(rows), prepend=-1))
+    gradients = np.add.reduceat((pull * error)[:, None] * jacobian, begins)
+    spare = len(begins) - len(names)
+    covariance = (
+        inverse @ (gradients.T @ gradients) @ inverse * (len(begins) / max(spare, 1))
+    )
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / norms
+    softened = np.where(size < HUBER, size**2, 2.0 * HUBER * size - HUBER**2)
+    # to first order, what leaving a block out adds to its error
+    leverage = 2.0 * np.einsum("bi,ij,bj->b", gradients, inverse, gradients)
+    scores = np.add.reduceat(softened, begins) + leverage
+    named = dict(zip(names, spread.tolist(), strict=True))
+    return Refined(
+        tuple(terms),
+        values,
+        named,
+        error * sizes[reversing],
+        max(spare, 2),
+        scores,
+        sizes,
+    )
 
 
 def _scatter(error: np.ndarray, reversing: np.ndarray) -> np.ndarray:
@@ -259,44 +200,6 @@ def _scatter(error: np.ndarray, reversing: np.ndarray) -> np.ndarray:
     )
 
 
-def _judged(
-    scaled: _Scaled,
-    x: np.ndarray,
-    errors: Callable[[np.ndarray], np.ndarray],
-    sizes: np.ndarray,
-    rows: Sequence[Rows],
-    terms: tuple[str, ...],
-) -> Refined:
-    """Compute standard errors and scores of a solution."""
-    reversing = np.concatenate([each.reversing for each in rows])
-    error = errors(x)
-    weighted = error / sizes[reversing]
-    size = np.abs(weighted)
-    pull = np.minimum(1.0, HUBER / np.maximum(size, 1e-9))
-    steps = 1e-4 * np.eye(len(x))
-    jacobian = np.stack(
-        [(errors(x + h) - error) / 1e-4 / sizes[reversing] for h in steps], axis=1
-    )
-    inverse = np.linalg.pinv(jacobian.T @ (pull[:, None] * jacobian), rcond=1e-13)
-    parts = blocks_of(rows)
-    gradients = np.array(
-        [(jacobian[part] * (pull * weighted)[part, None]).sum(axis=0) for part in parts]
-    )
-    count = len(parts)
-    freedom = max(count - len(x), 2)
-    inflated = count / max(count - len(x), 1)
-    covariance = inverse @ (gradients.T @ gradients) @ inverse * inflated
-    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0)) * scaled.scale
-    softened = np.where(size < HUBER, size**2, 2.0 * HUBER * size - HUBER**2)
-    # to first order, what leaving a block out adds to its error
-    leverage = 2.0 * np.einsum("bi,ij,bj->b", gradients, inverse, gradients)
-    scores = np.array([softened[part].sum() for part in parts]) + leverage
-    values = scaled.values(x)
-    named = dict(zip(scaled.names, spread.tolist(), strict=True))
-    return Refined(terms, values, named, error, freedom, scores, sizes)
-
-
-def blocks_of(rows: Sequence[Rows]) -> list[np.ndarray]:
-    """Return the mask of each block among the fitted rows of all logs."""
-    labels = np.concatenate([each.block + 100_000 * i for i, each in enumerate(rows)])
-    return [labels == each for each in np.unique(labels)]
+def blocks_of(rows: Sequence[Rows]) -> np.ndarray:
+    """Return the number of the block of each fitted row of all logs."""
+    return np.concatenate([each.block + 100_000 * i for i, each in enumerate(rows)])

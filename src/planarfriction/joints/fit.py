@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,9 +16,10 @@ from planarfriction.joints import (
     torque_fit,
     torque_verdicts,
 )
-from planarfriction.joints.balance import FACTORS, MOST_LOAD, Refined
+from planarfriction.joints.balance import Refined
 from planarfriction.joints.log import JointLog, Plant, as_joint_logs
-from planarfriction.joints.result import JointFit, Series
+from planarfriction.joints.numbers import PARAMETERS
+from planarfriction.joints.result import JointFit, Series, not_shown
 from planarfriction.joints.torque_fit import Data
 
 Progress = Callable[[str], None]
@@ -95,16 +97,11 @@ def _fit_torques(
     progress: Progress,
 ) -> JointFit:
     data = torque_fit.prepare(logs)
-    ranked = torque_fit.choose(data, chosen, auto, progress)
+    ranked, baseline = torque_fit.choose(data, chosen, auto, progress)
     fit = torque_fit.finish(data, ranked, chosen, auto, progress)
-    values, spread, intervals = numbers_of(fit)
+    values, spread = numbers_of(fit)
     rest = torque_verdicts.rest_of(data, fit)
-    torque_verdicts.refuse(data, fit, rest, intervals)
-    plain = {"delay": 0.0} | {
-        name: value for name, value in fit.values.items() if name not in FACTORS
-    }
-    baseline = balance.refine(data.rows, plain, (), fit.scatter)
-    scores = {each.terms: each.score for each in (*ranked, baseline)}
+    scores = {each.terms: each.score for each in ranked}
     without = {
         term: tuple(each for each in fit.terms if each != term) for term in fit.terms
     }
@@ -122,93 +119,74 @@ def _fit_torques(
             if (why := torque_fit.doubt(data, fit, term))
         }
     )
-    verdicts = torque_verdicts.judge(
-        data, fit, rest, logs, plant, values, intervals, gains
-    )
-    doubts = [
-        torque_verdicts.Verdict(term, False, f"not shown by these logs: {why}")
-        for term, why in unclear.items()
-    ]
     series = _series(data, fit, baseline)
-    return JointFit(
-        logs, _settled(plant, values), None, fit.terms, values, spread, intervals,
-        tuple(each.name for each in series),
-        np.array([np.abs(each.fitted - each.measured).mean() for each in series]),
-        np.array([np.abs(each.baseline - each.measured).mean() for each in series]),
-        series, unclear, (*verdicts, *doubts),
+    errors = [np.abs(each.fitted - each.measured).mean() for each in series]
+    less = [np.abs(each.baseline - each.measured).mean() for each in series]
+    names = tuple(each.name for each in series)
+    found = JointFit(
+        logs, _settled(plant, values), None, fit.terms, values, spread, fit.freedom,
+        names, np.array(errors), np.array(less), series, unclear, (),
     )  # fmt: skip
+    torque_verdicts.refuse(data, fit, rest, found.intervals)
+    return replace(
+        found,
+        verdicts=(
+            *torque_verdicts.judge(data, found, rest, plant, gains),
+            *not_shown(unclear),
+        ),
+    )
 
 
-def numbers_of(
-    fit: Refined,
-) -> tuple[dict[str, float], dict[str, float], dict[str, tuple[float, float] | None]]:
-    """Return the numbers of a fit to torques, their standard errors and their 95 % intervals, by name.
+def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the numbers of a fit to torques and their standard errors, by name.
 
     Gravity is given by its size and the angle at which it vanishes.
     """
-    from scipy.stats import t
-
-    reach = float(t.ppf(0.975, fit.freedom))
-    values: dict[str, float] = {}
-    spread: dict[str, float] = {}
-    intervals: dict[str, tuple[float, float] | None] = {}
-
-    def add(name: str, value: float, error: float) -> None:
-        values[name] = value
-        if name in FACTORS:
-            factor = float(np.exp(min(reach * error, 700.0)))
-            spread[name] = value * error
-            intervals[name] = value / factor, value * factor
-        else:
-            spread[name] = error
-            intervals[name] = value - reach * error, value + reach * error
-
-    for name, value in fit.values.items():
-        if name not in fit.spread or name.startswith("gravity_"):
-            continue
-        add(name, value, fit.spread[name])
-    if values.get("load", 0.0) >= MOST_LOAD:
-        intervals["load"] = None
+    values = dict(fit.values)
+    factors = {
+        name: values[name] if PARAMETERS[name].logarithmic else 1.0 for name in values
+    }
+    spread = {name: error * factors[name] for name, error in fit.spread.items()}
     if "gravity" in fit.terms:
-        sine = fit.values["gravity_sin"]
-        cosine = fit.values["gravity_cos"]
-        size = float(np.hypot(sine, cosine))
-        error = float(np.hypot(fit.spread["gravity_sin"], fit.spread["gravity_cos"]))
-        add("gravity", size, error)
-        add("offset", float(np.arctan2(-cosine, sine)), error / max(size, 1e-300))
-    return values, spread, intervals
+        sine, cosine = (values.pop(name) for name in balance.TERMS["gravity"])
+        values["gravity"] = float(np.hypot(sine, cosine))
+        values["offset"] = float(np.arctan2(-cosine, sine))
+        spread["gravity"] = float(
+            np.hypot(*(spread.pop(name) for name in balance.TERMS["gravity"]))
+        )
+        spread["offset"] = spread["gravity"] / max(values["gravity"], 1e-300)
+    return values, spread
 
 
 def _settled(plant: Plant, values: Mapping[str, float]) -> Plant:
     """Return the plant with what a fit to torques estimated: its inertia, less that of a known pendulum, and offset."""
-    from dataclasses import replace
-
-    arm = plant.arm_mass or 0.0
-    own = values["inertia"] - (plant.mass + arm / 3.0) * plant.length**2
-    inertia = max(own, 0.0) if plant.inertia is None else plant.inertia
+    inertia = (
+        max(values["inertia"] - plant.pendulum_inertia, 0.0)
+        if plant.inertia is None
+        else plant.inertia
+    )
+    # without a mass, the offset is 0 already
     offset = values.get("offset", 0.0) if plant.offset is None else plant.offset
     return replace(
-        plant,
-        inertia=inertia,
-        arm_mass=arm,
-        offset=offset if plant.mass else plant.offset,
+        plant, inertia=inertia, arm_mass=plant.arm_mass or 0.0, offset=offset
     )
 
 
 def _series(data: Data, fit: Refined, baseline: Refined) -> tuple[Series, ...]:
     """Return the smoothed torque of each log as measured and modelled."""
-    fitted, rest = (
-        balance.predict(data.rows, each.values, each.terms) for each in (fit, baseline)
-    )
     delay = fit.values.get("delay", 0.0)
-    columns = zip(data.rows, fitted, rest, strict=True)
+    columns = zip(
+        data.rows,
+        *(balance.predict(data.rows, each.values) for each in (fit, baseline)),
+        strict=True,
+    )
     return tuple(
         Series(
-            rows.even.log.name,
-            rows.time[rows.fitted],
-            rows.measured(delay),
-            torque[rows.fitted],
-            other[rows.fitted],
+            each.even.log.name,
+            each.time[each.fitted],
+            each.measured(delay),
+            one[each.fitted],
+            other[each.fitted],
         )
-        for rows, torque, other in columns
+        for each, one, other in columns
     )

@@ -10,10 +10,10 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.verdicts import Verdict
-from planarfriction.joints.balance import FINE
 from planarfriction.joints.goal_verdicts import judge
-from planarfriction.joints.problem import NEEDS, PARAMETERS, SHORT, TERMS, Problem
-from planarfriction.joints.result import JointFit, Series
+from planarfriction.joints.numbers import Values, interval, least, quantile
+from planarfriction.joints.problem import NEEDS, SHORT, TERMS, Problem
+from planarfriction.joints.result import JointFit, Series, not_shown
 
 SPANS = (SHORT, 0.6, np.inf)
 """Times [s] after which a simulated run begins again at the measured motion: short runs have one minimum, the last is
@@ -30,10 +30,8 @@ MOST = 40
 """Most steps of a search."""
 
 UNRELATED = 0.7
-"""Mean error over the mean deviation of the angle from its mean from which on a run has nothing to do with the log."""
-
-AT_BOUND = 1e-3
-"""Distance from a bound, over the parameter's size or in its logarithm, within which an estimate ended there."""
+"""Mean error over the mean deviation of the angle from its mean from which on a run has nothing to do with the log:
+beside one log that contradicts them, the runs of the others miss by up to 0.5."""
 
 BEST = 2
 """Number of starts of a term that are followed to the end."""
@@ -71,14 +69,14 @@ class Trial:
 
         The scatter is that of a one-sided t-test, 95 %.
         """
-        from scipy.stats import t
-
         pairs = zip((less.short, *less.halves), (self.short, *self.halves), strict=True)
         falls, *halves = (
             np.log(np.maximum(one, 1e-300) / np.maximum(other, 1e-300))
             for one, other in pairs
         )
-        scatter = t.ppf(0.95, len(falls) - 1) * falls.std(ddof=1) / np.sqrt(len(falls))
+        scatter = (
+            quantile(len(falls) - 1, 0.95) * falls.std(ddof=1) / np.sqrt(len(falls))
+        )
         return (
             float(falls.mean()),
             float(scatter),
@@ -88,39 +86,17 @@ class Trial:
     @property
     def jackknife(self) -> dict[str, float]:
         """Standard error of each estimate by leaving out groups."""
-        count = len(self.folds)
-        table = np.array([[each[name] for name in self.values] for each in self.folds])
-        errors = np.sqrt(
-            (count - 1) / count * ((table - table.mean(axis=0)) ** 2).sum(axis=0)
-        )
-        return dict(zip(self.values, errors.tolist(), strict=True))
-
-    def interval(self, name: str, shift: float) -> tuple[float, float] | None:
-        """Compute the 95 % interval of an estimate from its standard error and its shift between fits.
-
-        Those searched by logarithm have factors; an estimate at the bound of its search has none.
-        """
-        from scipy.stats import t
-
-        value = self.values[name]
-        kind = PARAMETERS[name]
-        reach = float(
-            t.ppf(0.975, len(self.folds) - 1) * np.hypot(self.jackknife[name], shift)
-        )
-        if kind.logarithmic:
-            if min(np.log(value / kind.low), np.log(kind.high / value)) < AT_BOUND:
-                return None
-            factor = float(np.exp(min(reach / value, 700.0)))
-            return value / factor, value * factor
-        near = AT_BOUND * max(abs(value), kind.scale)
-        if kind.high - value < near or (kind.low < 0.0 and value - kind.low < near):
-            return None
-        return max(value - reach, kind.low), min(value + reach, kind.high)
+        # Folds are alike: they differ that much less than samples drawn anew.
+        more = np.sqrt(len(self.folds) - 1)
+        return {
+            name: float(more * np.std([each[name] for each in self.folds]))
+            for name in self.values
+        }
 
 
 def minimise(
     problem: Problem,
-    start: Mapping[str, float],
+    start: Values,
     spans: Sequence[float] = SPANS,
     without: Sequence[int] = (),
 ) -> dict[str, float]:
@@ -132,56 +108,30 @@ def minimise(
     values = dict(start)
     for span in spans:
         values = _least(problem, values, span, without)
-    width = float(np.median(np.abs(_rest(problem.errors(values), without))))
+    width = float(
+        np.median(np.abs(problem.errors(values)[~np.isin(problem.labels, without)]))
+    )
     return _least(
         problem, values, np.inf, without, loss="soft_l1", f_scale=max(width, 1e-12)
     )
 
 
-def _rest(groups: list[np.ndarray], without: Sequence[int]) -> np.ndarray:
-    return np.concatenate([each for i, each in enumerate(groups) if i not in without])
-
-
 def _least(
-    problem: Problem,
-    values: Mapping[str, float],
-    span: float,
-    without: Sequence[int],
-    **loss: Any,
+    problem: Problem, values: Values, span: float, without: Sequence[int], **loss: Any
 ) -> dict[str, float]:
-    from scipy.optimize import least_squares
-
-    kinds = [PARAMETERS[each] for each in problem.names]
-    log = np.array([each.logarithmic for each in kinds])
-
-    def factor(x: np.ndarray) -> np.ndarray:
-        return np.exp(np.where(log, x, 0.0))
-
-    def by_name(x: np.ndarray) -> dict[str, float]:
-        return dict(
-            zip(problem.names, np.where(log, factor(x), x).tolist(), strict=True)
-        )
-
-    def coordinates(numbers: Sequence[float]) -> np.ndarray:
-        return np.where(log, np.log(np.where(log, numbers, 1.0)), numbers)
-
-    low, high = (
-        coordinates([getattr(each, end) for each in kinds]) for end in ("low", "high")
+    counted = ~np.isin(problem.labels, without)
+    return least(
+        lambda values: problem.errors(values, span)[counted],
+        values,
+        problem.names,
+        True,
+        max_nfev=MOST,
+        **loss,
     )
-    slopes: Any = lambda x: _rest(problem.slopes(by_name(x), span), without) * factor(x)
-    settings: Any = {"x_scale": "jac", "ftol": FINE, "max_nfev": MOST, **loss}
-    found = least_squares(
-        lambda x: _rest(problem.errors(by_name(x), span), without),
-        np.clip(coordinates([values[each] for each in problem.names]), low, high),
-        slopes,
-        (low, high),
-        **settings,
-    )
-    return by_name(found.x)
 
 
 def with_term(
-    problem: Problem, values: Mapping[str, float], term: str
+    problem: Problem, values: Values, term: str
 ) -> tuple[Problem, dict[str, float]]:
     """Return a problem with one term more than that of `values`, and its best values from the best of its starts."""
     problem = problem.with_terms([*problem.terms, term])
@@ -260,16 +210,6 @@ def _check_related(problem: Problem, runs: Sequence[np.ndarray]) -> Iterator[Ver
         yield Verdict("fit", False, text)
 
 
-def _is_vague(
-    name: str,
-    values: Mapping[str, float],
-    spread: Mapping[str, float],
-    intervals: Mapping[str, Any],
-) -> bool:
-    """Return True if the number of a term has no interval, or one of its own size."""
-    return intervals[name] is None or not spread[name] < VAGUE * values[name]
-
-
 def fit_goals(
     base: Problem, chosen: Sequence[str], auto: bool, progress: Callable[[str], None]
 ) -> JointFit:
@@ -342,24 +282,23 @@ def result_of(
         for log, fitted, rest in zip(problem.logs, *runs, strict=True)
     )
     spread = {name: float(np.hypot(jackknife[name], shifts[name])) for name in values}
-    intervals = {name: kept.interval(name, shifts[name]) for name in values}
+    freedom = len(kept.folds) - 1
     unclear = {}
     for term in kept.terms:
         vague = [
             name
             for name in TERMS[term]
-            if name != "sigma_1" and _is_vague(name, values, spread, intervals)
+            if name != "sigma_1" and not spread[name] < VAGUE * values[name]
         ]
-        if vague:
+        bounded = [
+            name for name in TERMS[term] if interval(name, values[name], 0.0) is None
+        ]
+        for name in [*bounded, *vague][:1]:
             unclear[term] = (
-                f"{vague[0]} = {values[vague[0]]:.2g}, spread {spread[vague[0]]:.2g} between fits"
+                f"{name} = {values[name]:.2g}, spread {spread[name]:.2g} between fits"
             )
-    verdicts = judge(kept, pairs)
-    doubts += [
-        Verdict(term, False, f"not shown by these logs ({words})")
-        for term, words in unclear.items()
-    ]
+    verdicts = (*judge(kept, pairs), *doubts, *not_shown(unclear))
     return JointFit(
         problem.logs, problem.settled(values), values.get("torque_gain", problem.torque_gain), kept.terms, values,
-        spread, intervals, tuple(problem.groups), kept.errors, first.errors, series, unclear, (*verdicts, *doubts),
+        spread, freedom, tuple(problem.groups), kept.errors, first.errors, series, unclear, verdicts,
     )  # fmt: skip

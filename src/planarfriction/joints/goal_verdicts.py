@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from planarfriction.identify.verdicts import Verdict
-from planarfriction.joints.log import JointLog
+from planarfriction.joints.log import JointLog, runs
 from planarfriction.joints.problem import friction_of
 
 if TYPE_CHECKING:
@@ -52,11 +53,17 @@ WORDS = {
 
 def judge(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> tuple[Verdict, ...]:
     """Return the verdicts on a trial that was kept, and on the `pairs` of trials with and without a term."""
+    logs = kept.problem.logs
+    stuck = (
+        _on_standing(kept, i, mask)
+        for i, log in enumerate(logs)
+        if (mask := standing(log)).any()
+    )
     return (
         *_on_terms(kept, pairs),
         *_on_drive(kept),
-        *lags(kept.problem.logs),
-        *_on_logs(kept),
+        *lags(logs),
+        *itertools.chain(*stuck),
     )
 
 
@@ -129,8 +136,7 @@ def standing(log: JointLog) -> np.ndarray:
     speed = np.abs(log.speed)
     full = (np.abs(log.drive.duty(log.goal - log.q)) >= FULL) & (log.on > 0.0)
     mask = full & (speed < STANDING * speed.max())
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    for first, last in edges.reshape(-1, 2):
+    for first, last in runs(mask):
         if log.time[last - 1] - log.time[first] < LONG:
             mask[first:last] = False
     return mask
@@ -142,12 +148,6 @@ def lags(logs: Sequence[JointLog]) -> Iterator[Verdict]:
     if late and abs(lag := float(np.median(late))) > LATE:
         text = f"the reported speed lags by {1e3 * lag:.0f} ms ({1e3 * min(late):.0f} to {1e3 * max(late):.0f})"
         yield Verdict("dq", False, f"{text}: the slope of q was used")
-
-
-def _on_logs(kept: Trial) -> Iterator[Verdict]:
-    for i, log in enumerate(kept.problem.logs):
-        if (mask := standing(log)).any():
-            yield from _on_standing(kept, i, mask)
 
 
 def _on_standing(kept: Trial, i: int, mask: np.ndarray) -> Iterator[Verdict]:

@@ -149,6 +149,16 @@ class Plant(Checked):
         if not self.mass:
             self._set(arm_mass=self.arm_mass or 0.0, offset=self.offset or 0.0)
 
+    @property
+    def moment(self) -> float:
+        """Largest torque of gravity [N m]; an arm without a mass counts as weightless."""
+        return (self.mass + 0.5 * (self.arm_mass or 0.0)) * GRAVITY * self.length
+
+    @property
+    def pendulum_inertia(self) -> float:
+        """Moment of inertia of mass and arm about the joint [kg m^2]."""
+        return (self.mass + (self.arm_mass or 0.0) / 3.0) * self.length**2
+
 
 @dataclass(frozen=True, eq=False)
 class JointLog(ByValue):
@@ -367,11 +377,15 @@ def _check_sensors(log: JointLog) -> None:
         )
 
 
-def _longest_run(values: np.ndarray) -> tuple[int, int]:
+def runs(mask: np.ndarray) -> np.ndarray:
+    """Return the first index of each run of True, and the first behind it, `[N, 2]`."""
+    return np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
+
+
+def _longest_run(values: np.ndarray) -> Sequence[int]:
     """Return the first and the last index of the longest run of equal values."""
-    ends = np.concatenate([[-1], np.flatnonzero(np.diff(values)), [len(values) - 1]])
-    longest = int(np.argmax(np.diff(ends)))
-    return int(ends[longest]) + 1, int(ends[longest + 1])
+    equal = runs(np.diff(values) == 0.0)
+    return max(equal.tolist(), key=lambda ends: ends[1] - ends[0], default=(0, 0))
 
 
 def _check_goal(log: JointLog) -> None:

@@ -2,44 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
 from planarfriction.joints.friction import JointFriction
-from planarfriction.joints.log import GRAVITY, JointLog, Plant
+from planarfriction.joints.log import JointLog, Plant
 from planarfriction.joints.loops.runs import PlantNumbers, run_plant
-
-
-class Parameter(NamedTuple):
-    """Range and scale of a parameter."""
-
-    unit: str
-    low: float
-    high: float
-    scale: float
-    """Size at which a step of the search begins, where the start is smaller."""
-    logarithmic: bool = False
-
-
-PARAMETERS = {
-    "inertia": Parameter("kg m^2", 0.0, np.inf, 1e-4),
-    "arm_mass": Parameter("kg", 0.0, np.inf, 0.01),
-    "offset": Parameter("rad", -2.0 * np.pi, 2.0 * np.pi, 0.02),
-    "torque_gain": Parameter("N m/V", 1e-9, np.inf, 1e-3),
-    "back_emf": Parameter("N m s/rad", 0.0, np.inf, 1e-3),
-    "mu_c": Parameter("N m", 1e-9, np.inf, 1e-4),
-    "sigma_2": Parameter("N m s/rad", 0.0, np.inf, 1e-4),
-    "load": Parameter("-", 0.0, 0.95, 0.05),
-    "rise": Parameter("N m", 0.0, np.inf, 1e-4),
-    "v_s": Parameter("rad/s", 1e-4, 1e3, 1.0, True),
-    "sigma_0": Parameter("N m/rad", 1e-6, 1e9, 1.0, True),
-    "sigma_1": Parameter("N m s/rad", 0.0, np.inf, 1e-4),
-    "load_external": Parameter("-", 0.0, 0.95, 0.05),
-}
-"""Parameters by name, `rise` for `mu_s - mu_c`; `load` is b_m, and b_e too where that is not estimated."""
+from planarfriction.joints.numbers import Values, least
 
 TERMS: dict[str, tuple[str, ...]] = {
     "load": ("load",),
@@ -49,8 +22,8 @@ TERMS: dict[str, tuple[str, ...]] = {
 }
 """Terms beside Coulomb and viscous friction, in the order in which they are tried, with their parameters."""
 
-UNKNOWN = ("inertia", "arm_mass", "offset")
-"""Numbers of a plant that are estimated where they are not given."""
+UNKNOWN = ("inertia", "offset")
+"""Numbers of a plant that are estimated where they are not given; a mass of the arm would only scale all torques."""
 
 LEAST_INERTIA = 1e-12
 """Inertia that stands for none [kg m^2]."""
@@ -64,10 +37,7 @@ STEP = 2e-3
 SHORT = 0.2
 """Time after which a simulated run begins again where terms are judged [s]."""
 
-DIFFERENCE = 1e-5
-"""Step of differences, over the size of a parameter."""
-
-OFFSETS = np.pi * np.array([0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0])
+OFFSETS = (np.pi * np.array([0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0])).tolist()
 """Angles at which a pendulum may hang, from which a search begins [rad]."""
 
 MOVING = 0.05
@@ -88,12 +58,8 @@ class Problem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters that are estimated, `[P]`; the mass of an arm would only scale all torques."""
-        names = [
-            each
-            for each in UNKNOWN
-            if getattr(self.plant, each) is None and each != "arm_mass"
-        ]
+        """Names of the parameters that are estimated, `[P]`."""
+        names = [each for each in UNKNOWN if getattr(self.plant, each) is None]
         names += ["torque_gain"] if self.torque_gain is None else []
         names += (
             ["back_emf"]
@@ -110,25 +76,18 @@ class Problem:
         """Return the problem with other terms."""
         return replace(self, terms=tuple(each for each in TERMS if each in terms))
 
-    def settled(self, values: Mapping[str, float]) -> Plant:
+    def settled(self, values: Values) -> Plant:
         """Make the plant of parameters by name."""
-        return replace(
-            self.plant,
-            **{
-                each: values.get(each, getattr(self.plant, each) or 0.0)
-                for each in UNKNOWN
-            },
-        )
+        given = {
+            each: values.get(each, getattr(self.plant, each) or 0.0) for each in UNKNOWN
+        }
+        return replace(self.plant, arm_mass=self.plant.arm_mass or 0.0, **given)
 
-    def plant_numbers(self, values: Mapping[str, float], log: JointLog) -> PlantNumbers:
+    def plant_numbers(self, values: Values, log: JointLog) -> PlantNumbers:
         """Return what the loops read of plant and drive."""
-        plant = self.plant
+        plant = self.settled(values)
         drive = log.drive if log.voltage is None else None
-        inertia, arm, offset = (
-            values.get(each, getattr(plant, each) or 0.0) for each in UNKNOWN
-        )
-        inertia += (plant.mass + arm / 3.0) * plant.length**2
-        moment = (plant.mass + 0.5 * arm) * GRAVITY * plant.length
+        inertia = plant.inertia + plant.pendulum_inertia
         gain = values.get("torque_gain", self.torque_gain or 0.0)
         back_emf = values.get("back_emf", 0.0)
         servo = (
@@ -137,16 +96,18 @@ class Problem:
             else (drive.kp * drive.gain, drive.supply, drive.sag)
         )
         return PlantNumbers(
-            max(inertia, LEAST_INERTIA), moment, offset, gain, back_emf, *servo
+            max(inertia, LEAST_INERTIA),
+            plant.moment,
+            plant.offset,
+            gain,
+            back_emf,
+            *servo,
         )
 
     # ------------------------------------------------------------------ errors
 
     def simulated(
-        self,
-        values: Mapping[str, float],
-        logs: Sequence[JointLog],
-        span: float = np.inf,
+        self, values: Values, logs: Sequence[JointLog], span: float = np.inf
     ) -> list[np.ndarray]:
         """Simulate q and dq `[T, 2]` of logs from goal or voltage.
 
@@ -174,34 +135,24 @@ class Problem:
             )
         return motions
 
-    def errors(
-        self, values: Mapping[str, float], span: float = np.inf
-    ) -> list[np.ndarray]:
-        """Compute the errors of each group of samples [rad]."""
+    def errors(self, values: Values, span: float = np.inf) -> np.ndarray:
+        """Compute the errors of all samples [rad]."""
         runs = zip(self.simulated(values, self.logs, span), self.logs, strict=True)
-        return self._groups([motion[:, 0] - log.q for motion, log in runs])
+        return np.concatenate([motion[:, 0] - log.q for motion, log in runs])
 
-    def costs(self, values: Mapping[str, float], span: float = np.inf) -> np.ndarray:
+    def costs(self, values: Values, span: float = np.inf) -> np.ndarray:
         """Compute the mean absolute error of each group [rad]."""
-        return np.array([np.abs(each).mean() for each in self.errors(values, span)])
+        return np.bincount(
+            self.labels, np.abs(self.errors(values, span))
+        ) / np.bincount(self.labels)
 
-    def slopes(
-        self, values: Mapping[str, float], span: float = np.inf
-    ) -> list[np.ndarray]:
-        """Compute the slopes of each group's errors by the parameters by differences, `[T, P]`."""
-        here = self.errors(values, span)
-        columns = []
-        for name in self.names:
-            step = DIFFERENCE * max(abs(values[name]), PARAMETERS[name].scale)
-            more = self.errors({**values, name: values[name] + step}, span)
-            columns.append(
-                [(far - near) / step for far, near in zip(more, here, strict=True)]
-            )
-        return [np.column_stack(each) for each in zip(*columns, strict=True)]
-
-    def _groups(self, rows: list[np.ndarray]) -> list[np.ndarray]:
-        """Cut the rows of each log into its groups."""
-        return [each for log in rows for each in np.array_split(log, self.parts)]
+    @cached_property
+    def labels(self) -> np.ndarray:
+        """Number of the group of each sample."""
+        counts = [len(log.time) for log in self.logs]
+        return np.concatenate(
+            [self.parts * (i + np.arange(n) / n) for i, n in enumerate(counts)]
+        ).astype(int)
 
     @property
     def groups(self) -> list[str]:
@@ -214,57 +165,35 @@ class Problem:
     # ------------------------------------------------------------------ start
 
     def start(self) -> dict[str, float]:
-        """Compute the least squares of the torque balance, where the joint moves, of the linear parameters.
+        """Compute the least squares of the torque balance of rigid friction, where the joint moves.
 
-        `I a - tau_e + mu_c sign(v) + sigma_2 v = kt/R V - back_emf v`. The angle at which a pendulum hangs is not
-        linear: it is searched from several.
+        `I a - tau_e + mu_c sign(v) + sigma_2 v = kt/R V - back_emf v`; the angle at which a pendulum hangs is searched
+        from several.
         """
-        angles = OFFSETS if "offset" in self.names else OFFSETS[:1]
-        return min(
-            (self._start(float(each)) for each in angles), key=lambda found: found[1]
-        )[0]
-
-    def _start(self, offset: float) -> tuple[dict[str, float], float]:
-        """Return the least squares near an offset [rad], and their squared error."""
         names = [each for each in self.names if each not in self._more]
         zero = dict.fromkeys(names, 0.0)
-        if "offset" in zero:
-            zero["offset"] = offset
-        rows = []
-        right = []
-        for log in self.logs:
-            here = self._balance(zero, log)
-            moves = moving(log)
-            scales = [PARAMETERS[name].scale for name in names]
-            columns = [
-                self._balance({**zero, name: zero[name] + scale}, log) - here
-                for name, scale in zip(names, scales, strict=True)
-            ]
-            rows.append(np.column_stack(columns)[moves] / scales)
-            right.append(-here[moves])
-        table = np.concatenate(rows)
-        forces = np.concatenate(right)
-        size = np.maximum(np.abs(table).max(axis=0), 1e-300)
-        steps = np.linalg.lstsq(table / size, forces, rcond=1e-8)[0] / size
-        found = dict(zip(names, (steps + list(zero.values())).tolist(), strict=True))
-        fast = max(np.abs(log.speed).max() for log in self.logs)
-        strong = np.abs(forces)
-        least = {
-            "mu_c": 0.05 * np.median(strong) + 1e-6,
-            "sigma_2": 0.01 * strong.max() / max(fast, 1e-9),
-        }
-        for name in names:
-            found[name] = float(
-                np.clip(
-                    found[name],
-                    least.get(name, PARAMETERS[name].low),
-                    PARAMETERS[name].high,
-                )
-            )
-        rest = [self._balance(found, log)[moving(log)] for log in self.logs]
-        return found, float(np.square(np.concatenate(rest)).sum())
 
-    def _balance(self, values: Mapping[str, float], log: JointLog) -> np.ndarray:
+        def errors(values: Values) -> np.ndarray:
+            return np.concatenate(
+                [self._balance(values, log)[moving(log)] for log in self.logs]
+            )
+
+        starts = (
+            [zero | {"offset": angle} for angle in OFFSETS]
+            if "offset" in names
+            else [zero]
+        )
+        ends = [least(errors, each, names, True) for each in starts]
+        found = min(ends, key=lambda each: np.square(errors(each)).sum())
+        strong = np.abs(errors(zero))
+        fast = max(np.abs(log.speed).max() for log in self.logs)
+        found["mu_c"] = max(found["mu_c"], 0.05 * float(np.median(strong)) + 1e-6)
+        found["sigma_2"] = max(
+            found["sigma_2"], 0.01 * float(strong.max() / max(fast, 1e-9))
+        )
+        return found
+
+    def _balance(self, values: Values, log: JointLog) -> np.ndarray:
         """Compute the torque that is missing in the balance of rigid friction [N m], `[T]`."""
         plant = self.plant_numbers(values, log)
         v = log.speed
@@ -278,55 +207,53 @@ class Problem:
             - driven
         )
 
-    def guesses(self, term: str, values: Mapping[str, float]) -> list[dict[str, float]]:
+    def guesses(self, term: str, values: Values) -> list[dict[str, float]]:
         """Return starts of a term beside the values of a fit without it; the first changes little."""
         mu_c = values["mu_c"]
+        load = values.get("load", 0.0)
         if term == "load":
             return [
-                {"load": 0.02},
-                {"load": 0.1, "mu_c": 0.5 * mu_c},
-                {"load": 0.3, "mu_c": 0.2 * mu_c},
+                {"load": b, "mu_c": share * mu_c}
+                for b, share in ((0.02, 1.0), (0.1, 0.5), (0.3, 0.2))
             ]
         if term == "directional":
-            load = values["load"]
+            shares = ((1.0, 1.0), (0.3, 1.5), (2.0, 1.0))
             return [
-                {"load_external": load},
-                {"load_external": 0.3 * load, "load": 1.5 * load},
-                {"load_external": min(2.0 * load, 0.9)},
+                {"load_external": min(external * load, 0.9), "load": motor * load}
+                for external, motor in shares
             ]
         if term == "stribeck":
             fast = max(float(np.quantile(np.abs(log.speed), 0.9)) for log in self.logs)
-            return [
-                {"rise": share * mu_c, "v_s": part * fast}
-                for share in (0.1, 0.4)
-                for part in (0.01, 0.03, 0.1, 0.3)
-            ]
+            parts = itertools.product((0.1, 0.4), (0.01, 0.03, 0.1, 0.3))
+            return [{"rise": share * mu_c, "v_s": part * fast} for share, part in parts]
         most = mu_c + values.get("rise", 0.0)
-        bent = (
-            (most / angle, time)
-            for angle in (1e-4, 1e-3, 3e-3, 1e-2, 0.1)
-            for time in (1e-3, 1e-2)
-        )
+        bent = itertools.product((1e-4, 1e-3, 3e-3, 1e-2, 0.1), (1e-3, 1e-2))
         return [
-            {"sigma_0": stiffness, "sigma_1": time * stiffness}
-            for stiffness, time in bent
+            {"sigma_0": most / angle, "sigma_1": time * most / angle}
+            for angle, time in bent
         ]
 
 
-def friction_of(values: Mapping[str, float]) -> JointFriction:
-    """Make the friction of parameters by name."""
+DIRECT = (
+    "mu_c",
+    "sigma_2",
+    "v_s",
+    "sigma_0",
+    "sigma_1",
+    "asymmetry",
+    "viscous_asymmetry",
+)
+"""Estimates that are fields of a friction."""
+
+
+def friction_of(values: Values) -> JointFriction:
+    """Make the friction of estimates by name."""
     load = values.get("load", 0.0)
     return JointFriction(
-        values["mu_c"],
-        values["sigma_2"],
-        load,
-        values.get("load_external", load),
-        values["mu_c"] + values.get("rise", 0.0),
-        values.get("v_s", 1.0),
-        values.get("sigma_0"),
-        values.get("sigma_1", 0.0),
-        values.get("asymmetry", 0.0),
-        values.get("viscous_asymmetry", 0.0),
+        **{name: values[name] for name in DIRECT if name in values},
+        mu_s=values["mu_c"] + values.get("rise", 0.0),
+        load_motor=load,
+        load_external=values.get("load_external", load),
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,15 +15,8 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.friction import JointFriction
 from planarfriction.joints.log import JointLog, Plant
+from planarfriction.joints.numbers import PARAMETERS, interval, quantile
 from planarfriction.joints.problem import Problem, friction_of
-
-UNITS = {
-    "inertia": "kg m^2", "arm_mass": "kg", "offset": "rad", "gravity": "N m", "torque_offset": "N m", "delay": "s",
-    "low_pass": "s", "torque_gain": "N m/V", "back_emf": "N m s/rad", "mu_c": "N m", "sigma_2": "N m s/rad",
-    "load": "-", "load_external": "-", "rise": "N m", "v_s": "rad/s", "sigma_0": "N m/rad", "sigma_1": "N m s/rad",
-    "asymmetry": "N m", "viscous_asymmetry": "N m s/rad",
-}  # fmt: skip
-"""Units of all numbers that are estimated, by name; `rise` is `mu_s - mu_c`."""
 
 
 class Series(NamedTuple):
@@ -38,6 +32,14 @@ class Series(NamedTuple):
     """Same of the fit."""
     baseline: np.ndarray
     """Same of the fit of Coulomb and viscous friction alone."""
+
+
+def not_shown(unclear: Mapping[str, str]) -> list[Verdict]:
+    """Return the verdicts on terms that were asked for and that the logs do not show."""
+    return [
+        Verdict(term, False, f"not shown by these logs: {why}")
+        for term, why in unclear.items()
+    ]
 
 
 @described
@@ -56,9 +58,9 @@ class JointFit:
     values: Mapping[str, float]
     """Estimates by name."""
     spread: Mapping[str, float]
-    """Standard error of each estimate; of the logarithm of `v_s` and `sigma_0` for logs with a torque."""
-    intervals: Mapping[str, tuple[float, float] | None]
-    """95 % interval of each estimate; None for one that ended at a bound of its search."""
+    """Standard error of each estimate."""
+    freedom: int
+    """Degrees of freedom of the standard errors."""
     groups: tuple[str, ...]
     """Names of the logs, or of their parts, that have an error each."""
     errors: np.ndarray
@@ -71,6 +73,15 @@ class JointFit:
     """Terms that were asked for and that the logs do not show, with the reason."""
     verdicts: tuple[Verdict, ...]
     """Findings in words, each with its number."""
+
+    @cached_property
+    def intervals(self) -> dict[str, tuple[float, float] | None]:
+        """95 % interval of each estimate; None for one that ended at a bound of its search."""
+        reach = quantile(self.freedom, 0.975)
+        return {
+            name: interval(name, value, reach * self.spread[name])
+            for name, value in self.values.items()
+        }
 
     @property
     def friction(self) -> JointFriction:
@@ -128,9 +139,9 @@ class JointFit:
         value = self.values[name]
         interval = self.intervals[name]
         if interval is None:
-            return f"{name:17} {value:11.4g} {'-':>10}  at the bound of its search, {UNITS[name]}"
+            return f"{name:17} {value:11.4g} {'-':>10}  at the bound of its search, {PARAMETERS[name].unit}"
         low, high = interval
-        return f"{name:17} {value:11.4g} {self.spread[name]:10.2g}  {low:.4g} to {high:.4g} {UNITS[name]}"
+        return f"{name:17} {value:11.4g} {self.spread[name]:10.2g}  {low:.4g} to {high:.4g} {PARAMETERS[name].unit}"
 
     def plot(self) -> Any:
         """Draw the log that gains most from the terms, what is left of it, and friction over speed at three loads."""
@@ -143,8 +154,8 @@ class JointFit:
             "terms": list(self.terms),
             "unclear": dict(self.unclear),
             "parameters": {
-                name: {"value": value, "spread": self.spread[name], "unit": UNITS[name],
-                       "interval": None if self.intervals[name] is None else list(self.intervals[name] or ())}
+                name: {"value": value, "spread": self.spread[name], "unit": PARAMETERS[name].unit,
+                       "interval": self.intervals[name] and list(self.intervals[name] or ())}
                 for name, value in self.values.items()
             },
             "unit_of_errors": self.unit,

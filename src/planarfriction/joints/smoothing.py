@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.joints.log import JointLog
+from planarfriction.joints.log import JointLog, runs
+from planarfriction.joints.loops.balance import follow_path
 
 DELAYS = np.arange(-6, 42, 2) * 1e-3
 """Delays of a measured torque that are tried [s]."""
@@ -69,6 +71,11 @@ class EvenLog(NamedTuple):
     noise: float
     """Standard deviation of the angle's white noise [rad]."""
 
+    @property
+    def power(self) -> float:
+        """Power of the angle's noise [rad^2 s]."""
+        return self.noise**2 * self.dt
+
 
 def evenly(log: JointLog) -> EvenLog:
     """Interpolate a log to its median sampling time, and measure the noise of its angle."""
@@ -89,23 +96,19 @@ def encoder_step(angle: np.ndarray) -> float:
     changes = changes[changes > 1e-9 * max(1.0, np.abs(angle).max())]
     if len(changes) < 5:
         return 0.0
-    least = np.percentile(changes, 1)
-    single = changes < 1.2 * least
-    step = changes[single].mean()
-    if not single.any() or single.mean() < 0.002:
+    single = changes < 1.2 * np.percentile(changes, 1)
+    if single.mean() < 0.002:
         return 0.0
-    ratios = changes / step
-    small = ratios < 30.0
-    off = np.median(np.abs(ratios - np.round(ratios))[small])
-    return float(step) if small.sum() > 5 and off < 0.05 else 0.0
+    ratios = changes / changes[single].mean()
+    small = ratios[ratios < 30.0]
+    off = np.median(np.abs(small - np.round(small)))
+    return float(changes[single].mean()) if len(small) > 5 and off < 0.05 else 0.0
 
 
 def white_noise(signal: np.ndarray) -> float:
     """Estimate the standard deviation of the white noise of a signal from its third differences."""
     third = np.diff(signal, 3)
-    return (
-        float(np.median(np.abs(third)) * NORMAL / np.sqrt(20.0)) if len(third) else 0.0
-    )
+    return float(np.median(np.abs(third)) * NORMAL / np.sqrt(20.0))
 
 
 def derivatives(
@@ -144,35 +147,28 @@ def kernel_width(logs: Sequence[EvenLog]) -> float:
     width = max(
         1.5 * slowest, 3e-3, min(0.02 * speed / max(acceleration, 1e-300), WIDEST)
     )
-    power = float(np.mean([log.noise**2 * log.dt for log in logs]))
+    power = np.mean([log.power for log in logs])
     while width < WIDEST:
         found = [derivatives(log, width) for log in logs]
         moved, bent = (
             np.mean([2.0 * np.median(np.abs(each[k])) ** 2 for each in found])
             for k in (1, 2)
         )
-        if (
-            speed_noise(power, width) < NOISY_SPEED * moved
-            and acceleration_noise(power, width) < ATTENUATED * bent
-        ):
+        quiet = smoothed_noise(power, width, 1) < NOISY_SPEED * moved
+        if quiet and smoothed_noise(power, width, 2) < ATTENUATED * bent:
             break
         width *= 1.2
     return float(width)
 
 
-def speed_noise(power: float, width: float) -> float:
-    """Compute the variance of the smoothed speed from the power of the angle's noise, variance times sampling time."""
-    return power / (4.0 * np.sqrt(np.pi) * width**3)
+def smoothed_noise(power: float, width: float, order: int) -> float:
+    """Compute the variance of white noise behind the kernel, or behind its first or second derivative.
 
-
-def acceleration_noise(power: float, width: float) -> float:
-    """Compute the variance of the smoothed acceleration from the power of the angle's noise."""
-    return 3.0 * power / (8.0 * np.sqrt(np.pi) * width**5)
-
-
-def torque_noise(log: EvenLog, width: float) -> float:
-    """Compute the variance of the smoothed torque that its white noise makes."""
-    return white_noise(log.torque) ** 2 * log.dt / (2.0 * np.sqrt(np.pi) * width)
+    `power` is the variance of a sample times the sampling time.
+    """
+    return (
+        (0.5, 0.25, 0.375)[order] * power / (np.sqrt(np.pi) * width ** (2 * order + 1))
+    )
 
 
 class Scales(NamedTuple):
@@ -194,23 +190,26 @@ def scales(logs: Sequence[EvenLog], width: float) -> Scales:
     A Gaussian keeps the instant at which a steadily accelerated joint turns round, so the speed of slow motion may go
     through a wider kernel, whose noise is smaller.
     """
-    power = float(np.mean([log.noise**2 * log.dt for log in logs]))
+    power = np.mean([log.power for log in logs])
     resolution = max(log.resolution for log in logs)
 
     def sure(width: float) -> float:
-        return max(
-            3.0 * float(np.sqrt(speed_noise(power, width))),
-            0.2 * resolution / width,
-            1e-9,
+        return float(
+            max(
+                3.0 * np.sqrt(smoothed_noise(power, width, 1)),
+                0.2 * resolution / width,
+                1e-9,
+            )
         )
 
     speed, acceleration = (
         np.concatenate([derivatives(log, width)[k] for log in logs]).var()
         for k in (1, 2)
     )
-    moved = max(acceleration - acceleration_noise(power, width), 1e-300)
-    longest = SLOW_SHARE * float(np.sqrt(speed / moved))
-    slow_width = float(np.clip(SLOW_FACTOR * width, width, max(longest, width)))
+    moved = max(acceleration - smoothed_noise(power, width, 2), 1e-300)
+    slow_width = float(
+        np.clip(SLOW_SHARE * np.sqrt(speed / moved), width, SLOW_FACTOR * width)
+    )
     return Scales(width, sure(width), slow_width, sure(slow_width))
 
 
@@ -247,26 +246,47 @@ class Rows:
 
     def smoothed(self, columns: np.ndarray) -> np.ndarray:
         """Smooth columns of all rows as the torque was, `[R, ...]`."""
-        from scipy.ndimage import gaussian_filter1d
+        from scipy.ndimage import correlate1d
 
-        return gaussian_filter1d(columns, self.blur, axis=0, mode="nearest", truncate=4)
+        return correlate1d(columns, self.weights, axis=0, mode="nearest")
 
-    def low_passed(self, columns: np.ndarray, time_constant: float) -> np.ndarray:
-        """Filter columns of all rows by a low pass of first order, as a drive filters its torque, `[R, ...]`."""
-        from scipy.signal import lfilter
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """Weights of the kernel over rows, two zeros at either end, `[W]`."""
+        half = int(4.0 * self.blur + 0.5)
+        found = np.pad(np.exp(-0.5 * (np.arange(-half, half + 1) / self.blur) ** 2), 2)
+        return found / found.sum()
 
+    @cached_property
+    def sloping(self) -> np.ndarray:
+        """Slope of the weights over time, `[W]`."""
+        return np.gradient(self.weights, self.spacing)
+
+    @cached_property
+    def linear(self) -> np.ndarray:
+        """Smoothed speed, its size, and sine and cosine of the angle, `[4, R]`."""
+        columns = [
+            self.speed,
+            np.abs(self.speed),
+            np.sin(self.angle),
+            np.cos(self.angle),
+        ]
+        return np.array([self.smoothed(each) for each in columns])
+
+    def low_passed(self, values: np.ndarray, time_constant: float) -> np.ndarray:
+        """Filter values at all rows by a low pass of first order, as a drive filters its torque, `[R]`."""
         if time_constant <= 1e-5:
-            return columns
-        keep = np.exp(-self.spacing / time_constant)
-        half = 0.5 * (1.0 - keep)
-        begin = columns[:1] * (0.5 * (1.0 + keep))
-        return lfilter([half, half], [1.0, -keep], columns, axis=0, zi=begin)[0]
+            return values
+        path = np.full(len(values), self.spacing / time_constant)
+        path[0] = np.inf
+        means = 0.5 * (values + np.append(values[0], values[:-1]))
+        return follow_path(means[:, None], path)[:, 0]
 
     def measured(self, delay: float) -> np.ndarray:
         """Return the torque of the fitted rows, read later by a delay [s], `[F]` [N m]."""
         return np.interp(self.time[self.fitted] + delay, self.even.time, self.torque)
 
-    @property
+    @cached_property
     def path(self) -> np.ndarray:
         """Distance [rad] from the row before, `[R]`."""
         return np.abs(np.diff(self.angle, prepend=self.angle[0]))
@@ -283,9 +303,9 @@ def rows_of(log: EvenLog, limits: Scales) -> Rows:
     from scipy.ndimage import gaussian_filter1d
 
     width = limits.width
-    smooth = {"sigma": width / log.dt, "mode": "nearest", "truncate": REACH}
     torque, external = (
-        gaussian_filter1d(each, **smooth) for each in (log.torque, log.external)
+        gaussian_filter1d(each, width / log.dt, mode="nearest", truncate=REACH)
+        for each in (log.torque, log.external)
     )
     spacing = max(width / PER_WIDTH, log.dt)
     time = np.arange(log.time[0], log.time[-1], spacing)
@@ -299,24 +319,19 @@ def rows_of(log: EvenLog, limits: Scales) -> Rows:
     )
     margin = max(REACH * width, 3.0 * limits.slow_width) + np.abs(DELAYS).max()
     usable = (time > time[0] + margin) & (time < time[-1] - margin)
+    usable &= np.arange(len(time)) % PER_WIDTH == 0
     for first, last in runs(np.abs(speed) < limits.slow):
         if (last - first) * spacing > STANDS:
             usable[first:last] = False
-    usable[np.arange(len(time)) % PER_WIDTH != 0] = False
     fitted = np.flatnonzero(usable)
-    turns = np.zeros(len(time))
-    turns[np.flatnonzero(np.diff(np.sign(speed)))] = 1.0
     blur = width / spacing
-    near = gaussian_filter1d(turns, blur, mode="nearest", truncate=4) > 1e-4 / blur
-    direction = np.clip(speed / limits.slow, -1.0, 1.0)
+    turns = np.diff(np.sign(speed), append=np.sign(speed[-1])) != 0.0
+    near = (
+        gaussian_filter1d(turns.astype(float), blur, mode="nearest", truncate=4)
+        > 1e-4 / blur
+    )
     block = ((time - time[0]) / BLOCK).astype(int)
     return Rows(
-        log, spacing, blur, time, angle, speed, acceleration, external, direction, torque,
+        log, spacing, blur, time, angle, speed, acceleration, external, np.clip(speed / limits.slow, -1.0, 1.0), torque,
         fitted, near[fitted].astype(int), block[fitted],
     )  # fmt: skip
-
-
-def runs(mask: np.ndarray) -> np.ndarray:
-    """Return the first index of each run of True, and the first behind it, `[N, 2]`."""
-    edges = np.diff(np.concatenate([[0], mask.astype(int), [0]]))
-    return np.flatnonzero(edges).reshape(-1, 2)

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints import subsets
-from planarfriction.joints.balance import (
-    FACTORS,
-    MOST_LOAD,
-    TERMS,
-    Refined,
-    miss,
-    predict,
-    refine,
-)
+from planarfriction.joints.balance import TERMS, Refined, errors, predict, refine
 from planarfriction.joints.log import JointLog
+from planarfriction.joints.numbers import PARAMETERS, Values
 from planarfriction.joints.smoothing import (
-    EvenLog,
     Rows,
     Scales,
     evenly,
@@ -76,95 +67,27 @@ GRID = 9
 """Number of Stribeck speeds, and of bends, that are searched."""
 
 
-@dataclass(frozen=True)
-class Data:
+class Data(NamedTuple):
     """Logs of torques, smoothed by one kernel, with what they can show."""
 
-    evens: tuple[EvenLog, ...]
-    """Logs that move."""
     limits: Scales
     """Width of the kernel, and least speed."""
     rows: tuple[Rows, ...]
-    """Rows of each log."""
-
-    @cached_property
-    def speed(self) -> np.ndarray:
-        """Speed at all fitted rows [rad/s]."""
-        return np.concatenate([each.speed[each.fitted] for each in self.rows])
-
-    @cached_property
-    def torque(self) -> np.ndarray:
-        """Measured torque at all fitted rows [N m]."""
-        return np.concatenate([each.measured(0.0) for each in self.rows])
-
-    @cached_property
-    def fastest(self) -> float:
-        """Speed that 1 % of the rows exceed [rad/s]."""
-        return float(np.percentile(np.abs(self.speed), 99))
-
-    @cached_property
-    def turning(self) -> np.ndarray:
-        """Acceleration at each reversal [rad/s^2]."""
-        return np.concatenate(
-            [np.abs(each.acceleration[each.reversals]) for each in self.rows]
-        )
-
-    @cached_property
-    def slowest_fall(self) -> float:
-        """Stribeck speed below which the logs show none [rad/s]."""
-        slow = np.sort(np.abs(self.speed))
-        crossed = (
-            0.5 * self.limits.width * np.percentile(self.turning, 20)
-            if len(self.turning)
-            else 0.0
-        )
-        return float(max(1.5 * self.limits.slow, slow[min(40, len(slow) - 1)], crossed))
-
-    @cached_property
-    def least_bend(self) -> float:
-        """Deflection of bristles below which the logs show none [rad]."""
-        turned = (
-            0.5 * self.limits.width**2 * np.percentile(self.turning, 20)
-            if len(self.turning)
-            else 1.0
-        )
-        return float(max(max(each.resolution for each in self.evens), turned, 1e-6))
-
-    @property
-    def grid(self) -> subsets.Grid:
-        """Stribeck speeds and bends that the logs can show."""
-        swing = np.ptp(np.concatenate([each.angle for each in self.rows]))
-        highest = 0.5 * self.fastest
-        speeds = (
-            np.geomspace(self.slowest_fall, highest, GRID)
-            if self.shows_fall
-            else np.array([highest])
-        )
-        return subsets.Grid(
-            speeds,
-            np.geomspace(
-                self.least_bend, max(0.1 * swing, 4.0 * self.least_bend), GRID
-            ),
-        )
-
-    @property
-    def shows_fall(self) -> bool:
-        """True if the speeds are spread enough to show a fall of friction with speed."""
-        return 0.5 * self.fastest > 1.3 * self.slowest_fall
-
-    @property
-    def allowed(self) -> list[str]:
-        """Terms that the logs can show."""
-        blind = {
-            "stribeck": not self.shows_fall,
-            "bristles": len(self.turning) < REVERSALS,
-        }
-        return [term for term in TERMS if not blind.get(term)]
-
-    def wider(self) -> tuple[Rows, ...]:
-        """Smooth the logs by a wider kernel."""
-        limits = self.limits._replace(width=WIDER * self.limits.width)
-        return tuple(rows_of(each, limits) for each in self.evens)
+    """Rows of each log that moves."""
+    speed: np.ndarray
+    """Speed at all fitted rows [rad/s]."""
+    torque: np.ndarray
+    """Measured torque at all fitted rows [N m]."""
+    fastest: float
+    """Speed that 1 % of the rows exceed [rad/s]."""
+    slowest_fall: float
+    """Stribeck speed below which the logs show none [rad/s]."""
+    least_bend: float
+    """Deflection of bristles below which the logs show none [rad]."""
+    grid: subsets.Grid
+    """Stribeck speeds and bends that the logs can show."""
+    allowed: list[str]
+    """Terms that the logs can show."""
 
 
 def prepare(logs: Sequence[JointLog]) -> Data:
@@ -183,82 +106,103 @@ def prepare(logs: Sequence[JointLog]) -> Data:
         raise InvalidValueError(
             f"q of {logs[0].name}", rule, f"a swing of {np.ptp(logs[0].q):.2g} rad"
         )
+    step = max(1e-6, *(each.resolution for each in moving))
+    bits = np.log2(np.array([360.0, 2.0 * np.pi]) / step)
+    degrees, radians = np.abs(bits - np.round(bits))
+    if degrees < 2e-3 < radians and bits[0] > 6.0:
+        raise InvalidValueError(
+            "q of the logs",
+            "be in rad",
+            "steps of 360 over a power of two: it is in degrees",
+        )
     limits = scales(moving, kernel_width(moving))
-    kept = [
-        (each, rows)
-        for each in moving
-        if len((rows := rows_of(each, limits)).fitted) >= LEAST_ROWS
-    ]
-    if not kept:
+    rows = tuple(
+        each
+        for each in (rows_of(even, limits) for even in moving)
+        if len(each.fitted) >= LEAST_ROWS
+    )
+    if not rows:
         raise InvalidValueError(
             "logs", "move for longer than a second", "too few samples in motion"
         )
-    data = Data(
-        tuple(even for even, _ in kept), limits, tuple(rows for _, rows in kept)
-    )
-    forth = np.mean(data.speed > 2.0 * limits.slow)
-    back = np.mean(data.speed < -2.0 * limits.slow)
+    speed = np.concatenate([each.speed[each.fitted] for each in rows])
+    forth = np.mean(speed > 2.0 * limits.slow)
+    back = np.mean(speed < -2.0 * limits.slow)
     if min(forth, back) < MATTERS:
         rule = "move in both directions: Coulomb friction and an offset of the torque look alike in one"
         raise InvalidValueError(
             "logs", rule, f"{forth:.0%} of the samples forwards, {back:.0%} backwards"
         )
-    return data
+    torque = np.concatenate([each.measured(0.0) for each in rows])
+    slow = np.sort(np.abs(speed))
+    fastest = float(np.percentile(slow, 99))
+    turning = np.concatenate(
+        [np.abs(each.acceleration[each.reversals]) for each in rows]
+    )
+    # change of the speed within half a width of the kernel at a gentle reversal
+    crossed = (
+        0.5 * limits.width * float(np.percentile(turning, 20)) if len(turning) else 0.0
+    )
+    slowest_fall = float(max(1.5 * limits.slow, slow[min(40, len(slow) - 1)], crossed))
+    resolution = max(each.even.resolution for each in rows)
+    least_bend = max(resolution, crossed * limits.width if len(turning) else 1.0, 1e-6)
+    swing = np.ptp(np.concatenate([each.angle for each in rows]))
+    bends = np.geomspace(least_bend, max(0.1 * swing, 4.0 * least_bend), GRID)
+    falls = 0.5 * fastest > 1.3 * slowest_fall
+    speeds = (
+        np.geomspace(slowest_fall, 0.5 * fastest, GRID)
+        if falls
+        else np.array([0.5 * fastest])
+    )
+    blind = {"stribeck": not falls, "bristles": len(turning) < REVERSALS}
+    allowed = [term for term in TERMS if not blind.get(term)]
+    grid = subsets.Grid(speeds, bends)
+    return Data(
+        limits, rows, speed, torque, fastest, slowest_fall, least_bend, grid, allowed
+    )
 
 
 def choose(
     data: Data, told: Sequence[str], auto: bool, progress: Callable[[str], None]
-) -> list[Refined]:
-    """Refine sets of terms; return the smallest of the best first, then the others.
+) -> tuple[list[Refined], Refined]:
+    """Refine sets of terms; return the smallest of the best first, then the others; and a first fit without terms.
 
     A set is kept if its score, over blocks, lies within one standard error or `FLAT` of the best. Terms that a set does
     not show are left out of it. Without `auto`, only the set that was told is refined.
     """
-    progress("Coulomb and viscous friction")
-    start = {
-        "inertia": 0.0,
-        "mu_c": float(data.torque.std()),
-        "sigma_2": 0.0,
-        "torque_offset": 0.0,
-        "delay": 0.0,
-    }
-    progress(
-        f"first estimate, Coulomb and viscous friction: {_level(refine(data.rows, start, ()).values)}; all sets"
-    )
-    grid = data.grid
-    largest = float(np.abs(data.torque).max())
+    progress(_words(()))
+    start = {"inertia": 0.0, "mu_c": float(data.torque.std()), "sigma_2": 0.0}
+    baseline = refine(data.rows, start, ())
+    progress(f"first estimate, {_words(())}: {_level(baseline.values)}; all sets")
     allowed = data.allowed if auto else told
-    candidates = subsets.search(data.rows, grid, told, allowed)
-    first = candidates[0]
-    progress(f"best set by sums, {_words(first.terms)}: {_level(first.values)}")
+    candidates = subsets.search(data.rows, data.grid, told, allowed)
+    values = {each.terms: each.values for each in candidates}
+    first = candidates[0].terms
+    progress(f"best set by sums, {_words(first)}: {_level(values[first])}")
     rough: dict[str, float] = {}
-    if "bristles" in first.terms and "stribeck" in allowed:
-        terms = (
-            first.terms
-            if "stribeck" in told
-            else tuple(each for each in first.terms if each != "stribeck")
-        )
-        rough = refine(
-            data.rows, subsets.started(_named(candidates, terms), largest), terms
-        ).values
-    best = refine(data.rows, _start(data, first, rough, largest), first.terms)
-    progress(f"second estimate, {_words(best.terms)}: {_level(best.values)}")
-    fits = {best.terms: best}
+    if "bristles" in first and "stribeck" in allowed:
+        terms = tuple(each for each in first if each != "stribeck" or each in told)
+        rough = refine(data.rows, values[terms], terms).values
+    best = refine(data.rows, _start(data, values[first], rough), first)
+    progress(f"second estimate, {_words(first)}: {_level(best.values)}")
+    fits = {first: best}
 
     def refined(terms: tuple[str, ...]) -> Refined:
         if terms not in fits:
             progress(_words(terms))
-            start = _start(data, _named(candidates, terms), rough, largest)
-            known = {
+            start = _start(data, values[terms], rough)
+            start |= {
                 name: value for name, value in best.values.items() if name in start
             }
-            fits[terms] = refine(data.rows, start | known, terms, best.scatter)
+            fits[terms] = refine(data.rows, start, terms, best.scatter)
         return fits[terms]
 
+    most = FAR * candidates[0].score
     near = [
-        each.terms for each in candidates if len({*each.terms} ^ {*first.terms}) == 1
+        each.terms
+        for each in candidates
+        if len({*each.terms} ^ {*first}) == 1 and each.score < most
     ]
-    near = [each for each in near if _named(candidates, each).score < FAR * first.score]
     good: dict[tuple[str, ...], Refined] = {}
     for terms in dict.fromkeys(
         [*(each.terms for each in candidates[:REFINED]), *near, tuple(told)]
@@ -270,19 +214,16 @@ def choose(
     ranked = sorted(good.values(), key=lambda each: each.score)
     close = [each for each in ranked if _as_good(each, ranked[0])]
     smallest = min(close, key=lambda each: (len(each.terms), each.score))
-    return [smallest, *(each for each in ranked if each is not smallest)]
+    return [smallest, *(each for each in ranked if each is not smallest)], baseline
 
 
-def _start(
-    data: Data, candidate: subsets.Candidate, rough: Mapping[str, float], largest: float
-) -> dict[str, float]:
+def _start(data: Data, start: dict[str, float], rough: Values) -> dict[str, float]:
     """Return the numbers from which a set of terms is refined.
 
     Bristles lag by the level itself, which the sums do not know: with them, a fall of friction is searched once more
     by the model, around the `rough` numbers of a fit without it.
     """
-    start = subsets.started(candidate, largest)
-    if not ("stribeck" in candidate.terms and rough):
+    if not ("rise" in start and rough):
         return start
     # a delay that ended at its bound without a fall of friction would stay there
     known = start | {
@@ -296,18 +237,11 @@ def _start(
         for speed in data.grid.v_s.tolist()
     ]
     return min(
-        [start, *falls], key=lambda values: miss(data.rows, values, candidate.terms)
+        [start, *falls], key=lambda values: np.abs(errors(data.rows, values)).mean()
     )
 
 
-def _named(
-    candidates: Sequence[subsets.Candidate], terms: tuple[str, ...]
-) -> subsets.Candidate:
-    """Return the candidate with some terms."""
-    return next(each for each in candidates if each.terms == terms)
-
-
-def _level(values: Mapping[str, float]) -> str:
+def _level(values: Values) -> str:
     return ", ".join(f"{name} = {values[name]:.3g}" for name in ("mu_c", "sigma_2"))
 
 
@@ -334,62 +268,44 @@ def doubt(data: Data, fit: Refined, term: str) -> str:
     values = fit.values
     spread = fit.spread
     level = values["mu_c"] + max(values.get("rise", 0.0), 0.0)
-    if term == "stribeck":
-        return _doubt_of_fall(data, values, spread, level)
-    if term == "bristles":
-        bend = level / values["sigma_0"]
-        if bend <= 0.5 * data.least_bend:
-            return f"its bend of {bend:.2g} rad is below the {data.least_bend:.2g} rad that these logs show"
-        vague = spread["sigma_0"] >= SURE_FACTOR
-        return (
-            f"sigma_0 is only known within a factor of {np.exp(min(2.0 * spread['sigma_0'], 700.0)):.2g}"
-            if vague
-            else ""
-        )
-    least = {
-        "gravity": MATTERS * level,
-        "load": MATTERS,
-        "asymmetry": MATTERS * level / data.fastest,
-    }[term]
-    names = TERMS[term]
-    size = (
-        float(np.hypot(*(values[name] for name in names)))
-        if term == "gravity"
-        else values[names[0]]
-    )
-    # Its level may as well be an offset of the torque.
-    tested = names[:1] if term == "asymmetry" else names
-    clear = max(abs(values[name]) / max(spread[name], 1e-300) for name in tested)
-    if term == "load" and size >= MOST_LOAD - 0.01:
-        return "the level would grow with all of the torque"
-    size = size if term == "load" else abs(size)
-    return (
-        ""
-        if clear > SURE and size > least
-        else f"{names[0]} = {size:.2g} is not clear of zero, or does not matter"
-    )
-
-
-def _doubt_of_fall(
-    data: Data, values: dict[str, float], spread: dict[str, float], level: float
-) -> str:
-    speed = values["v_s"]
-    rise = values["rise"]
-    if not 0.5 * data.slowest_fall < speed < 1.5 * data.fastest:
+    factor = next((name for name in TERMS[term] if PARAMETERS[name].logarithmic), "")
+    if (
+        term == "bristles"
+        and (bend := level / values["sigma_0"]) <= 0.5 * data.least_bend
+    ):
+        return f"its bend of {bend:.2g} rad is below the {data.least_bend:.2g} rad that these logs show"
+    if (
+        term == "stribeck"
+        and not 0.5 * data.slowest_fall < values["v_s"] < 1.5 * data.fastest
+    ):
         reach = f"{data.slowest_fall:.2g} to {data.fastest:.2g} rad/s"
-        return f"its speed of {speed:.2g} rad/s lies outside of those that these logs show, {reach}"
-    if spread["v_s"] >= SURE_FACTOR:
-        return f"v_s is only known within a factor of {np.exp(min(2.0 * spread['v_s'], 700.0)):.2g}"
-    bands = np.histogram(
-        np.abs(data.speed), np.linspace(min(data.limits.slow, speed), speed, BANDS + 1)
-    )[0]
-    if rise > MOST_RISE * values["mu_c"] and bands.min() < LEAST_ROWS:
-        return f"mu_s would be {1.0 + rise / values['mu_c']:.2g} mu_c, and too few samples are slow enough to show it"
-    clear = rise > max(SURE * spread["rise"], MATTERS * level)
+        return f"its speed of {values['v_s']:.2g} rad/s lies outside of those that these logs show, {reach}"
+    if factor and spread[factor] >= SURE_FACTOR:
+        return f"{factor} is only known within a factor of {np.exp(min(2.0 * spread[factor], 700.0)):.2g}"
+    if term == "stribeck" and values["rise"] > MOST_RISE * values["mu_c"]:
+        slow = np.linspace(
+            min(data.limits.slow, values["v_s"]), values["v_s"], BANDS + 1
+        )
+        if np.histogram(np.abs(data.speed), slow)[0].min() < LEAST_ROWS:
+            ratio = 1.0 + values["rise"] / values["mu_c"]
+            return f"mu_s would be {ratio:.2g} mu_c, and too few samples are slow enough to show it"
+    if term == "load" and values["load"] >= PARAMETERS["load"].high - 0.01:
+        return "the level would grow with all of the torque"
+    if term == "bristles":
+        return ""
+    # the level of an asymmetry may as well be an offset of the torque
+    names = [name for name in TERMS[term] if name not in (factor, "asymmetry")]
+    size = float(np.hypot.reduce([values[name] for name in names]))
+    least = MATTERS * {"load": 1.0, "asymmetry": level / data.fastest}.get(term, level)
+    clear = (
+        max(abs(values[name]) / max(spread[name], 1e-300) for name in names) > SURE
+        and size > least
+    )
+    against = term in ("stribeck", "load") and values[names[0]] < 0.0
     return (
         ""
-        if clear
-        else f"mu_s exceeds mu_c by {rise:.2g} N m, which is not clear of zero, or does not matter"
+        if clear and not against
+        else f"{names[0]} = {size:.2g} is not clear of zero, or does not matter"
     )
 
 
@@ -413,78 +329,45 @@ def finish(
         if terms == fit.terms:
             return fit
         if terms not in fits:
-            start = {
-                name: value for name, value in fit.values.items() if name not in FACTORS
-            }
-            fits[terms] = refine(
-                data.rows,
-                {"delay": 0.0} | start | _factors(fit),
-                terms,
-                ranked[0].scatter,
-            )
+            fits[terms] = refine(data.rows, fit.values, terms, ranked[0].scatter)
         if fits[terms].score > 1.2 * fits.get(fit.terms, fit).score:
             return fit
         fit = fits[terms]
 
 
-def _factors(fit: Refined) -> dict[str, float]:
-    return {name: fit.values[name] for name in FACTORS if name in fit.values}
-
-
 def _lagging(data: Data, fit: Refined) -> Refined:
     """Refine a fit once more, and with a low pass in place of its delay where that explains more."""
-    fit = refine(data.rows, {"delay": 0.0} | fit.values, fit.terms)
+    fit = refine(data.rows, fit.values, fit.terms)
     delay = fit.values["delay"]
     if delay <= max(LATEST, SURE * fit.spread["delay"]):
         return fit
     low = refine(
-        data.rows,
-        fit.values | {"low_pass": delay, "delay": 0.0},
-        fit.terms,
-        None,
-        "low_pass",
+        data.rows, fit.values | {"low_pass": delay}, fit.terms, None, "low_pass"
     )
-    return (
-        low
-        if np.square(low.error).sum()
-        < np.square(_low_passed_error(data, fit, delay)).sum()
-        else fit
-    )
-
-
-def _low_passed_error(data: Data, fit: Refined, time_constant: float) -> np.ndarray:
-    """Compute the error of a fit with a delay behind a low pass, which removes as much of the angle's noise."""
-    found = predict(data.rows, fit.values, fit.terms)
-    return np.concatenate(
-        [
-            rows.low_passed(
-                torque
-                - np.interp(
-                    rows.time + fit.values["delay"], rows.even.time, rows.torque
-                ),
-                time_constant,
-            )[rows.fitted]
-            for torque, rows in zip(found, data.rows, strict=True)
-        ]
-    )
+    # behind a low pass too, which removes as much of the angle's noise
+    squares = 0.0
+    for rows, torque in zip(data.rows, predict(data.rows, fit.values), strict=True):
+        late = np.interp(rows.time + delay, rows.even.time, rows.torque)
+        squares += np.square(rows.low_passed(torque - late, delay)[rows.fitted]).sum()
+    return low if np.square(low.error).sum() < squares else fit
 
 
 def _widened(data: Data, fit: Refined) -> Refined:
     """Add to the spreads what another kernel and even weights move: a term that reversals alone support moves then."""
     late = "low_pass" if "low_pass" in fit.values else "delay"
     even = np.full(2, fit.scatter.max())
+    limits = data.limits._replace(width=WIDER * data.limits.width)
+    wider = [rows_of(each.even, limits) for each in data.rows]
     others = [
         refine(data.rows, fit.values, fit.terms, even, late).values,
-        refine(data.wider(), fit.values, fit.terms, None, late).values,
+        refine(wider, fit.values, fit.terms, None, late).values,
     ]
     spread = {}
     for name, error in fit.spread.items():
         value = fit.values[name]
-        if name in FACTORS:
-            moves = [np.log(each[name] / value) for each in others]
-            least = EXACT
+        if PARAMETERS[name].logarithmic:
+            moves = [EXACT, *(np.log(each[name] / value) for each in others)]
         else:
-            moves = [each[name] - value for each in others]
-            least = EXACT * abs(value)
-        spread[name] = float(np.sqrt(error**2 + np.sum(np.square(moves)) + least**2))
+            moves = [EXACT * value, *(each[name] - value for each in others)]
+        spread[name] = float(np.linalg.norm([error, *moves]))
     return fit._replace(spread=spread)

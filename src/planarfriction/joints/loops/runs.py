@@ -102,20 +102,6 @@ def joint_step(joint, z, speed, tau_motor, tau_external, dt):
 
 
 @jit
-def follow_path(columns, travelled, lagged):
-    """Write what follows each column `[R, C]` by a lag of first order over a path, `dz/du = x - z`, from 0.
-
-    `travelled` `[R]` is the path from the row before, in lengths of the lag.
-    """
-    for j in range(columns.shape[1]):
-        z = 0.0
-        for i in range(len(columns)):
-            keep = math.exp(-travelled[i])
-            z = keep * z + (1.0 - keep) * columns[i, j]
-            lagged[i, j] = z
-
-
-@jit
 def run_measured(joint, time, speed, tau_motor, tau_external, taken):
     """Write the friction [N m] along a measured motion into `taken` `[T]`; bristles begin straight."""
     z = 0.0
