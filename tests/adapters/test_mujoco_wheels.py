@@ -14,18 +14,25 @@ mujoco = pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare  # noqa: E402
 from planarfriction.errors import InvalidValueError  # noqa: E402
 from tests.support.wheels import (  # noqa: E402
+    CAR,
     DT,
     HALF,
     LAW,
-    MASS,
+    MOTORS,
     POINT,
     RADIUS,
     SHAPES,
     SITES,
+    STRIP,
+    TRAIL,
     TREAD,
     box,
+    car,
+    caster,
+    drawn,
     face,
     on_the_floor,
+    roller,
     wheel,
 )
 
@@ -163,14 +170,7 @@ def test_a_puck_with_its_site_in_the_middle_slides_and_a_coin_on_its_rim_rolls()
 @pytest.mark.parametrize("angle", [45.0, -30.0])
 def test_a_mecanum_roller_rolls_across_its_axis_and_holds_along_it(angle):
     """On a carrier of its own mass, thrown at an angle: v/(1 + I/(m r^2)) is left across it, and nothing along it."""
-    i = 0.5 * MASS * RADIUS**2
-    text = f"""<mujoco><option timestep="{DT}"/><worldbody><geom name="floor" type="plane" size="9 9 .1"/>
-    <body pos="0 0 {RADIUS - 1e-5}" euler="0 0 {angle}"><joint type="slide" axis="1 0 0"/>
-    <joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
-    <inertial pos="0 0 0" mass="{MASS}" diaginertia="1 1 1"/><body euler="90 0 0"><joint axis="0 0 1"/>
-    <inertial pos="0 0 0" mass="{MASS}" diaginertia="{i} {i} {i}"/>
-    <geom name="roller" type="cylinder" size="{RADIUS} {HALF}"/>
-    <site name="roller" xyaxes="0 0 1 1 0 0"/></body></body></worldbody></mujoco>"""
+    text = on_the_floor(roller(angle))
     d, friction = made(
         text, PatchContact(TREAD, site="roller", geoms=("floor", "roller"))
     )
@@ -187,24 +187,11 @@ def test_a_mecanum_roller_rolls_across_its_axis_and_holds_along_it(angle):
 
 def test_a_car_goes_as_its_wheels_turn():
     """Two driven wheels and a sphere in a socket behind: v = w r ahead, and (w_2 - w_1) r/b about the middle of b."""
-    geoms = "".join(
-        f"""<body pos="0 {y} {RADIUS}" euler="90 0 0"><joint name="{name}" axis="0 0 -1"/>
-        <geom name="{name}" type="cylinder" size="{RADIUS} 0.01" mass="0.2"/>
-        <site name="{name}" xyaxes="0 0 1 1 0 0"/></body>"""
-        for name, y in (("right", -0.1), ("left", 0.1))
-    )
-    text = f"""<mujoco><option timestep="{DT}" integrator="implicitfast"/><worldbody>
-    <geom name="floor" type="plane" size="9 9 .1"/>
-    <body><freejoint/><geom type="box" size="0.1 0.08 0.02" pos="-0.04 0 0.05" mass="1"/>{geoms}
-    <body pos="-0.15 0 0.02"><joint type="ball"/><geom name="ball" type="sphere" size="0.02" mass="0.05"/>
-    <site name="ball"/></body></body></worldbody>
-    <actuator><velocity joint="right" kv="1"/><velocity joint="left" kv="1"/></actuator></mujoco>"""
-    tread = pf.ReducedModel(pf.ContactPatch.rectangle(0.004, 0.0005, cells=5), LAW)
+    text = on_the_floor(car(), options='integrator="implicitfast"', more=MOTORS)
     patches = [
-        PatchContact(tread, site=name, geoms=("floor", name))
-        for name in ("right", "left")
+        PatchContact(model, site=name, geoms=("floor", name))
+        for name, model in CAR.items()
     ]
-    patches += [PatchContact(POINT, site="ball", geoms=("floor", "ball"))]
     d, friction = made(text, *patches)
     for right, left in ((6.0, 6.0), (6.0, 4.0)):
         d.ctrl[:] = right, left
@@ -223,33 +210,22 @@ def test_a_car_goes_as_its_wheels_turn():
 
 def test_a_caster_swings_behind_its_pivot():
     """Drawn at a constant speed it follows a tractrix: tan(phi/2) falls as exp(-v t/a) behind the pivot."""
-    trail = 0.04
     speed = 0.2
-    start = math.radians(120.0)
-    text = f"""<mujoco><option timestep="{DT}" integrator="implicitfast"/><worldbody>
-    <geom name="floor" type="plane" size="9 9 .1"/>
-    <body><joint type="slide" axis="1 0 0"/><geom type="sphere" size="0.01" mass="1000" contype="0" conaffinity="0"/>
-    <body><joint type="slide" axis="0 0 1"/><joint name="swivel" axis="0 0 1"/>
-    <geom type="sphere" size="0.01" pos="0 0 0.06" mass="0.5" contype="0" conaffinity="0"/>
-    <body pos="{-trail} 0 {0.5 * RADIUS}" euler="90 0 0"><joint axis="0 0 1"/>
-    <geom name="wheel" type="cylinder" size="{0.5 * RADIUS} 0.002" mass="0.01"/>
-    <site name="wheel" xyaxes="0 0 1 1 0 0"/></body></body></body></worldbody></mujoco>"""
-    tread = pf.ReducedModel(pf.ContactPatch.rectangle(0.0005, cells=3), LAW)
+    start = 120.0
+    text = on_the_floor(caster(start), options='integrator="implicitfast"')
     d, friction = made(
-        text, PatchContact(tread, site="wheel", geoms=("floor", "wheel"))
+        text, PatchContact(STRIP, site="caster", geoms=("floor", "caster"))
     )
-    d.qpos[2] = start
     for _ in range(50):
         friction.step(d)
-    begin = d.qpos[2]
-    d.qvel[0] = speed
-    # it starts without slip, the wheel rolling and the arm turning about the pivot
-    d.qvel[2] = -speed / trail * math.sin(begin)
-    d.qvel[3] = -speed * math.cos(begin) / (0.5 * RADIUS)
+    begin = math.radians(start) + d.qpos[2]
+    d.qvel[:] = drawn(math.degrees(begin), speed)
     for i in range(1, 301):
         friction.step(d)
-        wanted = math.tan(0.5 * begin) * math.exp(-speed * i * DT / trail)
-        assert math.tan(0.5 * d.qpos[2]) == pytest.approx(wanted, rel=0.02, abs=2e-3)
+        wanted = math.tan(0.5 * begin) * math.exp(-speed * i * DT / TRAIL)
+        assert math.tan(0.5 * (math.radians(start) + d.qpos[2])) == pytest.approx(
+            wanted, rel=0.02, abs=2e-3
+        )
     assert friction.misplaced(d) is None
 
 

@@ -131,6 +131,22 @@ def test_pads_that_close_while_they_turn_do_not_turn_what_they_hold():
     assert np.ptp(scene.places(*in_mujoco(scene, 0.4))[:, 2]) < 1e-4
 
 
+def test_what_soft_pads_hold_creeps_by_what_the_second_order_leaves():
+    """By `(1/8 - y/(6 a x)) a^4 x` in each step, with `a = w dt`, where pads give by y.
+
+    A place (x, y) that turns by a moves by `y a + x a^2/2` towards the axis, which leaves out `y a^3/6`, and by
+    `x a - y a^2/2` along the normal, which takes `x a^3/6` too much for pads that close.
+    """
+    scene = turning("arm", 10.0, 2e-3)._replace(ctrl=120.0)
+    times, qpos = in_mujoco(scene, 3.0)
+    radius, angle, _ = scene.places(times, qpos)[times > 1.5].T
+    place = radius * np.exp(1j * angle)
+    creep = np.diff(place.real[[0, -1]])[0] / (len(place) - 1) / (0.02**4 * 0.5)
+    assert creep == pytest.approx(
+        1.0 / 8.0 - place[0].imag / (6.0 * 0.02 * 0.5), abs=2e-3
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.mjx
 def test_pads_that_close_while_they_turn_do_not_turn_what_they_hold_in_mjx():

@@ -51,7 +51,7 @@ def twists_and_loads(friction, d, before) -> tuple[np.ndarray, np.ndarray]:
             gain += side * np.array(
                 [*(axes[:2] @ gains @ before), axes[2] @ gained @ before]
             )
-            apart += side * axes[2] @ (moves + 0.5 * dt * gains) @ before
+            apart += side * axes[2] @ (moves - 0.5 * dt * gains) @ before
         # the contact goes along with the smaller geom: over its surface, and away from it
         goes = 0 if placed.carrier == placed.own else 1
         body = (placed.owner, placed.support)[goes]
@@ -60,8 +60,8 @@ def twists_and_loads(friction, d, before) -> tuple[np.ndarray, np.ndarray]:
         over = velocities[goes] - moves @ before
         over -= (axes[2] @ over) * axes[2]
         moved = np.cross(over, spin)
-        # what leaves, leaves along the normal, which turns with both bodies
-        apart += 0.5 * dt * axes[2] @ moved
+        # what has left in the last step, leaves along the normal, which turns with both bodies
+        apart -= 0.5 * dt * axes[2] @ moved
         moved += apart * np.cross(axes[2], spins[0] + spins[1])
         gain[:2] += axes[:2] @ (np.cross(gain[2] * axes[2], went) + moved)
         twists[p] += 0.5 * dt * gain

@@ -1,4 +1,4 @@
-"""Wheels, and boxes that slide, in MuJoCo: bodies whose motion has a closed form wherever their site lies."""
+"""Bodies in MuJoCo whose motion has a closed form wherever their site lies: wheels, rollers, casters, cars, boxes."""
 
 from __future__ import annotations
 
@@ -68,12 +68,77 @@ def face(mu: float) -> pf.ReducedModel:
     return pf.ReducedModel(pf.ContactPatch.rectangle(2.0 * HALF, cells=9), law)
 
 
-def on_the_floor(*bodies: str, options: str = "") -> str:
-    """Return a model of bodies on a floor."""
+STRIP = pf.ReducedModel(pf.ContactPatch.rectangle(0.0005, cells=3), LAW)
+"""Patch under the thin wheel of a caster."""
+
+NARROW = pf.ReducedModel(pf.ContactPatch.rectangle(0.004, 0.0005, cells=5), LAW)
+"""Patch under a wheel of a car."""
+
+
+def roller(angle: float, *, y: float = 0.0) -> str:
+    """Return a roller with its axis at an angle [degrees] to y, on a carrier of its own mass that does not turn."""
+    i = 0.5 * MASS * RADIUS**2
+    return f"""<body pos="0 {y} {RADIUS - 1e-5}" euler="0 0 {angle}"><joint type="slide" axis="1 0 0"/>
+    <joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
+    <inertial pos="0 0 0" mass="{MASS}" diaginertia="1 1 1"/><body euler="90 0 0"><joint axis="0 0 1"/>
+    <inertial pos="0 0 0" mass="{MASS}" diaginertia="{i} {i} {i}"/>
+    <geom name="roller" type="cylinder" size="{RADIUS} {HALF}" {ALONE}/>
+    <site name="roller" xyaxes="0 0 1 1 0 0"/></body></body>"""
+
+
+TRAIL = 0.04
+"""Distance of a caster's wheel from its pivot [m]."""
+
+
+def caster(start: float, *, y: float = 0.0) -> str:
+    """Return a caster that stands at an angle [degrees] from where it is drawn to, along x, by a heavy sphere."""
+    return f"""<body pos="0 {y} 0"><joint type="slide" axis="1 0 0"/>
+    <geom type="sphere" size="0.01" mass="1000" {ALONE}/>
+    <body euler="0 0 {start}"><joint type="slide" axis="0 0 1"/><joint name="swivel" axis="0 0 1"/>
+    <geom type="sphere" size="0.01" pos="0 0 0.06" mass="0.5" {ALONE}/>
+    <body pos="{-TRAIL} 0 {0.5 * RADIUS}" euler="90 0 0"><joint axis="0 0 1"/>
+    <geom name="caster" type="cylinder" size="{0.5 * RADIUS} 0.002" mass="0.01" {ALONE}/>
+    <site name="caster" xyaxes="0 0 1 1 0 0"/></body></body></body>"""
+
+
+def drawn(start: float, speed: float) -> tuple[float, float, float, float]:
+    """Return velocities of a caster that is drawn without slip: its wheel rolls, and the arm turns about the pivot."""
+    angle = math.radians(start)
+    return (
+        speed,
+        0.0,
+        -speed / TRAIL * math.sin(angle),
+        -speed * math.cos(angle) / (0.5 * RADIUS),
+    )
+
+
+CAR = {"right": NARROW, "left": NARROW, "behind": POINT}
+"""Patches of a car."""
+
+MOTORS = '<actuator><velocity joint="right" kv="1"/><velocity joint="left" kv="1"/></actuator>'
+"""Motors of a car, which take the speeds of its wheels [rad/s]."""
+
+
+def car(*, y: float = 0.0) -> str:
+    """Return a car on two driven wheels and a sphere in a socket behind them."""
+    wheels = "".join(
+        f"""<body pos="0 {side} {RADIUS}" euler="90 0 0"><joint name="{name}" axis="0 0 -1"/>
+        <geom name="{name}" type="cylinder" size="{RADIUS} 0.01" mass="0.2" {ALONE}/>
+        <site name="{name}" xyaxes="0 0 1 1 0 0"/></body>"""
+        for name, side in (("right", -0.1), ("left", 0.1))
+    )
+    return f"""<body name="car" pos="0 {y} 0"><freejoint/>
+    <geom type="box" size="0.1 0.08 0.02" pos="-0.04 0 0.05" mass="1" {ALONE}/>{wheels}
+    <body pos="-0.15 0 0.02"><joint type="ball"/><geom name="behind" type="sphere" size="0.02" mass="0.05" {ALONE}/>
+    <site name="behind"/></body></body>"""
+
+
+def on_the_floor(*bodies: str, options: str = "", more: str = "") -> str:
+    """Return a model of bodies on a floor, and more beside them."""
     mesh = (
         f'<asset><mesh name="wheel" vertex="{MESH}"/></asset>'
         if "mesh=" in "".join(bodies)
         else ""
     )
     return f"""<mujoco><option timestep="{DT}" {options}/>{mesh}
-    <worldbody><geom name="floor" type="plane" size="9 9 .1"/>{"".join(bodies)}</worldbody></mujoco>"""
+    <worldbody><geom name="floor" type="plane" size="9 9 .1"/>{"".join(bodies)}</worldbody>{more}</mujoco>"""

@@ -13,12 +13,6 @@ from planarfriction._engine.compiler.memory import (
 )
 from planarfriction._engine.protocol import SLOPES
 
-ALONG = 1e-12
-"""Square of the sine of the angle between a frame's x axis and the normal below which its y axis takes its place."""
-
-FLAT = 0.25
-"""Square of that sine below which a patch that was in contact before keeps its x axis, carried along with its body."""
-
 
 class Problem(NamedTuple):
     """A problem of k patches."""

@@ -15,7 +15,6 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 
 from planarfriction._engine.coupled import placing
-from planarfriction._engine.coupled.coupling_rows import ALONG, FLAT
 from planarfriction.adapters.drake.patches import Placed
 from planarfriction.errors import InvalidValueError
 
@@ -151,11 +150,12 @@ class Shadow:
             else list(placing.onto_plane(site.tolist(), middle, normal))
         )
         origin = turned.T @ (place - site)
-        last = _across((turned @ before).tolist(), normal)
-        x, last = _axis(turned[:, 0].tolist(), turned[:, 1].tolist(), last, normal)
+        across = (
+            _across(each.tolist(), normal)
+            for each in (turned[:, 0], turned[:, 1], turned @ before)
+        )
+        *x, c, s = placing.x_axis(*across, normal)
         y = _cross(normal, x)
-        c = _dot(last, x)
-        s = _dot(last, y)
         away = list(map(operator.sub, middle, place))
         beyond = (
             max(placing.excess(_dot(x, away), _dot(y, away), 1.0, self._reaches[p]))
@@ -224,7 +224,7 @@ class Shadow:
         both = (own + other)[:3]
         apart = float(normal @ away[3:])
         given = (each.tolist() for each in (over, away[:3], both, normal))
-        bend[3:] += placing.bend(*given, apart, 1.0)
+        bend[3:] += placing.bend(*given, apart, 1.0, 1.0)
         return seen @ bend / self.dt
 
     def _place(self, frame: Any, place: Sequence[float]) -> Any:
@@ -314,20 +314,6 @@ def _dot(one: Sequence[float], other: Sequence[float]) -> float:
 def _across(vector: Sequence[float], normal: Sequence[float]) -> list[float]:
     along = _dot(vector, normal)
     return [a - along * b for a, b in zip(vector, normal, strict=True)]
-
-
-def _axis(
-    x: list[float], y: list[float], last: list[float], normal: list[float]
-) -> tuple[list[float], list[float]]:
-    """Return the x axis of a patch, and its last one carried along (see `adapters.mujoco.loops.geometry`)."""
-    x = _across(x, normal)
-    flat = _dot(x, x)
-    if _dot(last, last) >= ALONG:
-        last = _unit(last)
-        sign = math.copysign(1.0, _dot(x, last))
-        return (last if flat < FLAT else _unit([sign * each for each in x])), last
-    x = _unit(x if flat >= ALONG else _across(y, normal))
-    return x, x
 
 
 def _unit(vector: Sequence[float]) -> list[float]:

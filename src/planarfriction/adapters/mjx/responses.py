@@ -16,12 +16,13 @@ import jax.numpy as jnp
 from mujoco import mjx
 
 from planarfriction._engine.coupled import placing
-from planarfriction._engine.coupled.coupling_rows import ALONG, FLAT
 from planarfriction.adapters.mjx.newton import HostResponse
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.formulas import turning_mean
 from planarfriction.jax.namespace import xp
 from planarfriction.tensors.pressure import centre_of
+
+_x_axis = placing.x_axis_with(jnp.where)
 
 
 class Active(NamedTuple):
@@ -249,13 +250,8 @@ def geometry(
         turned = d.site_xmat[place.site].reshape(3, 3)
         site = d.site_xpos[place.site]
         across = turned - jnp.outer(normal, normal @ turned)
-        flat = across[:, 0] @ across[:, 0]
-        along = across @ before
-        kept = touching & (along @ along >= ALONG)
-        along = _unit(along, kept)
-        sided = jnp.where(kept & (across[:, 0] @ along < 0.0), -1.0, 1.0) * across[:, 0]
-        x = _unit(jnp.where(flat >= ALONG, sided, across[:, 1]), touching)
-        x = jnp.where(kept & (flat < FLAT), along, x)
+        *x, cosine, sine = _x_axis(across[:, 0], across[:, 1], across @ before, normal)
+        x = jnp.stack(x)
         middle = jnp.where(chosen[:, None], contact.pos, 0.0).sum(0) / jnp.maximum(
             chosen.sum(), 1
         )
@@ -274,9 +270,7 @@ def geometry(
             placing.onto_plane(jnp.where(at_contact, last, site), middle, normal)
         )
         y = jnp.cross(normal, x)
-        carried = jnp.where(
-            kept, jnp.stack([along @ x, -along @ y]), jnp.array([1.0, 0.0])
-        )
+        carried = jnp.where(touching, jnp.stack([cosine, sine]), jnp.array([1.0, 0.0]))
         sides = zip(
             (place.owner, place.support),
             (place.own, place.other),
@@ -284,7 +278,7 @@ def geometry(
             strict=True,
         )
         own, other = (_side(m, d, centre, *side) for side in sides)
-        moves, turns, drift, drift_spin, part, spin, _ = jax.tree.map(
+        moves, turns, drift, drift_spin, past, spin, _ = jax.tree.map(
             jnp.subtract, own, other
         )
         across = jnp.where(touching, jnp.stack([x, y]), 0.0)
@@ -292,7 +286,7 @@ def geometry(
         both = own.spin + other.spin
         dt = m.opt.timestep
         drift += jnp.stack(
-            placing.bend(over, spin, both, normal, normal @ (part + drift), dt)
+            placing.bend(over, spin, both, normal, normal @ past, -1.0, dt)
         )
         drift = jnp.append(
             across @ drift, jnp.where(touching, normal @ drift_spin, 0.0)
@@ -344,8 +338,8 @@ class _Side(NamedTuple):
     drift: jax.Array
     """Velocity and spin `[3]` that no wrench changes: of the surface on the body, and half of what both gain."""
     drift_spin: jax.Array
-    velocity: jax.Array
-    """Velocity of the body `[3]` where the step begins."""
+    past: jax.Array
+    """Mean velocity of the surface in the last step `[3]`."""
     spin: jax.Array
     """Spin of the surface `[3]`."""
     over: jax.Array
@@ -373,16 +367,12 @@ def _side(
         + dt**2 * second * jnp.cross(turn, across)
         + dt * jnp.cross(spin, move)
     )
-    drift = mean + 0.5 * dt * (gain + jnp.cross(spin, velocity))
+    gain += jnp.cross(spin, velocity)
+    drift = mean + 0.5 * dt * gain
+    past = velocity + move - 0.5 * dt * (gain + jnp.cross(2.0 * spin + turn, move))
     drift_spin = turn + 0.5 * dt * (gained + jnp.cross(spin, turn))
     return _Side(
-        moves,
-        turns,
-        drift,
-        drift_spin,
-        velocity,
-        spin + turn,
-        move + jnp.cross(spin, away),
+        moves, turns, drift, drift_spin, past, spin + turn, move + jnp.cross(spin, away)
     )
 
 

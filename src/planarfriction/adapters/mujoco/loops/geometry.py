@@ -29,12 +29,12 @@ from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.calls import call_c
 from planarfriction._engine.compiler.memory import at, doubles, integers, integers32
 from planarfriction._engine.coupled import placing
-from planarfriction._engine.coupled.coupling_rows import ALONG, FLAT
 from planarfriction.formulas import turning_mean
 
 onto_plane = kernel(placing.onto_plane)
 across = kernel(placing.across)
 bend = kernel(placing.bend)
+x_axis = kernel(placing.x_axis_with(xp.where))
 
 
 @kernel
@@ -126,27 +126,18 @@ def axes(s, p):
 
 @kernel
 def _put_axis(own, d, s, p, before, axis):
-    """Write the x axis of patch p: that of its site, across the normal, on the side of the last one; see `FLAT`."""
+    """Write the x axis of patch p: that of its site, across the normal, on the side of the last one."""
     turned = at(doubles(integers(d + own.data.site_xmat)[0]), 9 * integers(own.site)[p])
     frame = three(at(s.frames, 6 * p))
+    n = times(1.0 / norm(frame), frame)
     x = column(turned, 0)
     y = column(turned, 1)
     last = turned_by(turned, three(before))
-    n = times(1.0 / norm(frame), frame)
     x = plus(x, -dot(x, n), n)
+    y = plus(y, -dot(y, n), n)
     last = plus(last, -dot(last, n), n)
-    flat = square(x)
-    carried = square(last) >= ALONG
-    if carried:
-        last = times(1.0 / norm(last), last)
-        x = last if flat < FLAT else (times(-1.0, x) if dot(x, last) < 0.0 else x)
-    elif flat < ALONG:
-        x = plus(y, -dot(y, n), n)
-    x = times(1.0 / norm(x), x)
-    s.carried[2 * p] = 1.0
-    s.carried[2 * p + 1] = 0.0
-    if carried:
-        s.carried[2 * p], s.carried[2 * p + 1] = dot(last, x), dot(n, cross(last, x))
+    first, second, third, s.carried[2 * p], s.carried[2 * p + 1] = x_axis(x, y, last, n)
+    x = first, second, third
     for i in range(3):
         s.axes[3 * p + i] = x[i]
         axis[i] = dot(x, column(turned, i))
@@ -156,7 +147,7 @@ def _put_axis(own, d, s, p, before, axis):
 def _add_surface(own, m, d, s, p, geom, spin, sign):
     """Add to the drift of patch p the mean twist of the surface of a geom relative to its body, which turns by `spin`.
 
-    Return velocity and spin of the surface where the step begins.
+    Return velocity and spin of the surface where the step begins, and its mean velocity in the last step.
     """
     surface = at(doubles(integers(m + own.model.geom_surfacevel)[0]), 6 * geom)
     dt = doubles(m + own.model.timestep)[0]
@@ -178,7 +169,7 @@ def _add_surface(own, m, d, s, p, geom, spin, sign):
         plus(mean, dt, cross(spin, move)),
         plus(turn, 0.5 * dt, cross(spin, turn)),
     )
-    return move, turn
+    return move, turn, plus(move, -0.5 * dt, cross(plus(turn, 2.0, spin), move))
 
 
 @kernel
@@ -192,7 +183,7 @@ def _add_drift(s, p, factor, move, turn):
 
 @kernel
 def _add_side(own, m, d, s, p, body, geom, sign):
-    """Add the surface of a geom on a body to rows and drift of patch p; return velocity, spin and acceleration."""
+    """Add the surface of a geom on a body to patch p; return its velocity, spin, and mean velocity in the last step."""
     nv = own.nv
     rows = at(s.jacobian, 3 * own.nv * p)
     point = at(s.frames, 6 * p + 3)
@@ -218,11 +209,13 @@ def _add_side(own, m, d, s, p, body, geom, sign):
             gain = plus(gain, velocity[i], column_of(s.moves, nv, i))
             gained = plus(gained, velocity[i], column_of(s.turns, nv, i))
         _add_drift(s, p, sign * half, gain, gained)
+    before = plus(move, -half, gain)
     if own.model.geom_surfacevel >= 0:
-        slide, spin = _add_surface(own, m, d, s, p, geom, turn, sign)
+        slide, spin, slid = _add_surface(own, m, d, s, p, geom, turn, sign)
         move = plus(move, 1.0, slide)
         turn = plus(turn, 1.0, spin)
-    return move, turn, gain
+        before = plus(before, 1.0, slid)
+    return move, turn, before
 
 
 @kernel
@@ -302,10 +295,10 @@ def _rows(own, m, d, s, nefc, p, kept):
     _put_origin(own, d, s, p, normal, at(kept.held, 3 * p))
     _put_places(own, d, s, nefc, p, centre, x, y)
     clear(rows, 3 * own.nv)
-    move, turn, gain = _add_side(
+    move, turn, before = _add_side(
         own, m, d, s, p, integers(own.owner)[p], integers(own.own)[p], 1.0
     )
-    below, spin, bent = _add_side(
+    below, spin, past = _add_side(
         own, m, d, s, p, integers(own.support)[p], integers(own.other)[p], -1.0
     )
     call_c(
@@ -314,16 +307,14 @@ def _rows(own, m, d, s, nefc, p, kept):
     )
     tilt = plus(turn, -1.0, spin)
     dt = doubles(m + own.model.timestep)[0]
-    apart = dot(normal, plus(move, -1.0, below)) + 0.5 * dt * dot(
-        normal, plus(gain, -1.0, bent)
-    )
+    apart = dot(normal, plus(before, -1.0, past))
     goes = integers(own.carrier)[p] == integers(own.own)[p]
     over = plus(move if goes else below, -1.0, three(at(s.block, 3)))
     _add_drift(
         s,
         p,
         1.0,
-        bend(over, tilt, plus(turn, 1.0, spin), normal, apart, dt),
+        bend(over, tilt, plus(turn, 1.0, spin), normal, apart, -1.0, dt),
         zeros(tilt),
     )
     s.tilts[p] = math.sqrt(dot(x, tilt) ** 2 + dot(y, tilt) ** 2)

@@ -72,7 +72,7 @@ def bend(patches: Patches, host: Host, frames: Frames):
         )
         rate = 0.5 * dt * (own_rate - other_rate)
         normal = wp.vec3(axes[2, 0], axes[2, 1], axes[2, 2])
-        apart = wp.dot(normal, wp.spatial_top(own - other) + wp.spatial_top(rate))
+        apart = wp.dot(normal, wp.spatial_top(own - other - rate))
         over = over_centre(
             host, w, wp.spatial_top(own), patches.owner[p], patches.own[p]
         )
@@ -80,13 +80,9 @@ def bend(patches: Patches, host: Host, frames: Frames):
             over = over_centre(
                 host, w, wp.spatial_top(other), patches.support[p], patches.other[p]
             )
+        tilt = wp.spatial_bottom(own - other)
         x, y, z = gained(
-            over,
-            wp.spatial_bottom(own - other),
-            wp.spatial_bottom(own + other),
-            normal,
-            apart,
-            dt,
+            over, tilt, wp.spatial_bottom(own + other), normal, apart, -1.0, dt
         )
         move = axes * (wp.spatial_top(rate) + wp.vec3(x, y, z))
         turn = wp.dot(normal, wp.spatial_bottom(rate))

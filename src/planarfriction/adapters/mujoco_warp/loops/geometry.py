@@ -9,13 +9,13 @@ import mujoco
 import warp as wp
 
 from planarfriction._engine.coupled import placing
-from planarfriction._engine.coupled.coupling_rows import ALONG, FLAT
 from planarfriction.adapters.mujoco.loops.records import Memory
 
 FRICTIONLESS = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS))
 
 onto_plane = wp.func(placing.onto_plane)
 across = wp.func(placing.across)
+x_axis = wp.func(placing.x_axis_with(wp.where))
 
 
 @wp.struct
@@ -204,32 +204,9 @@ def axis_of(turned: wp.mat33, i: int) -> wp.vec3:
 
 
 @wp.func
-def axes_of(turned: wp.mat33, normal: wp.vec3, last: wp.vec3) -> wp.mat33:
-    """Return the axes of a patch as rows: x along that of its site, across the normal, on the side of the last one."""
-    one = axis_of(turned, 0)
-    two = axis_of(turned, 1)
-    x = one - wp.dot(one, normal) * normal
-    flat = wp.dot(x, x)
-    if wp.dot(last, last) > 0.0:
-        if flat < wp.static(FLAT):
-            x = last
-        elif wp.dot(x, last) < 0.0:
-            x = -x
-    elif flat < wp.static(ALONG):
-        x = two - wp.dot(two, normal) * normal
-    x = wp.normalize(x)
-    y = wp.cross(normal, x)
-    return wp.matrix_from_rows(x, y, normal)
-
-
-@wp.func
-def carried(turned: wp.mat33, normal: wp.vec3, before: wp.vec3) -> wp.vec3:
-    """Return the x axis of the last step, which went along with the body; zero for none."""
-    last = turned * before
-    last -= wp.dot(last, normal) * normal
-    if wp.dot(last, last) < wp.static(ALONG):
-        return wp.vec3()
-    return wp.normalize(last)
+def across_of(vector: wp.vec3, normal: wp.vec3) -> wp.vec3:
+    """Return the part of a vector across the normal."""
+    return vector - wp.dot(vector, normal) * normal
 
 
 @wp.func
@@ -283,18 +260,10 @@ def is_curved(patches: Patches, host: Host, w: int, p: int, normal: wp.vec3) -> 
 
 @wp.func
 def carry(
-    patches: Patches,
-    problem: Problem,
-    w: int,
-    p: int,
-    last: wp.vec3,
-    x: wp.vec3,
-    normal: wp.vec3,
+    patches: Patches, problem: Problem, w: int, p: int, cosine: float, sine: float
 ):
     """Write bristles and guess of a patch in its axes of this step instead of the last ones, if there are any."""
-    if wp.dot(last, last) > 0.0:
-        cosine = wp.dot(last, x)
-        sine = wp.dot(normal, wp.cross(last, x))
+    if cosine != 1.0 or sine != 0.0:
         fx = problem.guess[w, p, 0]
         fy = problem.guess[w, p, 1]
         problem.guess[w, p, 0] = cosine * fx + sine * fy
@@ -362,11 +331,14 @@ def place(patches: Patches, host: Host, frames: Frames, problem: Problem):
         middle = middle / float(count)
         site = patches.site[p]
         turned = host.site_xmat[w, site]
-        last = carried(turned, normal, frames.before[w, p])
-        axes = axes_of(turned, normal, last)
-        x = wp.vec3(axes[0, 0], axes[0, 1], axes[0, 2])
+        one = across_of(axis_of(turned, 0), normal)
+        two = across_of(axis_of(turned, 1), normal)
+        last = across_of(turned * frames.before[w, p], normal)
+        x_0, x_1, x_2, cosine, sine = x_axis(one, two, last, normal)
+        x = wp.vec3(x_0, x_1, x_2)
+        axes = wp.matrix_from_rows(x, wp.cross(normal, x), normal)
         frames.axis[w, p] = wp.transpose(turned) * x
-        carry(patches, problem, w, p, last, x, normal)
+        carry(patches, problem, w, p, cosine, sine)
         origin = host.site_xpos[w, site]
         held = frames.held[w, p]
         curved = is_curved(patches, host, w, p, normal)
