@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planarfriction._engine.bristles import bristle_step, leaning_cells, points
-from planarfriction._engine.codegen.derive import derive
+from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.published import published_step
 from planarfriction._engine.published.published_contact import PublishedPatch
 from planarfriction.formulas import LawNumbers
@@ -26,10 +26,12 @@ GRIP = LAW.sigma_0 / 0.6
 """One over the largest deflection [1/m] at some speed."""
 
 BRISTLE = derive(
-    bristle_step.step, ("z", "u", "v", "per_h", "q", "law.breakaway_ratio"), ("z", "u")
+    bristle_step.step,
+    ("z", "u", "v", "per_h", "q", "law.breakaway_ratio"),
+    {"z": 2, "u": 2},
 )
-CELL = derive(points.step, ("z", "u"), ("z", "u"))
-LEANING = derive(leaning_cells.step, ("z", "u"), ("lean.a", "z", "u"))
+CELL = derive(points.step, ("z", "u"), {"z": 2, "u": 2})
+LEANING = derive(leaning_cells.step, ("z", "u"), {"lean.a": 2, "z": 2, "u": 2})
 
 TURNS = 0.0, 1e-8, 1e-4, 0.5, 1.0, 0.5 * math.pi, 3.0, math.pi - 1e-8
 """Angles between a bristle and its velocity [rad]."""

@@ -1,5 +1,6 @@
 """Traces of functions that write to lists."""
 
+from planarfriction._engine.codegen import operators
 from planarfriction._engine.codegen.trace import Branch, Number, Trace
 
 
@@ -16,7 +17,7 @@ def test_lists_are_written_once():
     row = [x, 0.0]
     doubled = trace.call(function, (x, row))
     total, _, branch = trace.operations
-    assert (total.text, total.arguments) == ("{0} + {1}", ("x", "x"))
+    assert (total.operator, total.arguments) == (operators.ADD, ("x", "x"))
     assert row[0].name == doubled.name == total.name
     assert isinstance(branch, Branch) and branch.outcomes == ((row[1].name, "real"),)
     assert (branch.yes.results, branch.no.results) == ((total.name,), (1.0,))

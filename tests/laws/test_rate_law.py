@@ -340,11 +340,33 @@ def test_wrong_laws_are_refused_in_one_line():
         def bristle_rate(xp, law, z, v):
             return plus(v, xp.exp(700.0) * xp.exp(700.0), z)
 
-    with pytest.raises(
-        InvalidValueError, match=r"^law must be a straight line \(.*line \d+: `if norm"
-    ) as caught:
-        Branches()
-    assert "\n" not in str(caught.value)
+    @dataclass(frozen=True)
+    class Misspelt(BoucWen):
+        @staticmethod
+        def bristle_rate(xp, law, z, v):
+            return plus(v, -law.largest, z)
+
+    @dataclass(frozen=True)
+    class Joined(BoucWen):
+        @staticmethod
+        def bristle_rate(xp, law, z, v):
+            pair = v[0], v[1]
+            return pair + pair
+
+    for wrong, words in [
+        (
+            Branches,
+            r"bristle_rate, line \d+: `if norm\(z\) > law.largest_deflection:` asks which way .* `xp.where`",
+        ),
+        (Misspelt, "no attribute 'largest'"),
+        (Joined, r"too many values to unpack \(expected 2\)"),
+    ]:
+        with pytest.raises(
+            InvalidValueError,
+            match=rf"^law must be a formula \(.*{words}.*\), got {wrong.__name__}$",
+        ) as caught:
+            wrong()
+        assert "\n" not in str(caught.value)
     with pytest.raises(InvalidValueError, match="mu must be a number"):
         BoucWen(mu=True)
     with pytest.raises(InvalidValueError, match="largest_deflection must be"):

@@ -48,7 +48,10 @@ class Written(RateLaw):
     @staticmethod
     def bristle_rate(xp, law, z, v):
         speed = norm(v)
-        g = law.mu_c + (law.mu_s - law.mu_c) * xp.exp(-xp.power(speed / law.v_s, 2.0))
+        power = 1.0
+        for _ in range(2):
+            power = power * (speed / law.v_s)
+        g = law.mu_c + (law.mu_s - law.mu_c) * xp.exp(-power)
         return plus(v, -law.sigma_0 * speed / g, z)
 
     @staticmethod

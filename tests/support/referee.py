@@ -7,6 +7,7 @@ numbers lie.
 
 from __future__ import annotations
 
+import inspect
 import math
 import types
 from collections.abc import Callable, Iterator, Sequence
@@ -18,8 +19,8 @@ from mpmath import mpf
 from numba import njit
 
 from planarfriction._engine.codegen import vectors
-from planarfriction._engine.codegen.derive import Derivative
-from planarfriction._engine.codegen.rules import per
+from planarfriction._engine.codegen.derivatives import Derivative
+from planarfriction._engine.codegen.ratios import per
 from planarfriction._engine.compiler import compiled_math
 
 DIGITS = 60
@@ -168,11 +169,12 @@ def jacobians(
         flat(pulled(derivative_of.forth, derivative_of.back, arguments, bars))
         for bars in _units(function(*arguments))
     ]
+    names = list(inspect.signature(derivative_of.function).parameters)
     columns = []
     sizes = []
     for path in derivative_of.by:
         name, _, rest = path.partition(".")
-        at = derivative_of.arguments.index(name)
+        at = names.index(name)
         value = arguments[at]
         for field in filter(None, rest.split(".")):
             value = getattr(value, field)

@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from itertools import compress
 from typing import Any, NamedTuple
 
+from planarfriction._engine.codegen import operators
+from planarfriction._engine.codegen.source import names_in
 from planarfriction._engine.codegen.trace import (
     Block,
     Branch,
@@ -71,26 +73,13 @@ class Writer:
 
     def expression(self, operation: Operation) -> str:
         """Return the text of an operation."""
-        arguments = [self.atom(each) for each in operation.arguments]
-        if operation.kind == "real":  # constants of index arithmetic stay integers
-            arguments = [
-                self.constant(float(each))
-                if isinstance(each, int) and "[" not in operation.text
-                else text
-                for each, text in zip(operation.arguments, arguments, strict=True)
-            ]
-        text = operation.text.format(*arguments)
-        if self.own:
-            text = text.replace("$sqrt", "sqrt_of")
-        if "@" in text:
-            text = text.replace("@", "" if self.own else "$").replace(
-                "(", "_of(" if self.own else "(", 1
-            )
-        head, sign, rest = text.partition("$")
-        if not sign:
-            return text
-        name, bracket, inside = rest.partition("(")
-        return f"{head}{name}{self.suffix}{bracket}{inside}"
+        operator = operation.operator
+        name = (
+            f"{operator.name}_of"
+            if self.own and operator.own
+            else operator.name + self.suffix
+        )
+        return operator.c.format(*map(self.atom, operation.arguments), name=name)
 
     # ------------------------------------------------------------------ functions
 
@@ -168,7 +157,7 @@ def used_by(block: Block) -> set[str]:
                     | used_by(_of(each.no, wanted))
                 )
         elif each.name in used:
-            used.update(name for name in each.arguments if isinstance(name, str))
+            used.update(names_in(each))
     return used
 
 
@@ -213,7 +202,7 @@ def passes_of(
     for each in operations:
         if all(
             name in common or not re.search(r"^t\d|\bk\b", name)
-            for name in _names(each)
+            for name in names_in(each)
         ):
             common.add(each.name)
     own = [each for each in operations if each.name not in common]
@@ -233,10 +222,10 @@ def passes_of(
             places_of.setdefault(
                 name, next(each for each in room if each not in places_of.values())
             )
-        read = {name for each in own[first:last] for name in _names(each)}
+        read = {name for each in own[first:last] for name in names_in(each)}
         read |= set(block.results) if last == len(own) else set()
         for each in reversed(again):
-            read |= set(_names(each)) if each.name in read else set()
+            read |= set(names_in(each)) if each.name in read else set()
         lines = [
             f"    const real {name} = {place};"
             for name, place in before.items()
@@ -265,16 +254,12 @@ def passes_of(
     return Passes(-(-count // blocks), blocks, rows, "\n".join(shared), texts)
 
 
-def _names(operation: Operation) -> Iterator[str]:
-    return (each for each in operation.arguments if isinstance(each, str))
-
-
 def _again(own: list[Operation]) -> list[Operation]:
     """Return operations of so few steps that each pass does them itself."""
     steps: dict[str, int] = {}
     for each in own:
         steps[each.name] = (
-            1 + sum(steps.get(name, 0) for name in _names(each))
+            1 + sum(steps.get(name, 0) for name in names_in(each))
             if _is_short(each)
             else SHORT + 1
         )
@@ -282,14 +267,16 @@ def _again(own: list[Operation]) -> list[Operation]:
 
 
 def _is_short(operation: Operation) -> bool:
-    return operation.kind == "real" and bool(
-        re.fullmatch(r"\{0\} [-+*] \{1\}", operation.text)
+    return operation.kind == "real" and operation.operator in (
+        operators.ADD,
+        operators.SUBTRACT,
+        operators.MULTIPLY,
     )
 
 
 def _handed(own: list[Operation], block: Block, end: int) -> list[str]:
     """Return the names that operations before a place leave to those after it, in order; none behind the last."""
-    later = {name for each in own[end:] for name in _names(each)} | set(block.results)
+    later = {name for each in own[end:] for name in names_in(each)} | set(block.results)
     return (
         [each.name for each in own[:end] if each.name in later]
         if end < len(own)

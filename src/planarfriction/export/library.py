@@ -23,6 +23,7 @@ from planarfriction.export.c_source import (
     of_compiled,
     passes_of,
     rendered,
+    used_by,
 )
 from planarfriction.export.c_values import Array, Fixed, Scalar
 from planarfriction.export.loops import Loops
@@ -325,11 +326,13 @@ def _functions(writer: Writer, pieces: Pieces) -> dict[str, str]:
         "steady": (pieces.steady, wrench),
         "slopes": (pieces.slopes(), [*results, *rows]),
     }
-    texts = {name: "\n".join(writer.lines(*each)) for name, each in traces.items()}
-    unused = {
-        name: "" if "[k" in text else "    (void)k;\n" for name, text in texts.items()
-    }
-    return {name: unused[name] + text for name, text in texts.items()}
+    functions = {}
+    for name, (block, outputs) in traces.items():
+        reads_k = any("[k" in each for each in (*used_by(block), *outputs))
+        functions[name] = "\n".join(
+            [*([] if reads_k else ["    (void)k;"]), *writer.lines(block, outputs)]
+        )
+    return functions
 
 
 def tilt_of(count: int) -> str:

@@ -14,9 +14,9 @@ from planarfriction._engine.bristles import discs, points
 from planarfriction._engine.bristles.law import grip
 from planarfriction._engine.bristles.settle import within
 from planarfriction._engine.cells import cells, cells_rollout
-from planarfriction._engine.codegen.derive import derive
+from planarfriction._engine.codegen.derivatives import derive
+from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.rewriting import Rewriting
-from planarfriction._engine.codegen.rules import ratio
 from planarfriction._engine.codegen.trace import (
     Block,
     Mathematics,
@@ -271,7 +271,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
 
     def slopes(trace: Trace) -> Any:
         own = _vector(trace, *(f"{name}[k]" for name in names))
-        written = derive(moved, by, ("z", "u"))
+        written = derive(moved, by, {"z": size, "u": size})
         forth = twin(written.forth)
         back = twin(written.back)
         u = lever.seen(own, _vector(trace, *_TWIST))

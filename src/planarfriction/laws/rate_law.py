@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction._engine.cells import cells, rate_law
-from planarfriction._engine.codegen import rules, vectors
+from planarfriction._engine.codegen import ratios, vectors
 from planarfriction._engine.compiler.calls import address_of
 from planarfriction._engine.compiler.memory import place_of, row_of
 from planarfriction._engine.coupled import steps
@@ -32,7 +32,7 @@ plus: Callable[[Any, Any, Any], Any] = _vectors.plus
 """Return `a + c b` (`plus(a, c, b)`)."""
 times: Callable[[Any, Any], Any] = _vectors.times
 """Return `c a` (`times(c, a)`)."""
-ratio: Callable[[Any, Any], Any] = rules.ratio
+ratio: Callable[[Any, Any], Any] = ratios.ratio
 """Return `x/y` for y > 0; 0 at 0 (`ratio(x, y)`)."""
 
 _SPEED = 1e-3
@@ -49,16 +49,16 @@ class RateLaw(FrictionLaw):
 
     A member is a frozen dataclass of numbers with a `largest_deflection` and a static method
     `bristle_rate(xp, law, z, v)` that returns zdot of a bristle z = (x, y) [m] driven at v = (v_x, v_y) [m/s]. That is
-    a straight line: assignments and one return, of numbers (`+ - * /`, `xp.exp`, `log`, `sin`, `cos`, `power`, `where`,
-    `minimum`, `maximum`) and of vectors (`dot`, `norm`, `plus`, `times`, `ratio`, imported from here). `law` has
-    the fields of the record, and `sigma_0`, `sigma_1`, `sigma_2`, `largest_deflection`. The traction is
+    a formula of numbers (`+ - * /`, `xp.exp`, `log`, `sin`, `cos`, `power`, `where`, `minimum`, `maximum`) and of
+    vectors (`dot`, `norm`, `plus`, `times`, `ratio`, imported from here), with loops of known length and without `if`.
+    `law` has the fields of the record, and `sigma_0`, `sigma_1`, `sigma_2`, `largest_deflection`. The traction is
     `-(sigma_0 z + sigma_1 zdot + sigma_2 v)`, unless there is a static method `bristle_traction(xp, law, z, zdot, v)`.
 
-    Derivatives of both are written from their sources. Steps are linearly implicit, of order 2, and keep bristles
+    Derivatives of both are written from a call with symbols. Steps are linearly implicit, of order 2, and keep bristles
     within the largest deflection. `DistributedModel` takes such laws in NumPy.
 
     Raises InvalidValueError for a field that is not a number, for a stiffness or largest deflection that is not > 0,
-    and for a function that is no straight line.
+    and for a function that cannot be called with symbols.
     """
 
     sigma_0: Any
@@ -80,9 +80,9 @@ class RateLaw(FrictionLaw):
         validation.positive("largest_deflection", self.largest_deflection)
         try:
             self.functions(cells.POSITIONS)
-        except TypeError as error:
+        except (TypeError, AttributeError) as error:
             raise InvalidValueError(
-                "law", f"be a straight line ({error})", type(self).__name__
+                "law", f"be a formula ({error})", type(self).__name__
             ) from None
 
     @property
@@ -183,7 +183,7 @@ class RateLaw(FrictionLaw):
     def functions(cls, lever: cells.Lever) -> rate_law.CellFunctions:
         """Return the compiled functions of contacts with this law whose cells have a lever.
 
-        Raises `NotStraightError`, a TypeError, for functions that are no straight lines.
+        Raises `NotStraightError`, a TypeError, for functions that cannot be traced.
         """
         names = [each.name for each in dataclasses.fields(cls)]  # pyright: ignore[reportArgumentType]
         names += [name for name in _COMMON if name not in names]

@@ -3,7 +3,7 @@
 What is written once for one cell, of numbers, is also what a tensor library needs for all cells at once. Numbers become
 arrays `[..., 1, N]`, with the cells along the last axis; a vector is a `Vector`, or a tuple where the source names its
 components. Only functions that are not straight lines, or whose slopes at a kink have a rule of their own (see
-`codegen.rules`), have forms for arrays here.
+`codegen.rules.primitive`), have forms for arrays here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 from planarfriction import formulas
 from planarfriction._engine.bristles import bristle_step
-from planarfriction._engine.codegen import rules, vectors
+from planarfriction._engine.codegen import ratios, vectors
 from planarfriction._engine.codegen.rewriting import Rewriting
 from planarfriction._engine.compiler import compiled_math
 from planarfriction._engine.published import published_contact, surfaces
@@ -150,8 +150,8 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         (formulas.disc_friction, disc_friction),
         (surfaces.place, functools.partial(_place, xp)),
         (published_contact.through, through),
-        (rules.per, per),
-        (rules.ratio, ratio),
+        (ratios.per, per),
+        (ratios.ratio, ratio),
         (bristle_step.cap, lambda x, most: sloping(formulas.cap(xp, x, most), x, most)),
         (
             bristle_step.reachable,

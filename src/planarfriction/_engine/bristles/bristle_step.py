@@ -6,7 +6,7 @@ A bristle `z` driven by `u` steps by
     n = back (exp(-x) z + (1 - exp(-x))/x dt u),   k(n)
 
 (docs/physics.md, "A step at a held twist"). `k` sees the deflection `|z| q/h` and `along = z/|z| . u/h`, with the
-grip `q`, the speed `v` and `h = |u|/v`. `derive` writes the derivatives.
+grip `q`, the speed `v` and `h = |u|/v`. `codegen.derivatives` writes the derivatives.
 
 At the kinks: the slope of a norm at zero is zero, and `along` of no bristle is constant. A minimum or maximum of equal
 numbers has the slope of its first argument. A bristle that the cap just touches counts as not capped: steady sliding
@@ -17,7 +17,8 @@ of the next cap.
 from __future__ import annotations
 
 from planarfriction import formulas
-from planarfriction._engine.codegen.rules import ratio, rule
+from planarfriction._engine.codegen.ratios import ratio
+from planarfriction._engine.codegen.rules import primitive
 from planarfriction._engine.codegen.vectors import Vector, dot, norm, plus, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
@@ -33,19 +34,13 @@ def cap(deflection: float, largest: float) -> float:
     return formulas.cap(xp, deflection, largest)
 
 
-@kernel
-def _per_capped(deflection: float, largest: float) -> float:
-    """Return one over the deflection of a capped bristle, 0 for others."""
-    capped = deflection > ROUNDING * largest
-    return xp.where(capped, 1.0, 0.0) / xp.where(capped, deflection, 1.0)
+def _cap_partials(factor: float, deflection: float, largest: float) -> tuple:
+    beyond = deflection > ROUNDING * largest
+    per = xp.where(beyond, 1.0, 0.0) / xp.where(beyond, deflection, 1.0)
+    return -factor * per, per
 
 
-rule(
-    cap,
-    "s",
-    {0: "-{t} * per_capped({0}, {1})", 1: "per_capped({0}, {1})"},
-    per_capped=_per_capped,
-)
+primitive(cap, _cap_partials)
 
 
 @kernel
@@ -54,12 +49,10 @@ def reachable(deflection: float, law: LawNumbers) -> float:
     return formulas.reachable_deflection(xp, deflection, law)
 
 
-@kernel
-def _beyond_full(deflection: float) -> float:
-    return xp.where(deflection > ROUNDING, 1.0, 0.0)
-
-
-rule(reachable, "s", {0: "beyond_full({0})"}, beyond_full=_beyond_full)
+primitive(
+    reachable,
+    lambda largest, deflection, law: (xp.where(deflection > ROUNDING, 1.0, 0.0), 0.0),
+)
 
 
 @kernel

@@ -7,8 +7,8 @@ along `W(u)`, and with the mean speed S (see `formulas.disc_friction`)
     z_ss = g(S)/sigma_0 W/S,     z_t' = u_t - (k/c_t) z_t,     z_s' = u_s - (k/c_s) z_s,
 
 where k is the decay of a single bristle with the deflection `|z|/|z_ss|` and the cosine of z and W (docs/physics.md,
-"Discs"). A disc without a radius is the bristle of a point. Functions are straight lines: derivatives and loops are
-written from them.
+"Discs"). A disc without a radius is the bristle of a point. Derivatives and loops are written from a trace of its
+functions.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import math
 from planarfriction import formulas
 from planarfriction._engine.bristles.bristle_step import capped, seen
 from planarfriction._engine.bristles.law import grip, traction
-from planarfriction._engine.codegen.rules import ratio
+from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.vectors import Vector, norm
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel

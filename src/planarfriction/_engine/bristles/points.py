@@ -2,7 +2,7 @@
 
     z' = u - k z,     t = -(sigma_0 z + sigma_1 z' + sigma_2 u),     k = bristle_decay (docs/physics.md, "Bristles")
 
-Functions are straight lines: loops over cells and derivatives are written from them (see `cell_passes`).
+Loops over cells and derivatives are written from a trace of its functions (see `cell_passes`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from planarfriction import formulas
 from planarfriction._engine.bristles import bristle_step
 from planarfriction._engine.bristles.law import grip, traction
-from planarfriction._engine.codegen.rules import ratio
+from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.vectors import Vector, dot, norm, plus
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel

@@ -58,7 +58,7 @@ class Limit(NamedTuple):
     """`(law, z)`: return the bristle brought back onto its limit, if it is beyond."""
     forth: Any
     back: Any
-    """Forth and back of `within` (see `derive`), by z, `sigma_0` and `mu_s`."""
+    """Forth and back of `within` (see `derivatives.derive`), by z, `sigma_0` and `mu_s`."""
     pushed: Any
     """`(law, z, changes)`: bring back a bristle and its changes."""
 

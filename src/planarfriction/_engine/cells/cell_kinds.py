@@ -14,8 +14,7 @@ from planarfriction._engine.cells.cell_passes import (
     forward_passes,
     share_passes,
 )
-from planarfriction._engine.codegen.derive import derive
-from planarfriction._engine.codegen.forward import forward
+from planarfriction._engine.codegen.derivatives import derive, forward
 from planarfriction._engine.codegen.vectors import reader_of
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles
@@ -47,12 +46,14 @@ def rollouts_of_cells(size: int, turned: bool, leans: bool) -> tuple:
     step = kind.element.step
     within = kind.element.within
     by = ("z", f"{path}.sigma_0", f"{path}.mu_s")
-    limited = derive(within, by, ("z",))
-    limit = Limit(within, limited.forth, limited.back, forward(within, by, ("z",)))
-    pushed = forward(step, cells_rollout.by_of(path), ("z", "u"))
+    limited = derive(within, by, kind.lengths)
+    limit = Limit(
+        within, limited.forth, limited.back, forward(within, by, kind.lengths)
+    )
+    pushed = forward(step, cells_rollout.by_of(path), kind.lengths)
     loops = forward_passes(kind).run, backward_passes(kind).run, share_passes(kind).run
     functions = Kind(kind.lever, size, *loops, pushed, law, limit, reader_of(size))
-    sensitivities = cells_sensitivities.bound(functions, step, within, path, kind.name)
+    sensitivities = cells_sensitivities.bound(functions, kind, path)
     rollout, gradient, tangent, shares = (
         cells_rollout.entry_of(each, functions, kind.name)
         for each in (

@@ -16,7 +16,7 @@ from planarfriction._engine.cells.cell_blocks import BAR, BY_LOAD, LANES, OUT, W
 from planarfriction._engine.cells.cells import CellsContact, Lever
 from planarfriction._engine.cells.cells_rollout import by_of
 from planarfriction._engine.cells.passes import Passes, passes
-from planarfriction._engine.codegen.derive import derive
+from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.trace import Number, Trace, traced
 from planarfriction._engine.codegen.twins import twin
 from planarfriction._engine.compiler import kernel
@@ -77,6 +77,12 @@ class CellKind(NamedTuple):
     """See `general_cells.Bristle`."""
     fixed: bool = False
     """True for a fixed stiffness, whose factor comes in place of dt (see `cell_steps`)."""
+
+    @property
+    def lengths(self) -> dict[str, int]:
+        """Lengths of the vectors among the arguments of the element, by name."""
+        asymmetry = {"law.a": 2, "lean.a": 2} if self.leans else {}
+        return {"z": self.element.size, "u": self.element.size, **asymmetry}
 
 
 @kernel
@@ -221,7 +227,7 @@ def backward_passes(kind: CellKind) -> Passes:
     element = kind.element
     lever = kind.lever
     written = derive(
-        element.step, by_of("lean.law" if kind.leans else "law"), ("z", "u")
+        element.step, by_of("lean.law" if kind.leans else "law"), kind.lengths
     )
 
     def adjoint(trace: Trace) -> Any:
@@ -298,7 +304,7 @@ def rate_passes(kind: CellKind) -> Passes:
 def slope_passes(kind: CellKind) -> Passes:
     """Write the derivatives of the rates of cells in `Rows` by state and velocity, and of tractions unless linear."""
     element = kind.element
-    written = derive(element.evaluate, ("z", "u"), ("z", "u"))
+    written = derive(element.evaluate, ("z", "u"), kind.lengths)
     count = element.size if kind.linear else 2 * element.size
     units = [
         tuple(float(m == j) for m in range(2 * element.size)) for j in range(count)

@@ -208,8 +208,8 @@ def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
 def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
     """Return the functions of the solver for contacts of a kind of cells whose records `read` reads."""
     loops = {
-        "rate": rate_passes(kind).run,
         "slope": slope_passes(kind).run,
+        "rate": rate_passes(kind).run,
         "fixed": kind.fixed,
     }
     return functions_of(
@@ -222,7 +222,7 @@ def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
 
 def steps_of(kind: CellKind, read: Any) -> StepFunctions:
     """Return the steps of contacts of a kind of cells whose records `read` reads."""
-    slopes = general_cells.slopes_of(kind.element.step, kind.element.size)
+    slopes = general_cells.slopes_of(kind.element.step, kind.element.size, kind.lengths)
     loops = {"advance": step_passes(kind).run, "linearise": slopes}
     return step_functions(
         kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops

@@ -137,7 +137,7 @@ def _bring_back_pull(
             _, tape = kind.limit.forth(
                 kind.law(law, block, i), kind.vector(block, Z + i, LANES)
             )
-            bars = kind.limit.back(tape, (kind.vector(block, BAR + i, LANES),))
+            bars = kind.limit.back(tape, kind.vector(block, BAR + i, LANES))
             scatter(block, BAR + i, LANES, bars[0])
             total = plus(total, 1.0, bars[1:])
     return total
@@ -369,7 +369,7 @@ def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
     u = lever.seen(one, interval.twist)
     d_u = lever.seen(one, interval.d_twist)
     law = kind.law(interval.law, block, i)
-    new, traction, d_new, d_traction = kind.pushed(
+    (new, traction), (d_new, d_traction) = kind.pushed(
         law, z, u, interval.dt, change, d_u, *interval.d_law
     )
     scatter(block, Z + i, LANES, new)

@@ -20,9 +20,10 @@ from planarfriction._engine.cells.cell_blocks import (
     Z,
     divided,
 )
+from planarfriction._engine.cells.cell_passes import CellKind
 from planarfriction._engine.cells.cells_rollout import _lay, _read, _write, entry_of
 from planarfriction._engine.cells.rollouts import Derivatives, row_of
-from planarfriction._engine.codegen.forward import forwards
+from planarfriction._engine.codegen.derivatives import forwards
 from planarfriction._engine.codegen.vectors import (
     Vector,
     add,
@@ -107,11 +108,27 @@ def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
     a, b, c, d, e, f = _changes(kind, block, i)
     changes = interval.stiffer, a, 1.0, b, 1.0, c, 1.0, d, 1.0, e, 1.0, f, 1.0, 1.0
     results = kind.pushed(kind.law(interval.law, block, i), z, u, interval.dt, *changes)
-    bristles = results[::2]
-    tractions = results[1::2]
-    scatter(block, Z + i, LANES, bristles[0])
-    scatter(block, _CHANGE + i, LANES, bristles[1:7])
-    scatter(block, _PULL + i, LANES, tractions)
+    (new, traction) = results[0]
+    d = results[1:]
+    scatter(block, Z + i, LANES, new)
+    scatter(
+        block,
+        _CHANGE + i,
+        LANES,
+        (d[0][0], d[1][0], d[2][0], d[3][0], d[4][0], d[5][0]),
+    )
+    pulls = (
+        traction,
+        d[0][1],
+        d[1][1],
+        d[2][1],
+        d[3][1],
+        d[4][1],
+        d[5][1],
+        d[6][1],
+        d[7][1],
+    )
+    scatter(block, _PULL + i, LANES, pulls)
 
 
 @kernel
@@ -206,12 +223,16 @@ def sensitivities(
         _read(w, Z, z[b], n, kind.size, _SIZE)
 
 
-def bound(kind: Kind, step: Any, within: Any, path: str, name: str) -> Any:
-    """Return the entry point of a kind of cells, from the step of one and its limit; `path` leads to their law."""
-    by = tuple((f"{path}.{each}", "z")[: 1 + (each in _MOVING)] for each in PARAMETERS)
-    limited = tuple(
+def bound(functions: Kind, kind: CellKind, path: str) -> Any:
+    """Return the entry point of a kind of cells; `path` leads to the law of one."""
+    by = [(f"{path}.{each}", "z")[: 1 + (each in _MOVING)] for each in PARAMETERS]
+    limited = [
         (f"{path}.{each}", "z")[each not in ("sigma_0", "mu_s") :] for each in _MOVING
+    ]
+    limit = functions.limit._replace(
+        pushed=forwards(kind.element.within, limited, kind.lengths)
     )
-    limit = kind.limit._replace(pushed=forwards(within, limited, ("z",)).pushed)
-    kind = kind._replace(pushed=forwards(step, by, ("z", "u")).pushed, limit=limit)
-    return entry_of(sensitivities, kind, name, _SIZE)
+    functions = functions._replace(
+        pushed=forwards(kind.element.step, by, kind.lengths), limit=limit
+    )
+    return entry_of(sensitivities, functions, kind.name, _SIZE)

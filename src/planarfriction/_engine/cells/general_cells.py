@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 
 from planarfriction._engine.bristles.law import traction
 from planarfriction._engine.cells.cells import Lever
-from planarfriction._engine.codegen.derive import derive, run_source, text_of
+from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.small_matrices import inverse
+from planarfriction._engine.codegen.source import run_source, text_of
 from planarfriction._engine.codegen.vectors import (
     Vector,
     matrix_applied,
@@ -91,9 +92,9 @@ def bristle(size: int, linear: bool) -> Bristle:
     )
 
 
-def slopes_of(function: Any, size: int) -> Any:
+def slopes_of(function: Any, size: int, lengths: dict[str, int]) -> Any:
     """Return a function that returns two vectors with their derivatives by z and u, as `CellSlopes`."""
-    written = derive(function, ("z", "u"), ("z", "u"))
+    written = derive(function, ("z", "u"), lengths)
     forth = written.forth
     rows_of = _rows_of(written.back, size)
 

@@ -11,28 +11,24 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from planarfriction._engine.bristles.law import squared
 from planarfriction._engine.cells.cell_blocks import LANES, scratch
-from planarfriction._engine.codegen.derive import run_source, text_of
+from planarfriction._engine.codegen import operators
+from planarfriction._engine.codegen.source import (
+    identifier,
+    line_of,
+    names_in,
+    needed,
+    run_source,
+    text_of,
+)
 from planarfriction._engine.codegen.trace import Block, Operation
 from planarfriction._engine.codegen.vectors import plus
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
-
-COSTS = {
-    "exp(": 16,
-    "sin(": 14,
-    "cos(": 14,
-    "log(": 16,
-    "pow(": 30,
-    "sqrt(": 8,
-    " / ": 8,
-}
-"""Costs of operations, in sums and products."""
 
 SQUARE = "LawNumbers.gamma"
 """Exponent that is 2 more often than not."""
@@ -79,20 +75,20 @@ def passes(
     calls = []
     for k, part in enumerate(parts):
         lines = [
-            f"{_name(each)} = {places.get(each) or inputs[each]}"
+            f"{identifier(each)} = {places.get(each) or inputs[each]}"
             for each in sorted(part.reads)
         ]
         for each in part.operations:
-            lines.append(f"{each.name} = {_text(each)}")
+            lines.append(line_of(each))
             if each.name in places:
                 lines.append(f"{places[each.name]} = {each.name}")
         lines += [
-            f"{stores[each]} = {_name(block.results[each])}"
+            f"{stores[each]} = {identifier(block.results[each])}"
             for each in part.ends
             if each < len(stores)
         ]
         summed = [each for each in part.ends if each >= len(stores)]
-        total = "".join(f"{_name(block.results[each])}, " for each in summed)
+        total = "".join(f"{identifier(block.results[each])}, " for each in summed)
         texts += _loop(
             k, [*lines, f"return ({total})" if total else "return"], len(summed)
         )
@@ -166,7 +162,7 @@ def _parts(
     short: int,
 ) -> list[Part]:
     """Divide the operations of a function among passes; results in the place of an input are stored by the last one."""
-    operations = _used(block)
+    operations = needed(block.operations, block.results)
     again = _done_again(operations, inputs, short)
     kept = [each for each in operations if each.name not in again]
     cuts = _cuts(kept, again, block, count)
@@ -175,7 +171,7 @@ def _parts(
         each.name: k for k, span in enumerate(spans) for each in kept[slice(*span)]
     }
     made = [
-        max((part_of.get(name, 0) for name in _needed([each], again)), default=0)
+        max((part_of.get(name, 0) for name in _reached([each], again)), default=0)
         for each in block.results
     ]
     for k, place in enumerate(stores):
@@ -200,22 +196,7 @@ def _parts(
 
 
 def _as_operations(results: Sequence[Any]) -> list[Operation]:
-    return [Operation("", "real", "{0}", (each,)) for each in results]
-
-
-def _used(block: Block) -> list[Operation]:
-    """Return the operations that the results of a block depend on."""
-    used = {each for each in block.results if isinstance(each, str)}
-    needed = []
-    for each in reversed(block.operations):
-        if each.name in used:
-            used.update(_arguments(each))
-            needed.append(each)
-    return needed[::-1]
-
-
-def _arguments(operation: Operation) -> Iterator[str]:
-    return (each for each in operation.arguments if isinstance(each, str))
+    return [Operation("", "real", operators.REAL, (each,)) for each in results]
 
 
 def _done_again(
@@ -226,13 +207,11 @@ def _done_again(
     alike = {name for name, source in inputs.items() if not source.endswith("+ i]")}
     again = {}
     for each in operations:
-        names = list(_arguments(each))
+        names = list(names_in(each))
         if alike.issuperset(names):
             alike.add(each.name)
             steps[each.name] = 0
-        elif each.kind == "bool" or not re.fullmatch(
-            r"\{0\} [-+*] \{1\}|-\{0\}", each.text
-        ):
+        elif each.kind == "bool" or each.operator not in operators.SHORT:
             steps[each.name] = short + (each.kind != "bool")
         else:
             steps[each.name] = 1 + sum(steps[name] for name in names)
@@ -243,37 +222,34 @@ def _done_again(
     return again
 
 
-def _needed(names: Sequence[Any], again: Mapping[str, Operation]) -> set[str]:
+def _reached(names: Sequence[Any], again: Mapping[str, Operation]) -> set[str]:
     """Return the names that others follow from, through operations that are done again."""
-    needed = set()
+    found = set()
     left = [each for each in names if isinstance(each, str)]
     while left:
         name = left.pop()
-        if name not in needed:
-            needed.add(name)
-            left += _arguments(again[name]) if name in again else ()
-    return needed
+        if name not in found:
+            found.add(name)
+            left += names_in(again[name]) if name in again else ()
+    return found
 
 
 def _names_needed(
     operations: Sequence[Operation], again: Mapping[str, Operation]
 ) -> set[str]:
-    return _needed([name for each in operations for name in _arguments(each)], again)
+    return _reached([name for each in operations for name in names_in(each)], again)
 
 
 def _cuts(
     kept: Sequence[Operation], again: Mapping[str, Operation], block: Block, count: int
 ) -> list[int]:
     """Return where passes begin: about evenly by cost, where few numbers are handed on."""
-    costs = [
-        next((cost for text, cost in COSTS.items() if text in each.text), 1)
-        for each in kept
-    ]
+    costs = [each.operator.cost for each in kept]
     reached = [sum(costs[:k]) / sum(costs) * count for k in range(len(kept))]
     made = {each.name: k for k, each in enumerate(kept)}
     last = [0] * len(kept)
     for k, each in enumerate([*kept, *_as_operations(block.results)]):
-        for name in _needed(list(_arguments(each)), again) & made.keys():
+        for name in _reached(list(names_in(each)), again) & made.keys():
             last[made[name]] = k
     handed = [sum(use >= end for use in last[:end]) for end in range(len(kept))]
     ends = set()
@@ -303,25 +279,3 @@ def _places(parts: Sequence[Part]) -> tuple[dict[str, str], int]:
             ends[last[each.name]].append(row)
         free += ends[k]
     return places, rows
-
-
-# ---------------------------------------------------------------------- source
-
-
-def _name(atom: Any) -> str:
-    """Return a name of the trace as one of Python, or a constant."""
-    return re.sub(r"\W", "_", atom) if isinstance(atom, str) else repr(atom)
-
-
-def _text(operation: Operation) -> str:
-    text = operation.text.format(*map(_name, operation.arguments))
-    if " ? " in text:
-        condition, _, rest = text.partition(" ? ")
-        text = f"xp.where({condition}, {', '.join(rest.split(' : '))})"
-    text = (
-        text.replace("&&", "and")
-        .replace("||", "or")
-        .replace("$sqrt", "math.sqrt")
-        .replace("$fabs", "abs")
-    )
-    return re.sub(r"[$@]", "xp.", text).replace("xp.pow(", "xp.power(")

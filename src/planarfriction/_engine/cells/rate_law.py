@@ -1,4 +1,4 @@
-"""A bristle of a law that is a function of its own, `z' = rate(xp, law, z, u)`, with the derivatives `derive` writes.
+"""A bristle of a law that is a function of its own, `z' = rate(xp, law, z, u)`, with derivatives written from it.
 
 The step is linearly implicit, of two stages (Rosenbrock; Verwer, Spee, Blom, Hundsdorfer 1999): with `A = dz'/dz` at
 the start and `g = 1 - 1/sqrt(2)`,
@@ -24,7 +24,7 @@ from planarfriction._engine.bristles.law import traction as traction_of
 from planarfriction._engine.cells.cell_passes import CellKind, Element
 from planarfriction._engine.cells.cell_steps import rates_of, steps_of
 from planarfriction._engine.cells.cells import LEVERS, Lever
-from planarfriction._engine.codegen.forward import forward
+from planarfriction._engine.codegen.derivatives import forward
 from planarfriction._engine.codegen.vectors import Vector, norm, plus, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
@@ -69,11 +69,16 @@ def _solved(
 @functools.cache
 def element_of(name: str, rate: Callable, pull: Callable = traction) -> Element:
     """Return the element of a bristle from `rate(xp, law, z, u)` and its traction `pull(xp, law, z, z', u)`."""
-    rate, pull = (
+    rate_of, pull = (
         each if hasattr(each, "py_func") else kernel(each) for each in (rate, pull)
     )
-    z_name, u_name = list(inspect.signature(rate.py_func).parameters)[2:4]
-    pushed = forward(rate, (z_name,), (z_name, u_name))
+
+    @kernel
+    def rate(xp: Any, law: Any, z: Vector, u: Vector) -> Vector:
+        x, y = rate_of(xp, law, z, u)
+        return x, y
+
+    pushed = forward(rate, ("z",), {"z": 2, "u": 2})
 
     @kernel
     def evaluate(law: Any, z: Vector, u: Vector) -> tuple[Vector, Vector]:

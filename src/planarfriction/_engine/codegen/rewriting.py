@@ -9,8 +9,10 @@ from typing import Any
 
 
 def like(a: Any, numbers: Iterable[Any]) -> Any:
-    """Return a tuple of numbers, a record if `a` is one."""
-    return type(a)(*numbers) if hasattr(a, "_fields") else tuple(numbers)
+    """Return a tuple of numbers of the kind of `a`, a record if that is one."""
+    if hasattr(a, "_fields"):
+        return type(a)(*numbers)
+    return type(a)(numbers) if isinstance(a, tuple) else tuple(numbers)
 
 
 def _plain(original: Any) -> Any:

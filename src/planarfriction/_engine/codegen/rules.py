@@ -1,163 +1,223 @@
-"""Rules of `derive`: derivatives of functions and operators that it does not take apart.
+"""Rules of derivatives: partial derivatives of operations and of functions, and the trace that keeps who follows which.
 
-They name the conventions at the kinks, and the forms of derivatives that lose no digits.
+Each operation has its partial derivatives in `PARTIALS`. A function with a kink, or one that loses digits if it is
+differentiated operation by operation, declares its own as a `primitive`, as with `custom_jvp` in JAX.
 """
 
 from __future__ import annotations
 
-import ast
-import math
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
+import contextlib
+import functools
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 from planarfriction import formulas
-from planarfriction._engine.codegen import vectors
-from planarfriction._engine.codegen.vectors import dot, placed, plus, times, zeros
+from planarfriction._engine.codegen import operators, vectors
+from planarfriction._engine.codegen.operators import Operator
+from planarfriction._engine.codegen.ratios import per, ratio
+from planarfriction._engine.codegen.rewriting import Rewriting
+from planarfriction._engine.codegen.trace import (
+    CompiledMathematics,
+    Number,
+    Trace,
+    flat,
+)
+from planarfriction._engine.codegen.twins import NAMES, SYMBOLS
 from planarfriction._engine.compiler import compiled_math as xp
-from planarfriction._engine.compiler import kernel
-
-_NONE: Mapping = MappingProxyType({})
 
 
-class Rule(NamedTuple):
-    """Derivative of a function that is not taken apart.
+class NotStraightError(TypeError):
+    """A function for which no derivative can be written."""
 
-    In its texts `{0}`, `{1}` stand for the arguments, `{t}` for the result (`{t0}`, `{t1}` for several), `{b}` for its
-    cotangent and `{d}` for the change of an argument.
+
+symbolic = Rewriting(SYMBOLS, NAMES)
+"""Function of symbols from a kernel, without primitives."""
+
+_primitives: list[tuple[Any, Callable]] = []
+
+
+@functools.cache
+def differentiable() -> Rewriting:
+    """Return the map from kernels to functions of the symbols of a `Tape`."""
+    return Rewriting([*SYMBOLS, *_primitives], NAMES)
+
+
+def primitive(function: Any, partials: Callable[..., tuple]) -> None:
+    """Declare the derivatives of a function instead of tracing them.
+
+    `partials(result, *arguments)` returns the derivative by each argument, numbers of a vector in a tuple, and 0.0 for
+    an argument that it does not depend on. If there are several results, it returns such a tuple for each of them.
     """
+    value = symbolic(function)
+    slopes = symbolic(partials)
 
-    results: str
-    """Kind of each result: "s" for a number, "v" for a vector."""
-    slopes: Mapping[Any, str] = _NONE
-    """Derivative of the result by argument i, or of result r by argument i for the key (r, i); kept on the tape."""
-    pulls: Mapping[int, str] = _NONE
-    """Cotangent of argument i, where a derivative of a vector would be a matrix."""
-    pushes: Mapping[int, str] = _NONE
-    """Change of the result with argument i, where `pulls` has its cotangent."""
-    names: Mapping[str, Any] = _NONE
-    """Functions that the texts name, beside `NAMES`."""
+    def call(*arguments: Any) -> Any:
+        tape = next(
+            (each.trace for each in flat(arguments) if isinstance(each, Number)), None
+        )
+        if tape is None:
+            return value(*arguments)
+        with tape.paused():
+            result = value(*arguments)
+        tape.step(result, arguments, slopes)
+        return result
 
-
-@kernel
-def per(x: float) -> float:
-    """Return `1/x` for x > 0; 0 at 0, and so is its slope."""
-    return 1.0 / xp.where(x > 0.0, x, math.inf)
-
-
-@kernel
-def ratio(x: float, y: float) -> float:
-    """Return `x/y` for y > 0; 0 at 0, and so are its slopes."""
-    return x * per(y)
+    _primitives.append((function, call))
+    differentiable.cache_clear()
 
 
-@kernel
-def _power_slope(x: float, exponent: float, raised: float) -> float:
+@symbolic
+def _power_slope(x: Any, exponent: Any, raised: Any) -> Any:
     """Return the derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
     return xp.where(
         x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0)
     )
 
 
-@kernel
-def _log(x: float) -> float:
+@symbolic
+def _log(x: Any) -> Any:
     """Return `log x`; 0 at 0, where `x^e log x` vanishes."""
     return xp.log(xp.where(x > 0.0, x, 1.0))
 
 
-@kernel
-def slip_slope(deflection: float, breakaway: float) -> float:
-    """Return the derivative of `slip_fraction` by the deflection, zero before breakaway and at full deflection.
+_per = symbolic(per)
+_where = CompiledMathematics.where
 
-    It is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection.
-    """
-    partly = (deflection > breakaway) & (deflection < 1.0)
-    return xp.where(
-        partly, formulas.slip_fraction_slope(xp, deflection, breakaway), 0.0
-    )
-
-
-@kernel
-def _slip_by_breakaway(deflection: float, breakaway: float) -> float:
-    """Return the derivative of `formulas.slip_fraction` by the breakaway ratio."""
-    return formulas.bristle_decay_by_breakaway(
-        xp, slip_slope(deflection, breakaway), deflection, breakaway
-    )
-
-
-NAMES: dict[str, Any] = {
-    "dot": dot, "formulas": formulas, "log_or_0": _log, "per": per, "placed": placed, "plus": plus,
-    "power_slope": _power_slope, "ratio": ratio, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": slip_slope,
-    "times": times, "xp": xp, "zeros": zeros,
-}  # fmt: skip
-"""Functions that generated code and the texts of rules name."""
-
-# Only the numerator: `derive` writes other quotients as products.
-# No square of `per`, which 1e-160 takes out of range.
-RULES: dict[Any, Rule] = {
-    ast.Add: Rule("s", {0: "1.0", 1: "1.0"}),
-    ast.Sub: Rule("s", {0: "1.0", 1: "-1.0"}),
-    ast.Mult: Rule("s", {0: "{1}", 1: "{0}"}),
-    ast.Div: Rule("s", {0: "1.0 / {1}"}),
-    ast.USub: Rule("s", {0: "-1.0"}),
-    plus: Rule(
-        "v",
-        {},
-        {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"},
-        {0: "{d}", 1: "times({d}, {2})", 2: "times({1}, {d})"},
+# By a constant; see `Tape.note` for others.
+PARTIALS: dict[Operator, Callable[..., tuple]] = {
+    operators.ADD: lambda t, a, b: (1.0, 1.0),
+    operators.SUBTRACT: lambda t, a, b: (1.0, -1.0),
+    operators.MULTIPLY: lambda t, a, b: (b, a),
+    operators.DIVIDE: lambda t, a, b: (
+        1.0 / b,
+        0.0,
     ),
-    times: Rule(
-        "v",
-        {},
-        {0: "dot({b}, {1})", 1: "times({0}, {b})"},
-        {0: "times({d}, {1})", 1: "times({0}, {d})"},
+    operators.NEGATE: lambda t, a: (-1.0,),
+    operators.ABS: lambda t, a: (_where(a >= 0.0, 1.0, -1.0),),
+    operators.SQRT: lambda t, a: (0.5 * _per(t),),
+    operators.POWER: lambda t, x, exponent: (_power_slope(x, exponent, t), t * _log(x)),
+    operators.EXP: lambda t, a: (t,),
+    operators.EXP_NEAR: lambda t, a: (t,),
+    operators.EXPM1: lambda t, a: (t + 1.0,),
+    operators.LOG: lambda t, a: (1.0 / a,),
+    operators.SIN: lambda t, a: (CompiledMathematics.cos(a),),
+    operators.SIN_NEAR: lambda t, a: (CompiledMathematics.cos(a),),
+    operators.COS: lambda t, a: (-CompiledMathematics.sin(a),),
+    operators.WHERE: lambda t, condition, a, b: (
+        0.0,
+        _where(condition, 1.0, 0.0),
+        _where(condition, 0.0, 1.0),
     ),
-    dot: Rule(
-        "s",
-        {},
-        {0: "times({b}, {1})", 1: "times({b}, {0})"},
-        {0: "dot({d}, {1})", 1: "dot({0}, {d})"},
+    operators.MINIMUM: lambda t, a, b: (
+        _where(a <= b, 1.0, 0.0),
+        _where(a <= b, 0.0, 1.0),
     ),
-    vectors.square: Rule(
-        "s", {}, {0: "times(2.0 * {b}, {0})"}, {0: "2.0 * dot({0}, {d})"}
+    operators.MAXIMUM: lambda t, a, b: (
+        _where(a >= b, 1.0, 0.0),
+        _where(a >= b, 0.0, 1.0),
     ),
-    # times the unit vector: one over a norm of 1e-160 leaves no room for another factor
-    vectors.norm: Rule(
-        "s",
-        {"per": "per({t})"},
-        {0: "times({b}, times({per}, {0}))"},
-        {0: "ratio(dot({0}, {d}), {t})"},
-    ),
-    math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
-    per: Rule("s", {0: "-{t} * {t}"}),
-    ratio: Rule("s", {0: "per({1})", 1: "-{t} * per({1})"}),
-    xp.where: Rule("s", {1: "xp.where({0}, 1.0, 0.0)", 2: "xp.where({0}, 0.0, 1.0)"}),
-    # of equal numbers the slope is that of the first
-    xp.maximum: Rule(
-        "s", {0: "xp.where({0} >= {1}, 1.0, 0.0)", 1: "xp.where({0} >= {1}, 0.0, 1.0)"}
-    ),
-    xp.minimum: Rule(
-        "s", {0: "xp.where({0} <= {1}, 1.0, 0.0)", 1: "xp.where({0} <= {1}, 0.0, 1.0)"}
-    ),
-    xp.exp: Rule("s", {0: "{t}"}),
-    xp.log: Rule("s", {0: "1.0 / {0}"}),
-    xp.sin: Rule("s", {0: "xp.cos({0})"}),
-    xp.cos: Rule("s", {0: "-xp.sin({0})"}),
-    xp.power: Rule("s", {0: "power_slope({0}, {1}, {t})", 1: "{t} * log_or_0({0})"}),
-    formulas.relaxation: Rule(
-        "ss",
-        {(0, 1): "-{t0}", (1, 1): "formulas.relaxation_slope(xp, {1}, {t0}, {t1})"},
-    ),
-    formulas.slip_fraction: Rule(
-        "s", {1: "slip_slope({1}, {2})", 2: "slip_by_breakaway({1}, {2})"}
-    ),
+    operators.REAL: lambda t, a: (0.0,),
 }
-"""Rules by function or operator."""
-
-QUOTIENT = Rule("s", {0: "{2}", 1: "-{t} * {2}"})
-"""Rule of a quotient, whose third argument is one over the denominator."""
+"""Partial derivatives of the result t of an operation by its arguments; of equal numbers the first one counts."""
 
 
-def rule(function: Callable, results: str, slopes: dict, **names: Any) -> None:
-    """Give a function a `Rule`, whose texts may name the functions `names`."""
-    RULES[function] = Rule(results, slopes, {}, {}, names)
+def _slip_fraction(alpha: Any, _: Any, deflection: Any, breakaway_ratio: Any) -> tuple:
+    """Return no slope before breakaway and at full deflection.
+
+    The slope is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection: rounding
+    of the cosine would show.
+    """
+    partly = (deflection > breakaway_ratio) & (deflection < 1.0)
+    slope = xp.where(
+        partly, formulas.slip_fraction_slope(xp, deflection, breakaway_ratio), 0.0
+    )
+    return (
+        0.0,
+        slope,
+        formulas.bristle_decay_by_breakaway(xp, slope, deflection, breakaway_ratio),
+    )
+
+
+def _relaxation(results: tuple, _: Any, x: Any) -> tuple:
+    remaining, mean = results
+    return (0.0, -remaining), (0.0, formulas.relaxation_slope(xp, x, remaining, mean))
+
+
+# One over a norm of 1e-160 leaves the range of numbers if it is squared, or multiplied by anything but its vector.
+primitive(vectors.norm, lambda size, a: (vectors.times(per(size), a),))
+primitive(per, lambda t, x: (-t * t,))
+primitive(ratio, lambda t, x, y: (per(y), -t * per(y)))
+primitive(formulas.relaxation, _relaxation)
+primitive(formulas.slip_fraction, _slip_fraction)
+
+
+# ---------------------------------------------------------------------- traces
+
+
+class Step(NamedTuple):
+    """A step of the chain rule: numbers that come out of others."""
+
+    results: tuple
+    arguments: tuple
+    partials: Callable[[], tuple]
+    """Return a tuple for each result, as `primitive` describes it."""
+
+
+class Tape(Trace):
+    """A trace that keeps the steps of the chain rule."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.steps: list[Step] = []
+        self._stepped: set[str] = set()
+        self._pauses = 0
+
+    @contextlib.contextmanager
+    def paused(self) -> Iterator[None]:
+        """Note operations, but no steps."""
+        self._pauses += 1
+        yield
+        self._pauses -= 1
+
+    def step(
+        self, result: Any, arguments: tuple, partials: Callable[..., tuple]
+    ) -> None:
+        """Keep a step, unless it is part of another one."""
+        if self._pauses:
+            return
+        several = isinstance(result, tuple)
+        numbers = tuple(each for each in flat((result,)))
+        self._stepped.update(each.name for each in numbers if isinstance(each, Number))
+        found = functools.partial(partials, result, *arguments)
+        self.steps.append(
+            Step(numbers, arguments, found if several else lambda: (found(),))
+        )
+
+    def note(self, operator: Operator, kind: str, *arguments: Any) -> Number:
+        """Return the result of an operation; one that has a derivative is a step."""
+        if self._pauses or kind != "real":
+            return super().note(operator, kind, *arguments)
+        if operator == operators.DIVIDE and isinstance(arguments[1], Number):
+            return self._quotient(*arguments)
+        result = super().note(operator, kind, *arguments)
+        if operator not in PARTIALS:
+            raise NotStraightError(
+                f"has no derivative (`{operator.python}`): give the function a `primitive`"
+            )
+        if result.name not in self._stepped:
+            self.step(result, arguments, PARTIALS[operator])
+        return result
+
+    def _quotient(self, a: Any, b: Number) -> Number:
+        """Return a quotient as a product with `1/b`, which its derivatives share."""
+        with self.paused():
+            per_b = 1.0 / b
+            result = a * per_b
+        self.step(result, (a, b), lambda t, a, b: (per_b, -t * per_b))
+        return result
+
+    def decide(self, condition: Number) -> bool:
+        """Refuse to decide how a function goes on."""
+        raise NotStraightError(
+            "asks which way a comparison goes: use `xp.where`, and `&` for `and`"
+        )

@@ -11,6 +11,9 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
+from planarfriction._engine.codegen import operators
+from planarfriction._engine.codegen.operators import Operator
+
 
 class Undecided(Exception):
     """A comparison that decides how a function goes on."""
@@ -27,9 +30,7 @@ class Operation(NamedTuple):
     """Name of its result."""
     kind: str
     """"real", "index", "wide" (64 bits) or "bool"."""
-    text: str
-    """Source with `{0}`, `{1}` for the arguments, `$` before the name of a mathematical function, and `@` before the
-    name of a function of `compiled_math`, whose domain may be smaller."""
+    operator: Operator
     arguments: tuple[Any, ...]
     """Names, or constants of Python."""
 
@@ -51,9 +52,9 @@ class Branch(NamedTuple):
     no: Block
 
 
-def _asking(text: str) -> Callable[[Any, Any], Any]:
-    """Return an operator of two numbers whose result is a truth."""
-    return lambda one, other: one.trace.note(text, "bool", one, other)
+def _asking(operator: Operator) -> Callable[[Any, Any], Any]:
+    """Return a method of two numbers whose result is a truth."""
+    return lambda one, other: one.trace.note(operator, "bool", one, other)
 
 
 class Number:
@@ -70,55 +71,59 @@ class Number:
         return self.trace.decide(self)
 
     def __add__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else self._noted("{0} + {1}", self, other)
+        return self if _is(other, 0.0) else self._noted(operators.ADD, self, other)
 
     def __radd__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else self._noted("{0} + {1}", other, self)
+        return self if _is(other, 0.0) else self._noted(operators.ADD, other, self)
 
     def __sub__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else self._noted("{0} - {1}", self, other)
+        return self if _is(other, 0.0) else self._noted(operators.SUBTRACT, self, other)
 
     def __rsub__(self, other: Any) -> Any:
-        return -self if _is(other, 0.0) else self._noted("{0} - {1}", other, self)
+        return (
+            -self if _is(other, 0.0) else self._noted(operators.SUBTRACT, other, self)
+        )
 
     def __mul__(self, other: Any) -> Any:
         if _is(other, 0.0):
             return other
         if _is(other, 1.0):
             return self
-        return -self if _is(other, -1.0) else self._noted("{0} * {1}", self, other)
+        return (
+            -self if _is(other, -1.0) else self._noted(operators.MULTIPLY, self, other)
+        )
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Any:
-        return self if _is(other, 1.0) else self._noted("{0} / {1}", self, other)
+        return self if _is(other, 1.0) else self._noted(operators.DIVIDE, self, other)
 
     def __rtruediv__(self, other: Any) -> Any:
-        return other if _is(other, 0.0) else self._noted("{0} / {1}", other, self)
+        return other if _is(other, 0.0) else self._noted(operators.DIVIDE, other, self)
 
     def __neg__(self) -> Number:
-        return self._noted("-{0}", self)
+        return self._noted(operators.NEGATE, self)
 
     def __abs__(self) -> Number:
-        return self._noted("$fabs({0})", self)
+        return self._noted(operators.ABS, self)
 
-    __lt__ = _asking("{0} < {1}")
-    __le__ = _asking("{0} <= {1}")
-    __gt__ = _asking("{0} > {1}")
-    __ge__ = _asking("{0} >= {1}")
-    __eq__ = _asking("{0} == {1}")
-    __ne__ = _asking("{0} != {1}")  # type: ignore[assignment]
+    __lt__ = _asking(operators.LESS)
+    __le__ = _asking(operators.LESS_OR_EQUAL)
+    __gt__ = _asking(operators.GREATER)
+    __ge__ = _asking(operators.GREATER_OR_EQUAL)
+    __eq__ = _asking(operators.EQUAL)
+    __ne__ = _asking(operators.NOT_EQUAL)  # type: ignore[assignment]
 
     def __and__(self, other: Any) -> Any:
         return (
-            _asking("{0} && {1}")(self, other)
+            _asking(operators.AND)(self, other)
             if isinstance(other, Number)
             else other and self
         )
 
     def __or__(self, other: Any) -> Any:
         return (
-            _asking("{0} || {1}")(self, other)
+            _asking(operators.OR)(self, other)
             if isinstance(other, Number)
             else other or self
         )
@@ -128,10 +133,10 @@ class Number:
     __hash__ = None  # type: ignore[assignment]
 
     def __lshift__(self, other: Any) -> Any:
-        return self._noted("{0} << {1}", self, other)
+        return self._noted(operators.SHIFT, self, other)
 
-    def _noted(self, text: str, *arguments: Any) -> Number:
-        return self.trace.note(text, kind_of(arguments), *arguments)
+    def _noted(self, operator: Operator, *arguments: Any) -> Number:
+        return self.trace.note(operator, kind_of(arguments), *arguments)
 
 
 def _key(argument: Any) -> Any:
@@ -177,23 +182,22 @@ class Trace:
         self._count += 1
         return Number(self, f"t{self._count}", kind)
 
-    def note(self, text: str, kind: str, *arguments: Any) -> Number:
+    def note(self, operator: Operator, kind: str, *arguments: Any) -> Number:
         """Return the result of an operation."""
+        if kind == "real" and operator not in (operators.READ, operators.REAL):
+            arguments = tuple(
+                _real(each) if getattr(each, "kind", "index") == "index" else each
+                for each in arguments
+            )
         names = tuple(
             each.name if isinstance(each, Number) else each for each in arguments
         )
-        key = text, *((type(each), each) for each in names)
+        key = operator, *((type(each), each) for each in names)
         if key not in self._known:
             self._known[key] = self._new(kind)
-            if kind == "real" and "[" not in text:  # indices of tables stay whole
-                kinds = [getattr(each, "kind", "") for each in arguments]
-                text = text.format(
-                    *(
-                        f"(real){{{i}}}" if one == "index" else f"{{{i}}}"
-                        for i, one in enumerate(kinds)
-                    )
-                )
-            self.operations.append(Operation(self._known[key].name, kind, text, names))
+            self.operations.append(
+                Operation(self._known[key].name, kind, operator, names)
+            )
         return self._known[key]
 
     def decide(self, condition: Number) -> bool:
@@ -290,7 +294,7 @@ class Table:
     def __getitem__(self, place: Any) -> Any:
         if self.numbers is not None and not isinstance(place, Number):
             return float(self.numbers[place])
-        return self.trace.note(self.name + "[{0}]", "real", place)
+        return self.trace.note(operators.READ, "real", self.name, place)
 
 
 def traced(function: Callable[[Trace], Any]) -> Block:
@@ -318,14 +322,14 @@ def flat(results: Any) -> Iterator[Any]:
 
 
 def _function(
-    text: str, plain: Callable[..., Any], kind: str | None = "real"
+    operator: Operator, plain: Callable[..., Any], kind: str | None = "real"
 ) -> Callable[..., Any]:
     """Return a function that notes its call, or computes it where all arguments are known; None: of their own kind."""
 
     def call(*arguments: Any) -> Any:
         symbols = [each for each in arguments if isinstance(each, Number)]
         return (
-            symbols[0].trace.note(text, kind or kind_of(arguments), *arguments)
+            symbols[0].trace.note(operator, kind or kind_of(arguments), *arguments)
             if symbols
             else plain(*arguments)
         )
@@ -333,19 +337,26 @@ def _function(
     return call
 
 
+def _real(x: Any) -> Any:
+    """Return a real number for a whole one or a truth."""
+    if not isinstance(x, Number):
+        return float(x) if isinstance(x, (int, float)) else x
+    return x if x.kind == "real" else x.trace.note(operators.REAL, "real", x)
+
+
 def _where(condition: Any, a: Any, b: Any) -> Any:
     if not isinstance(condition, Number):
         return a if condition else b
     if not isinstance(a, Number) and not isinstance(b, Number) and a == b:
         return a
-    return condition.trace.note("{0} ? {1} : {2}", kind_of((a, b)), condition, a, b)
+    return condition.trace.note(operators.WHERE, kind_of((a, b)), condition, a, b)
 
 
 def _power(x: Any, exponent: Any) -> Any:
     return x * x if _is(exponent, 2.0) else _pow(x, exponent)
 
 
-_pow = _function("$pow({0}, {1})", math.pow)
+_pow = _function(operators.POWER, math.pow)
 
 
 class Mathematics:
@@ -355,25 +366,25 @@ class Mathematics:
     inf = math.inf
     where = staticmethod(_where)
     power = staticmethod(_power)
-    sqrt = staticmethod(_function("$sqrt({0})", math.sqrt))
-    exp = staticmethod(_function("$exp({0})", math.exp))
-    expm1 = staticmethod(_function("$expm1({0})", math.expm1))
-    log = staticmethod(_function("$log({0})", math.log))
-    sin = staticmethod(_function("$sin({0})", math.sin))
-    cos = staticmethod(_function("$cos({0})", math.cos))
-    atan2 = staticmethod(_function("$atan2({0}, {1})", math.atan2))
-    floor = staticmethod(_function("$floor({0})", math.floor))
-    minimum = staticmethod(_function("{0} < {1} ? {0} : {1}", min, None))
-    maximum = staticmethod(_function("{0} > {1} ? {0} : {1}", max, None))
-    is_finite = staticmethod(_function("isfinite({0})", math.isfinite, "bool"))
-    integer = staticmethod(_function("(int)({0})", int, "index"))
-    real = float64 = staticmethod(_function("{0}", float))
+    sqrt = staticmethod(_function(operators.SQRT, math.sqrt))
+    exp = staticmethod(_function(operators.EXP, math.exp))
+    expm1 = staticmethod(_function(operators.EXPM1, math.expm1))
+    log = staticmethod(_function(operators.LOG, math.log))
+    sin = staticmethod(_function(operators.SIN, math.sin))
+    cos = staticmethod(_function(operators.COS, math.cos))
+    atan2 = staticmethod(_function(operators.ATAN2, math.atan2))
+    floor = staticmethod(_function(operators.FLOOR, math.floor))
+    minimum = staticmethod(_function(operators.MINIMUM, min, None))
+    maximum = staticmethod(_function(operators.MAXIMUM, max, None))
+    is_finite = staticmethod(_function(operators.IS_FINITE, math.isfinite, "bool"))
+    integer = staticmethod(_function(operators.INTEGER, int, "index"))
+    real = float64 = staticmethod(_real)
 
 
 class CompiledMathematics(Mathematics):
     """Functions for symbols in place of `compiled_math`."""
 
-    exp = staticmethod(_function("@exp({0})", math.exp))
-    sin = staticmethod(_function("@sin({0})", math.sin))
-    wide = staticmethod(_function("(long long)(int)({0})", int, "wide"))
-    of_bits = staticmethod(_function("of_bits({0})", float))
+    exp = staticmethod(_function(operators.EXP_NEAR, math.exp))
+    sin = staticmethod(_function(operators.SIN_NEAR, math.sin))
+    wide = staticmethod(_function(operators.WIDE, int, "wide"))
+    of_bits = staticmethod(_function(operators.OF_BITS, float))

@@ -62,10 +62,6 @@ def _rounded(x: Any) -> tuple[Any, Any]:
     return k, CompiledMathematics.of_bits((CompiledMathematics.wide(k) + 1023) << 52)
 
 
-def _placed(a: Any, i: int, x: Any) -> tuple:
-    return tuple(x if j == i else 0.0 for j in range(len(a)))
-
-
 def finished(function: FunctionType) -> Callable[..., Any]:
     """Let a twin with jumps join its ways."""
     jumps = {*dis.hasjrel, *dis.hasjabs}
@@ -105,7 +101,6 @@ SYMBOLS = (
     (vectors.times, lambda c, a: like(a, [c * x for x in a])),
     (vectors.plus, _plus),
     (vectors.zeros, lambda a: tuple(0.0 for _ in a)),
-    (vectors.placed, _placed),
     (vectors.put, _put),
     (vectors.put_all, _put),
     (memory.at, _At),

@@ -87,20 +87,6 @@ def zeros(typingctx: Any, a: types.Type) -> Any:
     return types.UniTuple(types.float64, len(a))(a), generate
 
 
-@intrinsic(prefer_literal=True)
-def placed(typingctx: Any, a: types.Type, i: types.Type, x: types.Type) -> Any:
-    """Return a vector of zeros as long as a, but for x in the constant place i."""
-    if not isinstance(i, types.IntegerLiteral):
-        return None
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        items = [context.get_constant(types.float64, 0.0)] * len(a)
-        items[i.literal_value] = args[2]
-        return context.make_tuple(builder, signature.return_type, items)
-
-    return types.UniTuple(types.float64, len(a))(a, i, types.float64), generate
-
-
 def _spread(add: bool) -> Callable[..., Any]:
     """Return the code of `accumulate` or `scatter`."""
 

@@ -21,8 +21,8 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction._engine.bristles.bristle_step import seen
 from planarfriction._engine.bristles.law import grip, traction
-from planarfriction._engine.codegen.derive import derive
-from planarfriction._engine.codegen.rules import ratio
+from planarfriction._engine.codegen.derivatives import derive
+from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.small_matrices import applied, inverse
 from planarfriction._engine.codegen.vectors import (
     Vector,
@@ -187,7 +187,7 @@ def _decay(law: LawNumbers, z: Vector, u: Vector, twist: Vector) -> float:
     return decay_of(law, z, u, v, per_h(u, v), grip(law, v))
 
 
-_SLOPES = derive(_decay, ("z", "u", "twist"), ("z", "u", "twist"))
+_SLOPES = derive(_decay, ("z", "u", "twist"), {"z": 3, "u": 3, "twist": 3})
 _forth = _SLOPES.forth
 _back = _SLOPES.back
 
@@ -206,8 +206,8 @@ def _slopes(
     (x, y, s) = twist
     j = m.sliding
     sliding_jacobian(record.kind, record.data, 0, record.size, x, y, s, norm(twist), j)
-    (k,), tape = _forth(record.law, z, applied(j, twist), twist)
-    by_z, by_u, by_twist = _back(tape, (1.0,))
+    k, tape = _forth(record.law, z, applied(j, twist), twist)
+    by_z, by_u, by_twist = _back(tape, 1.0)
     by_twist = plus(by_twist, 1.0, applied_back(j, by_u))
     for i in range(3):
         for p in range(3):

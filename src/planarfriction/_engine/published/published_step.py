@@ -2,7 +2,7 @@
 
 In scaled coordinates, `V_S = S V` at the centre of pressure with `S = diag(1, 1, r)`, the bristle `S^-1 z` steps as in
 `bristle_step`, driven by `u = h(V) |V_S|` with `h = |u|/|V_S|` (docs/physics.md, "The published reduced model").
-`derive` writes the derivatives, and the limit surface gives `du/dV_S`; its numbers are held fixed: r acts through
+`derivatives` writes the derivatives, and the limit surface gives `du/dV_S`; its numbers are held fixed: r acts through
 `V_S` alone.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction._engine.bristles import bristle_step
 from planarfriction._engine.bristles.law import PARAMETERS, grip
-from planarfriction._engine.codegen.derive import derive
+from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.vectors import (
     Vector,
     applied_back,
@@ -169,7 +169,7 @@ _BY = (
     *(f"law.{n}" for n in PARAMETERS),
     *(f"shape.{n}" for n in PublishedPatch._fields),
 )
-DERIVATIVE = derive(_step, _BY, ("z", "u", "twist"))
+DERIVATIVE = derive(_step, _BY, {"z": 3, "u": 3, "twist": 3})
 _forth = DERIVATIVE.forth
 _back = DERIVATIVE.back
 

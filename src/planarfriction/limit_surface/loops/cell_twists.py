@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from planarfriction._engine.bristles.discs import sliding
-from planarfriction._engine.codegen.derive import derive
+from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.vectors import dot, norm, plus, times
 from planarfriction._engine.compiler import jit, kernel
 from planarfriction.limit_surface.loops.twists import (
@@ -56,7 +56,7 @@ def _pull(u):
     return times(1.0 / speed, pull)
 
 
-_PULL = derive(_pull, ("u",), ("u",))
+_PULL = derive(_pull, ("u",), {"u": 3})
 _FORTH = _PULL.forth
 _BACK = _PULL.back
 
@@ -82,10 +82,10 @@ def cell_sums(levers, spins, weights, units, h, slopes):
             )
             if norm(u) <= _AT_REST:
                 continue
-            (pull,), tape = _FORTH(u)
+            pull, tape = _FORTH(u)
             for j in range(3):
                 h[m, j] += weights[i] * dot(pull, along[j])
-                (bend,) = _BACK(tape, (along[j],))
+                (bend,) = _BACK(tape, along[j])
                 for k in range(3):
                     slopes[m, j, k] += weights[i] * dot(bend, along[k])
 
@@ -96,9 +96,9 @@ def _of_disc(seen, i, a, b):
     along_a = (seen[2, i], seen[3, i], seen[7, i])
     along_b = (seen[4, i], seen[5, i], seen[8, i])
     u = plus(plus((seen[0, i], seen[1, i], seen[6, i]), a, along_a), b, along_b)
-    (pull,), tape = _FORTH(u)
-    (by_a,) = _BACK(tape, (along_a,))
-    (by_b,) = _BACK(tape, (along_b,))
+    pull, tape = _FORTH(u)
+    (by_a,) = _BACK(tape, along_a)
+    (by_b,) = _BACK(tape, along_b)
     slopes = dot(pull, along_a), dot(pull, along_b)
     return (
         slopes,
