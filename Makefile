@@ -37,7 +37,7 @@ test: $(VENV)/.test
 	$(PYTEST) $(ARGS)
 
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives.
-NUMERIC := _engine derivatives limit_surface models solvers test_coupling.py test_formulas.py
+NUMERIC := _engine derivatives limit_surface models solvers test_coupling.py test_formulas.py test_golden.py
 
 # The share of these that compiles least and rounds most.
 QUICKEST := _engine/test_*.py limit_surface solvers test_coupling.py test_formulas.py

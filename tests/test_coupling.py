@@ -1,7 +1,5 @@
 """The implicit step of many patches in contact space."""
 
-from __future__ import annotations
-
 import pickle
 
 import numpy as np
@@ -104,9 +102,7 @@ def test_compiled_steps_and_their_slopes_are_those_of_the_model(name):
 # ---------------------------------------------------------------------- what comes out
 
 
-def _host(
-    generator: np.random.Generator, k: int, *, dt: float = 1e-3, rank: int | None = None
-) -> HostStep:
+def _host(generator, k, *, dt=1e-3, rank=None):
     """A random host; `rank` of its response, which is nearly singular below 3k."""
     n = 3 * k
     scale = np.tile([1.0, 1.0, 100.0], k)
@@ -121,14 +117,7 @@ def _host(
     return HostStep(twist, generator.uniform(0.2, 3.0, k), wrench, response)
 
 
-def _checked(
-    patches: CoupledPatches,
-    state,
-    host: HostStep,
-    dt,
-    step: CoupledStep,
-    tolerance=1e-9,
-) -> None:
+def _checked(patches, state, host, dt, step, tolerance=1e-9):
     """The models' steps at the twists and loads that came out, and these from the wrenches."""
     change = (step.wrench - host.wrench).reshape(-1)
     for model, before, after, twist, load, wrench in zip(
@@ -165,9 +154,7 @@ def test_models_of_all_kinds_in_one_step(k):
             host = host._replace(wrench=step.wrench)
 
 
-def _reference(
-    patches: CoupledPatches, state, host: HostStep, dt: float, start: np.ndarray
-) -> np.ndarray:
+def _reference(patches, state, host, dt, start):
     """Twists by a dense solver that knows nothing of slopes."""
     states = patches.states(state)
 
@@ -335,9 +322,7 @@ def test_shapes_follow_the_loads_that_come_out():
 FEET = np.array([[0.05, 0.03], [0.05, -0.03], [-0.05, 0.03], [-0.05, -0.03]])
 
 
-def _box(
-    dt: float, t_end: float, model, *, push=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0)
-):
+def _box(dt, t_end, model, *, push=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0)):
     """Pose of a box of 0.2 kg on four patches with 0.5 N each, after semi-implicit steps in its own axes."""
     mass = np.array([0.2, 0.2, 2e-4])
     loads = np.full(4, 0.5)
@@ -465,7 +450,7 @@ def test_energy_never_grows(kind, dt):
     assert (energies[-1] < 0.9 * energies[0]).all()
 
 
-def _weights(model) -> np.ndarray | float:
+def _weights(model):
     few = model.reduction
     return few.patch.weights() if isinstance(few, pf.DistributedModel) else 1.0
 
@@ -473,7 +458,7 @@ def _weights(model) -> np.ndarray | float:
 # ---------------------------------------------------------------------- Newton's method
 
 
-def _statistics(seed: int, sets: int, environments: int, steps: int, height: float):
+def _statistics(seed, sets, environments, steps, height):
     generator = np.random.default_rng(seed)
     counts = []
     residuals = []

@@ -18,14 +18,12 @@ DISCS = ContactPatch(
 LEANING = dataclasses.replace(DISCS, asymmetry=(0.3, -0.2))
 
 
-def _patches(
-    reference: float | None, sigma_0: float = 1e6, second: ContactPatch = DISCS
-) -> CoupledPatches:
+def _patches(reference, sigma_0=1e6, second=DISCS):
     law = LuGre(mu_s=1.2, sigma_0=sigma_0, elasto_plastic=0.9, reference_load=reference)
     return CoupledPatches([DistributedModel(_GRID, law), DistributedModel(second, law)])
 
 
-def _host(seed: int, load: float | None = None, response: float = 0.0) -> HostStep:
+def _host(seed, load=None, response=0.0):
     rng = np.random.default_rng(seed)
     twist = rng.normal(size=(2, 3)) * [3e-3, 3e-3, 0.1]
     loads = rng.uniform(0.5, 3.0, 2) if load is None else np.full(2, load)

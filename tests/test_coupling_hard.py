@@ -1,7 +1,5 @@
 """Steps in contact space that are hard to solve, or have no solution."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,7 @@ ELLIPSOID = pf.LimitSurfaceEllipsoid(PATCH)
 PATCHES = CoupledPatches([pf.ReducedModelPublished(PATCH, LAW, ELLIPSOID)] * 4)
 
 
-def _runs(height: float, steps: int):
+def _runs(height, steps):
     """Steps of 0.1 to 10 ms, of bodies that stay and of others in each; friction tilts the loads by the `height`."""
     generator = np.random.default_rng(14)
     yield from random_run(
@@ -26,7 +24,7 @@ def _runs(height: float, steps: int):
     yield from abrupt_run(generator, PATCHES, 256, height, steps)
 
 
-def _excess_work(state, host, step, dt) -> np.ndarray:
+def _excess_work(state, host, step, dt):
     """Work on the host beyond what the bristles give, as a share of both."""
     flat = step.wrench.reshape(len(dt), -1)
     count = len(dt)

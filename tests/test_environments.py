@@ -1,7 +1,5 @@
 """Draws of parameters for environments of their own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,10 +1,5 @@
 """Messages stay on one line and short, and errors travel between processes with what they know."""
 
-from __future__ import annotations
-
-import copy
-import pickle
-
 import numpy as np
 import pytest
 
@@ -32,37 +27,6 @@ def test_messages_about_files_lose_their_middle():
         errors.one_line("a\x1b\nb") == "a\\x1b\\nb"
         and str(errors.FileError("a\tb")) == "a\\tb"
     )
-
-
-@pytest.mark.parametrize(
-    "error",
-    [
-        errors.InvalidValueError("mu", "be > 0", -1.0),
-        errors.MissingExtraError("jax", "jax"),
-        errors.SolverError("no", 3),
-        errors.IdentificationInterrupted({"mu_c": 0.51234567}),
-        errors.SweepInterrupted("2 of 3", "data"),
-        errors.SimulationInterrupted(7),
-    ],
-)
-def test_errors_travel_with_their_attributes(error):
-    for again in (pickle.loads(pickle.dumps(error)), copy.copy(error)):
-        assert (
-            type(again) is type(error)
-            and str(again) == str(error)
-            and again.__dict__ == error.__dict__
-        )
-    assert "mu must be > 0, got -1.0" in str(
-        errors.InvalidValueError("mu", "be > 0", -1.0)
-    )
-    assert str(errors.IdentificationInterrupted({"mu_c": 0.51234567})).endswith(
-        "[SI]: mu_c = 0.5123"
-    )
-
-
-def test_what_cannot_travel_stays_behind():
-    again = pickle.loads(pickle.dumps(errors.SolverError("no", lambda: 0)))
-    assert again.solution is None and str(again) == "no"
 
 
 def test_packages_that_lack_are_named_and_errors_of_our_own_are_not_hidden():

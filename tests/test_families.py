@@ -289,7 +289,7 @@ def test_a_fitted_quartic_comes_back_with_its_numbers():
 # ---------------------------------------------------------------------- models that cannot be written
 
 
-def a_solution(model) -> Solution:
+def a_solution(model):
     time = np.linspace(0.0, 1.0, 5)
     histories = {
         name: History(("time",), np.zeros(5), {"units": "m"})

@@ -1,9 +1,8 @@
 """The formulas: slopes against differences, limits, and the same number from NumPy and from compiled loops."""
 
-from __future__ import annotations
-
 import math
 
+import mpmath
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -45,6 +44,15 @@ def slope(function, x, step):
     near = function(x + step) - function(x - step)
     far = function(x + 2 * step) - function(x - 2 * step)
     return (8.0 * near - far) / (12.0 * step)
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-3, 0.0999, 0.11, 2.0, 6.0])
+def test_the_mean_of_what_turns_is_that_of_fifty_digits(angle):
+    with mpmath.workdps(50):
+        a = mpmath.mpf(angle)
+        exact = [float((1 - mpmath.cos(a)) / a**2), float((a - mpmath.sin(a)) / a**3)]
+    # 1e-13, and the difference at 0.11.
+    assert formulas.turning_mean(np, angle) == pytest.approx(exact, rel=1e-12)
 
 
 # ---------------------------------------------------------------------- Stribeck curve

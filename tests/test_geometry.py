@@ -1,7 +1,5 @@
 """Planar rigid motions: power is the same at every point and in every frame."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

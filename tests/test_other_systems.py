@@ -1,7 +1,5 @@
 """Other systems, by taking away what they lack: replacing of open files, locks, affinity, modules of POSIX."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess
@@ -17,7 +15,7 @@ from planarfriction_studies.bench import workflows
 POSIX = ("fcntl", "grp", "pty", "pwd", "resource", "termios")
 
 
-def refusing(monkeypatch, times: int) -> None:
+def refusing(monkeypatch, times):
     """Refuse to replace a file a number of times, as Windows does while another program has it open."""
     replace = os.replace
     left = iter(range(times))

@@ -1,7 +1,5 @@
 """A body on patches as the simplest thing to step."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Steps of bodies of all sizes, pressed and pushed hard: none is lost, in Python and in C."""
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 
@@ -23,7 +21,7 @@ SHORT = slice(0, 3)
 """Columns of time steps up to 10 ms."""
 
 
-def check(table: np.ndarray) -> None:
+def check(table):
     """Check that no step of up to 10 ms fails, and one in 100,000 of the others at most."""
     assert (
         table[:, SHORT, 1].sum() == 0
@@ -53,9 +51,7 @@ def test_a_million_random_steps_of_all_sizes(seed):
     check(failures(seed, 100_000))
 
 
-def failures_in_c(
-    seed: int, name: str, patches: int, total: int, count: int = 250, steps: int = 8
-) -> np.ndarray:
+def failures_in_c(seed, name, patches, total, count=250, steps=8):
     """Return steps and failures by the decades of mass and time step, `[12, 5, 2]`."""
     made = library(name, "double", "-O2", patches=patches)
     generator = np.random.default_rng(seed)

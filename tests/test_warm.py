@@ -1,7 +1,5 @@
 """Compiling ahead, and first runs in several processes and threads at once."""
 
-from __future__ import annotations
-
 import io
 import os
 import random
@@ -71,7 +69,7 @@ INTERRUPTED = {
 """Runs that compile for some seconds at least."""
 
 
-def started(code: str, cache=None, *arguments: str) -> subprocess.Popen:
+def started(code, cache=None, *arguments):
     where = (
         os.environ if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
     )
@@ -83,14 +81,14 @@ def started(code: str, cache=None, *arguments: str) -> subprocess.Popen:
     )
 
 
-def result(process: subprocess.Popen) -> str:
+def result(process):
     out, error = process.communicate()
     assert process.returncode == 0, error
     return out.strip()
 
 
 def test_what_was_compiled_ahead_is_not_compiled_again():
-    told: list[str] = []
+    told = []
     times = pf.warm_up(progress=told.append)
     assert list(times) == told and "joints" in told  # by processes beside this one
     assert {f"{kind}, {model}" for kind in warm._WORK for model in MODELS} < set(told)
@@ -99,7 +97,7 @@ def test_what_was_compiled_ahead_is_not_compiled_again():
 
 
 class Terminal(io.StringIO):
-    def isatty(self) -> bool:
+    def isatty(self):
         return True
 
 
@@ -161,7 +159,7 @@ def test_first_runs_in_several_threads(tmp_path):
     result(started(THREADS, tmp_path))
 
 
-def read_only_installation(folder: Path) -> dict[str, str]:
+def read_only_installation(folder):
     """Install the package where nothing can be written beside it; returns the environment that has it."""
     installed = folder / "planarfriction"
     shutil.copytree(

@@ -1,7 +1,5 @@
 """Published rules against the numbers that their equations give, and against exact limit surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ WEIGHT = 0.5 * 0.2 * GRAVITY
 """Friction, contact radius [m] and weight on each of two fingers [N] of the published example."""
 
 
-def disc(k: float) -> pf.ContactPatch:
+def disc(k):
     return pf.ContactPatch.disc(0.1, 5, pressure=pf.SoftFinger(c=0.1, k=k))
 
 

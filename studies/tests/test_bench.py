@@ -1,7 +1,5 @@
 """`planarfriction bench` and what the pages show of it: names, ratios, and tables that are made from its lines."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

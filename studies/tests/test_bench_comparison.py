@@ -1,7 +1,5 @@
 """`planarfriction bench --compare`: changes of ratios with their spread, on a machine that nobody else uses."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import subprocess
@@ -16,7 +14,7 @@ from planarfriction_studies.bench import comparison, running
 from planarfriction_studies.bench.measurement import Measurement
 
 
-def measured(name: str, *ratios: float) -> Measurement:
+def measured(name, *ratios):
     """A benchmark of 2 s, with the ratios of its rounds, in order."""
     middle = ratios[len(ratios) // 2]
     return Measurement(

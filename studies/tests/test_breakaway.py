@@ -1,7 +1,5 @@
 """Tables of where each model lets go: they are those of the stored numbers, and the measurement gives these again."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

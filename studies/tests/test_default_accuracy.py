@@ -1,7 +1,5 @@
 """Accuracy of the default tolerances: ends of the published in-hand runs, also with other tolerances."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,11 +1,7 @@
 """Every script that makes pictures and tables of the pages runs, on less than it is given for them."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import pytest
 
@@ -18,12 +14,12 @@ ELSEWHERE = {"make_breakaway", "make_referee", "make_tables"}
 """Scripts whose own tests run them: test_breakaway, test_referee, test_bench."""
 
 
-def beside(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def beside(made, folder, monkeypatch):
     pytest.importorskip("mujoco", reason="needs the extra [mujoco]")
     # Its finer cells take long.
     monkeypatch.setattr(made, "truth", lambda load: made.in_mujoco(load, None))
 
-    def last(path: Path, file: Any, frame: Any, count: int, fps: float) -> None:
+    def last(path, file, frame, count, fps):
         assert count > 20 and fps == 20.0
         file.write(frame(count - 1).tobytes()[:100])
 
@@ -31,7 +27,7 @@ def beside(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made.main(folder)
 
 
-def coverage(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def coverage(made, folder, monkeypatch):
     monkeypatch.setattr(made, "DURATION", 0.5)
     log = made.observed(made.ROWS["delay"], made.truth(made.ROWS["delay"]), 0)
     assert log.time[-1] == pytest.approx(0.495)
@@ -40,7 +36,7 @@ def coverage(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
-def explorer(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def explorer(made, folder, monkeypatch):
     if shutil.which("chromium") is None:
         pytest.skip("needs Chromium")
     (folder / "images").mkdir()
@@ -48,11 +44,11 @@ def explorer(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made.pictures()
 
 
-def house(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def house(made, folder, monkeypatch):
     made.draw().savefig(folder / "house.png")
 
 
-def images(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def images(made, folder, monkeypatch):
     simulate = pf.simulate
     # Tests of grips make that plan.
     monkeypatch.setattr(made, "grip_plan", made.bristle)
@@ -61,7 +57,7 @@ def images(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         figure.savefig(folder / f"{name}.png", dpi=20)
 
 
-def measured(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def measured(made, folder, monkeypatch):
     task = next(iter(TASKS))
     key = TASKS[task].measures[0].key
     stored = {
@@ -84,7 +80,7 @@ def measured(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "old" not in page
 
 
-def moving(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def moving(made, folder, monkeypatch):
     animate = pf.Solution.animate
     few = {"fps": 2.0, "dpi": 30.0}
     monkeypatch.setattr(
@@ -95,7 +91,7 @@ def moving(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made.main(folder)
 
 
-def pushing(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def pushing(made, folder, monkeypatch):
     single = replayed_pushes.single_pushes()
     in_time = replayed_pushes.pushes_in_time()
     one = next(each for each in in_time if each.name.endswith("3out_2 108"))
@@ -113,7 +109,7 @@ def pushing(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert made.PAGE.read_text().count("\n| ") == 1 + len(made.BOARDS)
 
 
-def joint(made: Any, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def joint(made, folder, monkeypatch):
     monkeypatch.setattr(made, "T_END", 1.0)
     # The other picture is that of a fit, which test_joints makes.
     made.holds().savefig(folder / "joint-holds.png")
@@ -141,7 +137,7 @@ def test_a_maker_of_pages_makes_them(name, tmp_path, monkeypatch):
     if not DOCS.is_dir():
         pytest.skip("no docs beside these tests")
     monkeypatch.syspath_prepend(DOCS)
-    made: ModuleType = script(f"docs/{name}.py")
+    made = script(f"docs/{name}.py")
     {**MAKERS, **SLOW}[name](made, tmp_path, monkeypatch)
     for picture in [
         *tmp_path.glob("*.png"),

@@ -1,7 +1,5 @@
 """Figures of the experiments, drawn from made numbers: each line has its data, in the units of its axis."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,25 +25,25 @@ TIME = np.linspace(0.0, 5.0, 501)
 UNITS = {"x": 1e3, "y": 1e3, "theta": 180.0 / np.pi, "fx": 1.0, "fy": 1.0, "tau": 1e3}
 
 
-def made(seed: int) -> dict[str, np.ndarray]:
+def made(seed):
     """Columns of a run."""
     random = np.random.default_rng(seed)
     columns = {name: random.normal(size=len(TIME)) for name in (*UNITS, "normal_force")}
     return {"time": TIME, **columns}
 
 
-def has(line, x, y) -> None:
+def has(line, x, y):
     np.testing.assert_allclose(
         line.get_xydata(), np.stack([x, y], -1), rtol=1e-12, atol=1e-12
     )
 
 
-def is_published(line, name: str, factor: float, part=slice(None)) -> None:
+def is_published(line, name, factor, part=slice(None)):
     curve = facts.published_curve(name)
     has(line, curve.time[part], factor * curve.values[part])
 
 
-def box_of(axes, number: int) -> list[float]:
+def box_of(axes, number):
     """Place, low whisker, first quartile, median, third quartile and high whisker of a box; crosses are left out."""
     lines = [line for line in axes.lines if line.get_marker() != "x"]
     whiskers = lines[5 * number : 5 * number + 2]
@@ -210,7 +208,7 @@ def test_the_staircase_is_drawn_within_its_limits():
 # ---------------------------------------------------------------------- velocity-driven
 
 
-def wrenches(seed: int) -> dict[str, np.ndarray]:
+def wrenches(seed):
     random = np.random.default_rng(seed)
     return {
         "time": TIME,

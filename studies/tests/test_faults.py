@@ -1,8 +1,5 @@
 """Faults of sensors in the rig: every one ends as the table says."""
 
-from __future__ import annotations
-
-import numpy as np
 import pytest
 
 from planarfriction_studies.rig import faults
@@ -10,7 +7,7 @@ from planarfriction_studies.rig import faults
 ALL = faults.expected()
 
 
-def wrong(task: str, found: np.ndarray, kinds: list[faults.Fault]) -> list[str]:
+def wrong(task, found, kinds):
     """Return the faults that ended otherwise than expected, each with the numbers of parts that did so."""
     ends = faults.ends(task, found)
     said = []

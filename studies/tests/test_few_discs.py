@@ -1,7 +1,5 @@
 """`ReducedModel` beside the distributed model of the same patch: in hand, and moved by random twists."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -16,7 +14,7 @@ FARTHEST = 2.5e-4
 """Largest distance of an end from the distributed model's [m], of ways of up to 20 mm."""
 
 
-def miss(case: Case) -> float:
+def miss(case):
     """Return the distance of the ends, at tolerances that leave less than a micrometre."""
     patch = PUBLISHED_PATCHES[case.shape]()
     scene = ladder.scenes_of(case.shape)[case.words]

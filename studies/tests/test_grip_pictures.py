@@ -1,7 +1,5 @@
 """Pictures and films of a part in a gripper show what was recorded."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -12,7 +10,7 @@ from planarfriction_studies.rig.demo import GripRecord, record_hold
 from planarfriction_studies.rig.pictures import plot_grip, write_grip_film
 
 
-def record(rows=40) -> GripRecord:
+def record(rows=40):
     """A part that slides by 10 mm and turns by a quarter in 0.4 s."""
     share = np.linspace(0.0, 1.0, rows)
     zero = 0.0 * share

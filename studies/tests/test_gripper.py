@@ -1,7 +1,5 @@
 """The rig: what it holds, how it slips, and what its sensors say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

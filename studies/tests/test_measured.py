@@ -1,7 +1,5 @@
 """The comparison on measured data: its tables, its splits, its scores, and models that are handed in."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import shutil

@@ -1,7 +1,5 @@
 """An observer on measured pushes and slides: the friction that it finds is that of a fit to the whole log."""
 
-from __future__ import annotations
-
 import gzip
 import itertools
 

@@ -1,7 +1,5 @@
 """Measured pushes followed from their start, the example of a plan, and what a push costs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

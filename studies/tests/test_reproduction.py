@@ -53,14 +53,14 @@ from planarfriction_studies.experiments.wording import (
 class Made:
     """An experiment that counts what it does, can be interrupted once, and can miss its reference."""
 
-    def __init__(self, name: str, *, interrupt_at: str = "", theirs: float = 2.0):
+    def __init__(self, name, *, interrupt_at="", theirs=2.0):
         self.name = name
         self.title = f"About <{name}>"
         self.interrupt_at = interrupt_at
         self.theirs = theirs
         self.done: list[str] = []
 
-    def run(self, work: Work) -> Result:
+    def run(self, work):
         import xarray as xr
 
         from planarfriction.plots.style import new_figure
@@ -104,7 +104,7 @@ class Made:
             left_out="the red curve" if self.name == "second" else "",
         )
 
-    def compute(self, letter: str) -> dict[str, float]:
+    def compute(self, letter):
         if letter == self.interrupt_at:
             self.interrupt_at = ""
             raise KeyboardInterrupt

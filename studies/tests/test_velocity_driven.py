@@ -1,7 +1,5 @@
 """The velocity-driven experiment: published and converged curves, box plots, and what would not fit them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.velocity_driven import boxes
 from planarfriction_studies.experiments.velocity_driven import run as velocity_driven
-from tests.support.studied import check
 
 
 @pytest.fixture(scope="module")
@@ -17,11 +14,7 @@ def result():
     return velocity_driven.run(Work(quick=True))
 
 
-def test_all_that_it_shows_is_as_recorded(result):
-    check("velocity-driven", result)
-
-
-def wrench(result, shape: str, model: str, component: str) -> np.ndarray:
+def wrench(result, shape, model, component):
     return result.data["wrenches"][component].sel(shape=shape, model=model).to_numpy()
 
 

@@ -32,7 +32,7 @@ READERS = {
 """A file of each kind, and what reads it."""
 
 
-def one_line(act, *arguments) -> str:
+def one_line(act, *arguments):
     with pytest.raises(FrictionError) as caught:
         act(*arguments)
     assert "\n" not in str(caught.value)

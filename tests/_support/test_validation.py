@@ -1,7 +1,5 @@
 """Checks of input at their limits: what just passes, what just does not, and the line that says so."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 from pathlib import Path
@@ -16,7 +14,7 @@ from planarfriction.formulas import LARGEST
 ABOVE = float(np.nextafter(LARGEST, np.inf))
 
 
-def refused(check, *given, **options) -> str:
+def refused(check, *given, **options):
     with pytest.raises(InvalidValueError) as error:
         check("x", *given, **options)
     told = str(error.value)

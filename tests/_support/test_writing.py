@@ -8,7 +8,6 @@ import subprocess
 import sys
 import textwrap
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,12 +25,12 @@ resource = pytest.importorskip("resource")  # not on Windows
 OLD = b"what was there before"
 
 
-def names(folder: Path) -> list[str]:
+def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
 @contextlib.contextmanager
-def started(code: str, *arguments: object) -> Iterator[subprocess.Popen]:
+def started(code, *arguments):
     """A Python process with `code`, which says "ready" as soon as everything is imported; killed at the end."""
     command = [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
@@ -186,7 +185,7 @@ def test_the_bytes_are_on_the_disk_before_they_take_the_place(tmp_path, monkeypa
 
 
 def test_permissions_stay_and_new_files_have_those_of_any_new_file(tmp_path):
-    def mode(name: str) -> int:
+    def mode(name):
         return stat.S_IMODE((tmp_path / name).stat().st_mode)
 
     (tmp_path / "plain").write_bytes(b"")

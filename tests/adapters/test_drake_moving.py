@@ -1,7 +1,5 @@
 """Boxes that come to rest on a moving carrier, and balls that roll, inside Drake."""
 
-from __future__ import annotations
-
 import math
 import warnings
 
@@ -22,7 +20,7 @@ from pydrake.multibody.tree import (
 )
 
 from planarfriction.adapters.drake import Friction, PatchContact, prepare
-from tests.support.drake_scenes import Running, bare, material, running
+from tests.support.drake_scenes import bare, material, running
 
 pytestmark = pytest.mark.drake
 
@@ -30,9 +28,7 @@ LAW = pf.LuGre(mu_c=0.4, sigma_2=0.0, elasto_plastic=0.9)
 CORNERS = 0.05 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 
 
-def carried(
-    mass: float, speed: float, dt: float, contact: str, approximation: str
-) -> Running:
+def carried(mass, speed, dt, contact, approximation):
     """A box of 0.5 kg that is 0.1 m/s slower than its carrier, which nothing else slows down."""
     builder, plant, scene_graph = bare(dt, discrete_contact_approximation=approximation)
     carrier = plant.AddRigidBody(
@@ -100,7 +96,7 @@ def test_a_box_comes_to_rest_on_a_carrier(mass, speed, approximation, contact):
     )
 
 
-def ball(turned: RotationMatrix, angle: float) -> Running:
+def ball(turned, angle):
     builder, plant, scene_graph = bare(2e-3)
     body = plant.AddRigidBody(
         "ball", SpatialInertia(0.1, [0, 0, 0], UnitInertia.SolidSphere(0.05))

@@ -41,7 +41,7 @@ HEAVY = 10.0
 CORNERS = 0.03 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 
 
-def ample(spin: float, radius: float) -> float:
+def ample(spin, radius):
     """Return the radius, or a smaller one at which a fifth of the friction of mu = 1 holds [m]."""
     return min(radius, 0.2 * 9.81 / spin**2)
 
@@ -53,7 +53,7 @@ class Turning(NamedTuple):
     part: Any
     support: Any
 
-    def path(self, seconds: float, every: float = 0.1) -> np.ndarray:
+    def path(self, seconds, every=0.1):
         """Return the times, radii and angles of the part about the support's axis, and its own angle, as rows."""
         rows = []
         for i in range(round(seconds / every) + 1):
@@ -74,7 +74,7 @@ class Turning(NamedTuple):
         return np.array(rows)
 
 
-def _box(plant: Any) -> Any:
+def _box(plant):
     """Add a box of 60 x 60 x 20 mm on four feet, with a frame on its bottom."""
     box = plant.AddRigidBody(
         "box", SpatialInertia(0.1, [0, 0, 0], UnitInertia.SolidBox(0.06, 0.06, 0.02))
@@ -90,14 +90,14 @@ def _box(plant: Any) -> Any:
     return box
 
 
-def _turntable(plant: Any) -> Any:
+def _turntable(plant):
     """Add a body that turns about the vertical."""
     return plant.AddRigidBody(
         "table", SpatialInertia(HEAVY, [0, 0, 0], UnitInertia.SolidSphere(1.0))
     )
 
 
-def _place(made: Running, part: Any, place: list[float], spin: float) -> None:
+def _place(made, part, place, spin):
     """Let a part turn about the vertical axis of the world."""
     plant = made.plant
     spins = np.array([0.0, 0.0, spin])
@@ -107,7 +107,7 @@ def _place(made: Running, part: Any, place: list[float], spin: float) -> None:
     )
 
 
-def table(spin: float, dt: float, **options: Any) -> Turning:
+def table(spin, dt, **options):
     """A box on a hinged table."""
     builder, plant, scene_graph = bare(dt, **options)
     support = _turntable(plant)
@@ -121,7 +121,7 @@ def table(spin: float, dt: float, **options: Any) -> Turning:
     return Turning(made, part, support.body_frame())
 
 
-def angles(spin: float, dt: float) -> Turning:
+def angles(spin, dt):
     """A box on a table that both turn by roll, pitch and yaw about skew axes: steps of these are no steady turns."""
     builder, plant, scene_graph = bare(dt)
     support = _turntable(plant)
@@ -145,7 +145,7 @@ def angles(spin: float, dt: float) -> Turning:
     return Turning(made, part, support.body_frame())
 
 
-def _on_a_deck(builder: Any, plant: Any, scene_graph: Any) -> Running:
+def _on_a_deck(builder, plant, scene_graph):
     """Return the plant with a deck on its table, and a patch between this and its box."""
     deck = material("point", rigid=True)
     plant.RegisterCollisionGeometry(
@@ -159,7 +159,7 @@ def _on_a_deck(builder: Any, plant: Any, scene_graph: Any) -> Running:
     )
 
 
-def car(spin: float, dt: float) -> Turning:
+def car(spin, dt):
     """A box on a car that drives in a circle, on springs that keep it there."""
     builder, plant, scene_graph = bare(dt)
     support = _turntable(plant)
@@ -188,7 +188,7 @@ def car(spin: float, dt: float) -> Turning:
     return Turning(made, part, support.body_frame())
 
 
-def arm(spin: float, dt: float, reach: float = 0.014) -> Turning:
+def arm(spin, dt, reach=0.014):
     """A block at the end of an arm, pressed along its circle by one pad against another.
 
     Pads press with 30 N where they are 6 mm in the block: they close if they begin further away.
@@ -247,7 +247,7 @@ def arm(spin: float, dt: float, reach: float = 0.014) -> Turning:
     return Turning(made, block, support.body_frame())
 
 
-def _check(made: Turning, spin: float, dt: float, seconds: float, start: float) -> None:
+def _check(made, spin, dt, seconds, start):
     """Compare the path with what the second order of the steps leaves, and the deflection of the bristles."""
     path = made.path(seconds)
     times, radius, around, own = path[path[:, 0] > start - 1e-9].T

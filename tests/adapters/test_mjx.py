@@ -103,7 +103,7 @@ def test_patches_that_follow_their_contact_do_so_as_in_mujoco():
     np.testing.assert_allclose(ours.wrenches(end), theirs.wrenches(d), atol=5e-3)
 
 
-def rolled(friction, m, data, steps: int):
+def rolled(friction, m, data, steps):
     """Rollouts of all `data` side by side: the last data, and positions `[steps + 1, E, nq]`."""
     batch = jax.tree.map(
         lambda *each: jnp.stack(each), *(mjx.put_data(m, d) for d in data)
@@ -133,7 +133,7 @@ class Discs(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def discs() -> Discs:
+def discs():
     """From the three starts to rest, and from a little more and less speed and spin than those of the first."""
     m, settled, patches = made(disc(*STARTS[0]))
     for _ in range(300):
@@ -383,9 +383,7 @@ def in_operations(patches):
     return step
 
 
-def compare_with_compiled(
-    seed: int, kinds, steps: int, bodies: int, reference_load: float | None = None
-) -> None:
+def compare_with_compiled(seed, kinds, steps, bodies, reference_load=None):
     generator = np.random.default_rng(seed)
     patches = random_patches(generator, 2, kinds)
     if reference_load is not None:

@@ -1,7 +1,5 @@
 """Friction that differs between environments in MJX: arrays under `vmap`, with derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

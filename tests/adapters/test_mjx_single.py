@@ -1,7 +1,5 @@
 """Patch friction in MJX in single precision: where double precision goes, without creep."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

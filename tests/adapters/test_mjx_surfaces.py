@@ -1,7 +1,5 @@
 """Surfaces that move and bodies that roll inside MJX and MuJoCo Warp."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -32,7 +30,7 @@ ROLLING = [
 ]
 
 
-def model(text: str, patches, angle: float = 0.0):
+def model(text, patches, angle=0.0):
     spec = mujoco.MjSpec.from_string(
         f'<mujoco><option cone="pyramidal"/><worldbody>{text}</worldbody></mujoco>'
     )
@@ -40,7 +38,7 @@ def model(text: str, patches, angle: float = 0.0):
     return prepare(spec, patches).compile()
 
 
-def in_mjx(m, patches, steps: int) -> np.ndarray:
+def in_mjx(m, patches, steps):
     """Return speeds along x."""
     jax = pytest.importorskip("jax")
     mjx = pytest.importorskip("mujoco.mjx")
@@ -58,7 +56,7 @@ def in_mjx(m, patches, steps: int) -> np.ndarray:
     return np.array(speeds)
 
 
-def in_warp(m, patches, steps: int) -> np.ndarray:
+def in_warp(m, patches, steps):
     pytest.importorskip("mujoco_warp")
     from planarfriction.adapters.mujoco_warp import Friction
 

@@ -1,7 +1,5 @@
 """Patch friction inside MuJoCo: steps, callbacks and rollouts that agree, whatever else is in the model."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 
@@ -29,7 +27,7 @@ PAD = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01, cells=9), LAW)
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
-def _made(text: str, patches, **options):
+def _made(text, patches, **options):
     spec = mujoco.MjSpec.from_string(text)
     for name, value in options.items():
         setattr(spec.option, name, value)
@@ -38,7 +36,7 @@ def _made(text: str, patches, **options):
     return m, mujoco.MjData(m), Friction(m, patches)
 
 
-def _held(scene, steps: int = 100, **options):
+def _held(scene, steps=100, **options):
     """A scene that has settled."""
     m, d, friction = scene.ours(**options)
     d.ctrl[:] = scene.control(0.0)
@@ -47,7 +45,7 @@ def _held(scene, steps: int = 100, **options):
     return m, d, friction
 
 
-def _saved(m, d) -> np.ndarray:
+def _saved(m, d):
     saved = np.zeros(mujoco.mj_stateSize(m, STATE))
     mujoco.mj_getState(m, d, saved, STATE)
     return saved

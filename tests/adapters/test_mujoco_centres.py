@@ -1,7 +1,5 @@
 """Origins of patches in MuJoCo: contacts that roll, faces whose points jump about, sites beside the contact."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -26,7 +24,7 @@ BOX = 'type="box" size="0.04 0.04 0.04"'
 
 
 def on_the_floor(
-    geom: str, site: str, model=SMALL, height=RADIUS, turned="", inertia=0.4, **options
+    geom, site, model=SMALL, height=RADIUS, turned="", inertia=0.4, **options
 ):
     """Return data after a body on a plane has come to rest, and friction."""
     i = inertia * MASS * RADIUS**2

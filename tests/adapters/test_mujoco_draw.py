@@ -1,7 +1,5 @@
 """Patches drawn into a MuJoCo scene, and the example that shows them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Friction that differs between environments: copies of a MuJoCo model with parameters of their own."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 
@@ -47,11 +45,11 @@ KINDS = {
 }
 
 
-def _patch(scale: float) -> pf.ContactPatch:
+def _patch(scale):
     return pf.ContactPatch.rectangle(0.06 * scale, 0.04 * scale, cells=7)
 
 
-def _made(kind: str, law=LAW, scale=1.0, centre=(0.0, 0.0)):
+def _made(kind, law=LAW, scale=1.0, centre=(0.0, 0.0)):
     follows = "follows" if "follow" in kind or "edge" in kind else "fixed"
     model = KINDS[kind](_patch(scale), law)
     spec = mujoco.MjSpec.from_string(

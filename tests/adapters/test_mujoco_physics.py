@@ -1,7 +1,5 @@
 """Patch friction inside MuJoCo against what theory, and the solver's own runs, say: held, shaken, stopped, turned."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -45,7 +45,7 @@ def matrices(host, m, d, nefc, places, x, products):
     return sparse
 
 
-def rows_of(m, d) -> np.ndarray:
+def rows_of(m, d):
     """Return the Jacobian of the constraints [nefc, nv] from MuJoCo's own multiplication."""
     columns = np.zeros((m.nv, d.nefc))
     for column, unit in zip(columns, np.eye(m.nv), strict=True):
@@ -178,7 +178,7 @@ def test_metric_holds_the_forces_that_the_integrator_takes_as_implicit(
     )
     assert other == bool(forces)
 
-    def force(velocity) -> np.ndarray:
+    def force(velocity):
         d.qvel[:] = velocity
         mujoco.mj_forward(m, d)
         return sum((getattr(d, name) for name in forces), np.zeros(m.nv))

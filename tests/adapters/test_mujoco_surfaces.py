@@ -1,7 +1,5 @@
 """Surfaces that move, stick or roll inside MuJoCo, and models that are prepared without changing their contacts."""
 
-from __future__ import annotations
-
 import gc
 import math
 
@@ -23,14 +21,14 @@ SMALL = pf.ContactPatch.disc(0.003, cells=5)
 BOX = [PatchContact(SOLE, "sole", ("box", "floor"))]
 
 
-def made(text: str, patches, dt: float = 1e-3):
+def made(text, patches, dt=1e-3):
     spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{text}</worldbody></mujoco>")
     spec.option.timestep = dt
     m = prepare(spec, patches).compile()
     return m, mujoco.MjData(m), Friction(m, patches)
 
 
-def box(floor: str = "", own: str = "", pos: str = "0 0 0.02", site: str = "") -> str:
+def box(floor="", own="", pos="0 0 0.02", site=""):
     return f"""<geom name="floor" type="plane" size="5 5 1" {floor}/><body name="box" pos="{pos}"><freejoint/>
     <geom name="box" type="box" size="0.02 0.02 0.02" mass="0.2" {own}/>
     <site name="sole" pos="0 0 -0.02" {site}/></body>"""

@@ -3,11 +3,8 @@
 Its own kernels and MuJoCo Warp's take a minute to compile on two processors, so most of these tests are slow ones.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import logging
-from typing import Any
 
 import numpy as np
 import pytest
@@ -64,9 +61,7 @@ def made(scene, model=None, pressure="auto", integrator="Euler", **options):
 class Both:
     """A scene that has settled in MuJoCo, and the same in the worlds of MuJoCo Warp."""
 
-    def __init__(
-        self, scene: Any, worlds: int = 2, parameters: Any = None, **options: Any
-    ) -> None:
+    def __init__(self, scene, worlds=2, parameters=None, **options):
         self.scene = scene
         self.m, self.d, patches = made(scene, **options)
         self.theirs = adapter.Friction(self.m, patches)
@@ -89,7 +84,7 @@ class Both:
             )
         data.time.fill_(self.d.time)
 
-    def control(self, t: float) -> None:
+    def control(self, t):
         if self.m.nu:
             controls = np.array(self.scene.control(t))
             self.d.ctrl[:] = controls
@@ -97,7 +92,7 @@ class Both:
                 np.tile(controls, (self.ours.data.nworld, 1)).astype(np.float32)
             )
 
-    def run(self, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    def run(self, seconds):
         """Return positions of all worlds [steps, E, nq] and of MuJoCo [steps, nq]."""
         ours = []
         theirs = []

@@ -1,7 +1,5 @@
 """Patches of faces inside MuJoCo: their pressure follows the contact forces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -37,7 +35,7 @@ def made(body=BOX, table=TABLE, joint="<freejoint/>", **options):
     return m, d, friction
 
 
-def stopped(start, **options) -> np.ndarray:
+def stopped(start, **options):
     """Return the pose where the box comes to rest, with the half step added that a velocity-stepping start loses."""
     _, d, friction = made(**options)
     start = np.array(start)

@@ -1,7 +1,5 @@
 """The box of `test_pressure_follows` in MJX and in Drake."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ START = np.array([0.0, 0.5, 8.0])
 """It turns by 44 degrees; by 51 with a pressure that stays in the middle of the patch."""
 
 
-def near(end: np.ndarray) -> bool:
+def near(end):
     """Return True within 0.5 mm and 0.1 degrees of the plate, the half step of its start put back."""
     off = abs(end + 0.5 * DT * START - PLATE.stops(*START))
     return bool(off[:2].max() < 5e-4 and off[2] < np.radians(0.1))
@@ -49,7 +47,7 @@ def test_in_drake_a_box_slides_as_a_plate():
     plant.SetFreeBodyPose(context, box, drake.RigidTransform())
     simulator.AdvanceTo(0.2)
 
-    def pose() -> np.ndarray:
+    def pose():
         at = plant.EvalBodyPoseInWorld(context, box)
         return np.array(
             [

@@ -1,7 +1,5 @@
 """Friction of boxes that moments tilt, in MJX and MuJoCo Warp in single precision: that of double precision."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -110,7 +108,7 @@ def in_warp(m, patches, qpos, qvel, force):
     return friction.wrenches().numpy().astype(float)
 
 
-def worst(found, wanted) -> float:
+def worst(found, wanted):
     """Return the largest error of a wrench in the weight, torques over half a width."""
     return float(abs((found - wanted) / (WEIGHT * np.array([1.0, 1.0, HALF[0]]))).max())
 

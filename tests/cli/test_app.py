@@ -54,7 +54,7 @@ def test_ctrl_c_before_the_first_sample_is_no_traceback(monkeypatch, capsys):
 
 
 @pytest.fixture
-def simulated(monkeypatch) -> list[tuple[pf.Scene, dict]]:
+def simulated(monkeypatch):
     """Replace `simulate` by a stand-in; returns what it was asked for."""
     calls = []
 
@@ -71,7 +71,7 @@ def simulated(monkeypatch) -> list[tuple[pf.Scene, dict]]:
     return calls
 
 
-def fails(capsys, *arguments: str) -> str:
+def fails(capsys, *arguments):
     """Run a command that must fail with exit code 2, one line on stderr, nothing on stdout; returns the line."""
     assert main(arguments) == 2
     captured = capsys.readouterr()
@@ -80,7 +80,7 @@ def fails(capsys, *arguments: str) -> str:
     return captured.err
 
 
-def read_csv(path: Path) -> dict[str, np.ndarray]:
+def read_csv(path):
     with path.open(newline="") as file:
         head, *rows = csv.reader(file)
     return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
@@ -164,7 +164,7 @@ def test_ready_scenes_by_name(name):
         assert scene.contacts[0].model.patch.cells == 317
 
 
-def run_models() -> tuple[str, str]:
+def run_models():
     return "DistributedModel", "ReducedModel"
 
 
@@ -202,7 +202,7 @@ def test_disc_rectangle_and_pressure_map(tmp_path):
 
 
 @pytest.fixture
-def scene_file(tmp_path) -> Path:
+def scene_file(tmp_path):
     path = tmp_path / "plate.json"
     synthetic.scene(contacts=2, name="my plate").to_file(path)
     return path
@@ -243,7 +243,7 @@ def test_run_prints_the_comparison(capsys, simulated):
     assert [options for _, options in simulated] == [{"rtol": 1e-4}] * 2
 
 
-def table_rows(text: str) -> list[list[str]]:
+def table_rows(text):
     """Cells of the rows of a printed table, empty ones left out."""
     rows = [
         [cell.strip() for cell in line.strip("│").split("│")]
@@ -348,7 +348,7 @@ def test_a_folder_that_cannot_be_written_is_found_before_the_simulation(
     assert simulated == []
 
 
-def interrupted(after: int, error):
+def interrupted(after, error):
     """A stand-in for `simulate` that ends in an error with a part of the solution after some complete runs."""
     done = []
 
@@ -504,7 +504,7 @@ LINES = [
 
 
 @pytest.fixture
-def measured(monkeypatch) -> list:
+def measured(monkeypatch):
     calls = []
 
     def run(names, *, full, rounds, progress):
@@ -604,7 +604,7 @@ def test_entry_points_of_each_distribution_are_its_commands(folder):
 
 def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, capsys):
     @click.command()
-    def hello() -> None:
+    def hello():
         print("hello")
 
     entries = [

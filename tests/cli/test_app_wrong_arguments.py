@@ -43,7 +43,7 @@ FILES = [(["limit-surface"], "--out", ".png"), (["limit-surface"], "--csv", ".cs
 
 
 @pytest.fixture(autouse=True)
-def place(tmp_path, monkeypatch) -> Path:
+def place(tmp_path, monkeypatch):
     """A folder with a scene, a log, a map, and things that are no files."""
     monkeypatch.chdir(tmp_path)
     for name, text in {
@@ -61,7 +61,7 @@ def place(tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
-def fails(capsys, *arguments: str) -> str:
+def fails(capsys, *arguments):
     """The line of a command that must fail and leave every file as it was."""
     before = {path.name: path.stat().st_mtime_ns for path in Path().iterdir()}
     assert main(arguments) == 2

@@ -1,7 +1,5 @@
 """`planarfriction doctor`: what it says of the installation, and that it notices what is wrong."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 
@@ -14,7 +12,7 @@ from planarfriction.cli import doctor, main
 from tests.support.repository import ROOT
 
 
-def lines(capsys) -> dict[str, str]:
+def lines(capsys):
     """The lines that were printed, by what stands before the first colon and space; the last one is the verdict."""
     *rows, verdict = capsys.readouterr().out.splitlines()
     return {"verdict": verdict} | dict(row.split(": ", 1) for row in rows)

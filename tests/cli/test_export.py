@@ -1,7 +1,5 @@
 """`planarfriction export`: files of models and of scenes as C source."""
 
-from __future__ import annotations
-
 import pytest
 
 import planarfriction as pf

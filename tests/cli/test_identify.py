@@ -1,7 +1,5 @@
 """`planarfriction identify`: estimates on stdout, files in the folder, one line for what is wrong."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import threading

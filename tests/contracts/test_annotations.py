@@ -1,7 +1,5 @@
 """Every function of the compiled core says what its arguments are."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 
@@ -14,7 +12,7 @@ MOST = 9
 LONG = {("fixed_stiffness.py", "stepped")}
 
 
-def functions(folder: str) -> list[tuple[str, ast.FunctionDef]]:
+def functions(folder):
     trees = (
         (each.name, ast.parse(each.read_text()))
         for each in sorted((PACKAGE / folder).rglob("*.py"))

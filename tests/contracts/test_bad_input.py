@@ -1,7 +1,6 @@
 """Wrong input is refused everywhere with one line that names the parameter, the rule and the value."""
 
-from __future__ import annotations
-
+import dataclasses
 import datetime
 import math
 import tracemalloc
@@ -51,8 +50,8 @@ class Talkative:
         return "line\n" * 5000
 
 
-def itself() -> list:
-    result: list = [1.0]
+def itself():
+    result = [1.0]
     result.append(result)
     return result
 
@@ -180,7 +179,7 @@ MASKS = ("weights", "pressure", "profile")
 """Pressures: an array of truth values is a mask."""
 
 
-def refused(name: str, call, value) -> None:
+def refused(name, call, value):
     with pytest.raises(InvalidValueError) as caught:
         call(value)
     message = str(caught.value)
@@ -429,6 +428,27 @@ def test_a_choice_is_a_text(name, call):
         (
             lambda: FINGER.weights(np.ones(1_000_000)),
             r"normal_force must be at most \d+ loads for \d+ cells",
+        ),
+        (
+            lambda: dataclasses.replace(SQUARE, cell_size=(-1e-3, 1e-3)),
+            "cell_size must be >= 0, got -0.001",
+        ),
+        (
+            lambda: pf.DistributedModel(FINGER, pf.LuGre(reference_load=2.0)),
+            "for a law with a reference_load, got disc",
+        ),
+        (
+            lambda: SQUARE.weights(2.0, moments=np.zeros((10**7, 2))),
+            "moments must be at most 3333333 pairs for 9 cells",
+        ),
+        (
+            lambda: pf.export_c(
+                pf.ReducedModel(
+                    SQUARE.with_friction_metric(None, (0.1, 0.0)), pf.LuGre()
+                ),
+                "pad",
+            ),
+            "model must have no asymmetry",
         ),
         (lambda: pf.scenes.curling(MODEL, twist=1.0), r"twist must have shape \[3\]"),
         (

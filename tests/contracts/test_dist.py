@@ -1,13 +1,10 @@
 """Distributions that `make dist` refuses: files missing or too many, another version, a wheel that grows."""
 
-from __future__ import annotations
-
 import io
 import re
 import tarfile
 import tomllib
 import zipfile
-from pathlib import Path
 
 import pytest
 
@@ -19,7 +16,7 @@ KIND = check.DISTRIBUTIONS["planarfriction"]
 CODE = {"planarfriction/__init__.py", "planarfriction/py.typed"}
 
 
-def wheel(folder: Path, names: set[str], content: bytes = b"") -> Path:
+def wheel(folder, names, content=b""):
     """Write a wheel with these files and all licences."""
     folder.mkdir()
     path = folder / "planarfriction-1.2.3-py3-none-any.whl"
@@ -32,7 +29,7 @@ def wheel(folder: Path, names: set[str], content: bytes = b"") -> Path:
     return path
 
 
-def source(folder: Path, names: set[str]) -> Path:
+def source(folder, names):
     """Write a source distribution with these files."""
     path = folder / "planarfriction-1.2.3.tar.gz"
     with tarfile.open(path, "w:gz") as archive:
@@ -45,9 +42,7 @@ def source(folder: Path, names: set[str]) -> Path:
     return path
 
 
-def faults(
-    folder: Path, *, code: set[str] = CODE, beside: set[str] = frozenset(), **options
-) -> list[str]:
+def faults(folder, *, code=CODE, beside=frozenset(), **options):
     """Lines about a release that has these files."""
     sent = source(folder, {f"src/{name}" for name in code} | KIND.beside | beside)
     return check.faults(

@@ -11,7 +11,7 @@ import pkgutil
 import re
 import runpy
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import matplotlib
 import pytest
@@ -70,7 +70,7 @@ class Block(NamedTuple):
     """Number of `##` headings before it."""
 
 
-def blocks(page: Path) -> list[Block]:
+def blocks(page):
     text = page.read_text(encoding="utf-8")
     result = []
     end = 0
@@ -88,7 +88,7 @@ def blocks(page: Path) -> list[Block]:
     return result
 
 
-def missing_packages(page: Path) -> dict[int, str]:
+def missing_packages(page):
     """Sections whose Python needs an optional package that is not installed, and which."""
     return {
         block.section: package
@@ -103,22 +103,22 @@ def missing_packages(page: Path) -> dict[int, str]:
     }
 
 
-def installed(package: str) -> bool:
+def installed(package):
     try:
         return importlib.util.find_spec(package) is not None
     except ModuleNotFoundError:  # a part of what is not there
         return False
 
 
-def unsigned_zeros(text: str) -> str:
+def unsigned_zeros(text):
     return re.sub(r"-(?=0\.0*(?!\d))", " ", text)
 
 
-def prose(page: Path) -> str:
+def prose(page):
     return FENCE.sub("", page.read_text(encoding="utf-8"))
 
 
-def anchors(page: Path) -> set[str]:
+def anchors(page):
     headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
     return {
         re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
@@ -126,7 +126,7 @@ def anchors(page: Path) -> set[str]:
     }
 
 
-def ids(page: Path) -> str:
+def ids(page):
     return page.name
 
 
@@ -152,7 +152,7 @@ def test_the_python_of_a_page_runs_and_prints_what_the_page_says(
     monkeypatch.chdir(tmp_path)
     for family in FAMILIES:  # what a page registers is forgotten after it
         monkeypatch.setattr(family, "_members", dict(family._members))
-    namespace: dict = {"__name__": page.stem}
+    namespace = {"__name__": page.stem}
     printed = ""
     backend = matplotlib.get_backend()
     matplotlib.use("Agg")
@@ -221,7 +221,7 @@ def test_links_to_code_lead_to_its_lines(page):
     assert runpy.run_path(str(ROOT / "docs" / "make_lines.py"))["updated"](text) == text
 
 
-def resolve(name: str, package: Any = planarfriction) -> bool:
+def resolve(name, package=planarfriction):
     """Return True if a package has a dotted name: modules, functions, classes and the fields of classes."""
     parts = name.split(".")
     value = package

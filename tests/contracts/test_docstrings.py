@@ -9,7 +9,6 @@ import importlib
 import inspect
 import re
 import textwrap
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import pytest
@@ -58,7 +57,7 @@ class Public(NamedTuple):
     """The class that it belongs to."""
 
 
-def members(where: str) -> Iterator[tuple[str, Any]]:
+def members(where):
     """Public classes and functions of a module of the package, each under its full name."""
     module = importlib.import_module(f"planarfriction.{where}")
     names = getattr(module, "__all__", None) or [
@@ -71,7 +70,7 @@ def members(where: str) -> Iterator[tuple[str, Any]]:
             yield f"{where}.{name}", value
 
 
-def callables(where: str) -> Iterator[Public]:
+def callables(where):
     for name, value in members(where):
         if not inspect.isclass(value):
             yield Public(name, value, value.__doc__ or "")
@@ -100,7 +99,7 @@ def callables(where: str) -> Iterator[Public]:
                 )
 
 
-def function_of(member: Any) -> Any:
+def function_of(member):
     """The function behind a method, a property or a function that keeps its results."""
     code = (
         member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
@@ -113,14 +112,14 @@ def function_of(member: Any) -> Any:
 
 
 @functools.cache
-def tree(code: Any) -> ast.AST:
+def tree(code):
     try:
         return ast.parse(textwrap.dedent(inspect.getsource(code)))
     except (OSError, SyntaxError):  # what `dataclass` wrote
         return ast.Module([], [])
 
 
-def called(node: ast.expr, code: Any, owner: type | None) -> Any:
+def called(node, code, owner):
     """Return the object of this package that a name or a member stands for in a function, None for other objects."""
     if isinstance(node, ast.Name):
         return code.__globals__.get(node.id)
@@ -140,9 +139,7 @@ def called(node: ast.expr, code: Any, owner: type | None) -> Any:
     )
 
 
-def raises(
-    code: Any, owner: type | None = None, seen: frozenset = frozenset()
-) -> set[str]:
+def raises(code, owner=None, seen=frozenset()):
     """Names of the errors that a function raises, itself or in what it calls of this package but compiled loops."""
     plain = r"planarfriction\.(?!_engine\.(?!records)|[\w.]+\.loops)"
     if (
@@ -170,7 +167,7 @@ def raises(
     return {name for name in found if name.endswith("Error")} - OF_PYTHON
 
 
-def modules() -> list[Any]:
+def modules():
     return [
         *PLAIN,
         *(
@@ -196,7 +193,7 @@ def test_what_raises_says_so(where):
     ]
 
 
-def records(where: str) -> list[tuple[str, Any]]:
+def records(where):
     """Public dataclasses and named tuples, as users see them."""
     kinds = [(name, value) for name, value in members(where) if inspect.isclass(value)]
     return [
@@ -206,7 +203,7 @@ def records(where: str) -> list[tuple[str, Any]]:
     ]
 
 
-def arguments(kind: Any) -> list[tuple[str, str]]:
+def arguments(kind):
     """Names and types of the arguments of a record, but for its own."""
     if dataclasses.is_dataclass(kind):
         return [

@@ -3,15 +3,12 @@
 The floors are those of the import-linter contracts in pyproject.toml, read here so that the tests need no extra.
 """
 
-from __future__ import annotations
-
 import ast
 import functools
 import importlib
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -77,12 +74,12 @@ SIMULATORS = {
 """Adapters of simulators that calculate with a package which has a floor of its own."""
 
 
-def _contracts() -> list[dict]:
+def _contracts():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     return settings["tool"]["importlinter"]["contracts"]
 
 
-def _floors() -> dict[str, int]:
+def _floors():
     """Module right below a package -> its floor, 0 at the bottom; modules on one floor do not see each other."""
     found = {}
     for contract in _contracts():
@@ -96,12 +93,12 @@ def _floors() -> dict[str, int]:
     return found
 
 
-def _module_name(file: Path, folder: Path) -> str:
+def _module_name(file, folder):
     parts = file.relative_to(folder).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def _imports(tree: ast.AST, nested: bool) -> Iterator[str]:
+def _imports(tree, nested):
     """Dotted names that the code imports, `from a import b` as `a.b`; imports for type checkers do not count.
 
     With `nested`, the imports inside functions too; without, only those that run when the module loads.
@@ -123,12 +120,12 @@ def _imports(tree: ast.AST, nested: bool) -> Iterator[str]:
 COMPILED = [folder.replace("/", ".") for folder in FOLDERS]
 
 
-def _is_compiled(module: str) -> bool:
+def _is_compiled(module):
     return any(f"{module}.".startswith(f"planarfriction.{name}.") for name in COMPILED)
 
 
 @functools.cache
-def _sources() -> list[tuple[str, ast.AST]]:
+def _sources():
     files = [
         (file, home)
         for package, home in SOURCES.items()
@@ -140,12 +137,12 @@ def _sources() -> list[tuple[str, ast.AST]]:
     ]
 
 
-def _floor(module: str, words: int = 2) -> str:
+def _floor(module, words=2):
     """The first words of a name: two for the module right below its package, three for a room of the engine."""
     return ".".join(module.split(".")[:words])
 
 
-def _upward_imports(sources: list[tuple[str, ast.AST]]) -> list[str]:
+def _upward_imports(sources):
     floors = _floors()
     found = []
     for module, tree in sources:
@@ -172,7 +169,7 @@ def _upward_imports(sources: list[tuple[str, ast.AST]]) -> list[str]:
     return found
 
 
-def _circle(sources: list[tuple[str, ast.AST]]) -> list[str]:
+def _circle(sources):
     """Modules that import each other in a circle, also inside functions; packages themselves do not count."""
     names = {module for module, _ in sources}
     packages = {module.rpartition(".")[0] for module in names}
@@ -348,7 +345,7 @@ def test_compiled_code_depends_on_nothing_outside_the_digest():
                 )
 
 
-def _loaded_after(code: str) -> set[str]:
+def _loaded_after(code):
     program = f"import sys\n{code}\nprint(*sorted(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", program],

@@ -1,7 +1,5 @@
 """A name is a text by which results can be reached: checked where it is given."""
 
-from __future__ import annotations
-
 import datetime
 import math
 import warnings

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import base64
 import dataclasses
-import html
 import io
 import re
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -19,10 +17,6 @@ from planarfriction._support.equality import ByValue, by_parts
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
 LAW = pf.LuGre(mu_s=1.2)
 SOFT = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.0085, n=1 / 3, k=2.0))
-
-
-class Samples(NamedTuple):
-    samples: list[int]
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +93,7 @@ def test_large_parts_of_a_record_are_shown_by_their_size():
     )
 
 
-def pictures(page: str) -> list[Image.Image]:
+def pictures(page):
     found = re.findall(r"data:image/png;base64,([^\"]+)", page)
     return [Image.open(io.BytesIO(base64.b64decode(each))) for each in found]
 
@@ -123,49 +117,6 @@ def test_notebooks_show_a_patch_with_its_pressure():
     assert corner[0.3, 0.3].sum() > corner[0.7, 0.7].sum() + 100
     assert np.abs(corner[0.7, 0.3] - corner[0.7, 0.7]).max() < 2.0
     assert corner[0.3, 0.7].min() > 250  # no load, no colour
-
-
-def test_notebooks_show_every_kind_of_patch_surface_and_solution(solution):
-    assert "shown at" in SOFT._repr_html_()
-    for patch in (
-        pf.ContactPatch.points([(0.0, 0.0)]),
-        pf.ContactPatch.line(0.02, 5),
-        SOFT,
-    ):
-        assert len(pictures(patch._repr_html_())) == 1
-    assert "20 x 0 mm" not in pf.ContactPatch.line(0.02, 5)._repr_html_()
-    assert "0 x 20 mm" in pf.ContactPatch.line(0.02, 5)._repr_html_()
-    assert len(pictures(pf.LimitSurfaceExact(DISC)._repr_html_())) == 1
-    without_load = pf.LimitSurfaceCells(SOFT)._repr_html_()
-    assert not pictures(without_load) and "give a normal_force" in without_load
-    shown = solution._repr_html_()
-    assert (
-        len(pictures(shown)) == 1 and "in-hand" in shown and "reached the end" in shown
-    )
-    assert not pictures(dataclasses.replace(solution, scene=None)._repr_html_())
-
-
-@pytest.mark.parametrize(
-    "law", [pf.LuGre(mu_c=0.4, v_s=2e-3), pf.Dahl(0.4), pf.CoulombStribeck(0.4)]
-)
-def test_notebooks_show_laws_models_and_scenes(law):
-    shown = law._repr_html_()
-    assert (
-        type(law).__name__ in shown and ">0.4<" in shown and len(pictures(shown)) == 1
-    )
-    assert (">0.002 m/s<" in shown) == (law == pf.LuGre(mu_c=0.4, v_s=2e-3))
-    for patch in (DISC, SOFT):
-        model = pf.ReducedModelPublished(patch, law)
-        assert (
-            repr(patch.name) in html.unescape(model._repr_html_())
-            and len(pictures(model._repr_html_())) == 1
-        )
-    scene = pf.scenes.in_hand(pf.ReducedModelPublished(DISC, pf.LuGre()))
-    shown = html.unescape(scene._repr_html_())
-    assert (
-        f"{scene.body.mass:g} kg" in shown
-        and f"contact {scene.contacts[0].name!r}" in shown
-    )
 
 
 def test_dir_lists_what_is_public_and_nothing_else():

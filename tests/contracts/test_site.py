@@ -1,7 +1,5 @@
 """The site of the documentation builds without a warning: links, names, terms, docstrings, and every gallery script."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

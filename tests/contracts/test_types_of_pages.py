@@ -1,7 +1,5 @@
 """The Python of README and docs passes pyright in its strict mode, as in the editor of a user."""
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import json
@@ -10,7 +8,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +43,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def judged(page: Path) -> str:
+def judged(page):
     """The Python of a page on the lines where it stands; `Any` where its own functions and lists leave out types."""
     lines = ["from typing import Any as _Any"]
     missing = missing_packages(page)
@@ -58,7 +55,7 @@ def judged(page: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def gaps(tree: ast.AST) -> Iterator[tuple[int, int, str]]:
+def gaps(tree):
     """Return the positions of arguments and empty lists without a type, each with the type to write there."""
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
@@ -77,7 +74,7 @@ def gaps(tree: ast.AST) -> Iterator[tuple[int, int, str]]:
             )
 
 
-def names(node: ast.AST) -> set[str]:
+def names(node):
     """Return the variables, imports and members of tensors in an expression."""
     found = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
     found |= {
@@ -90,7 +87,7 @@ def names(node: ast.AST) -> set[str]:
     }
 
 
-def root(node: ast.AST) -> str:
+def root(node):
     """The name that an expression begins with, or the member of a tensor that it goes through."""
     while not isinstance(node, ast.Name):
         if isinstance(node, ast.Attribute) and node.attr in OF_TENSORS:
@@ -102,9 +99,9 @@ def root(node: ast.AST) -> str:
     return node.id
 
 
-def origins(tree: ast.AST, until: int) -> dict[str, bool]:
+def origins(tree, until):
     """Names at a line of a page: True where the library, or what it gave, made them, False for other packages."""
-    ours: dict[str, bool] = dict.fromkeys(OF_TENSORS, False)
+    ours = dict.fromkeys(OF_TENSORS, False)
     found = [(node, getattr(node, "target", node)) for node in ast.walk(tree)]
     found = [
         (line, node)
@@ -140,12 +137,12 @@ def origins(tree: ast.AST, until: int) -> dict[str, bool]:
     return ours
 
 
-def from_ours(node: ast.AST, ours: dict[str, bool]) -> bool:
+def from_ours(node, ours):
     """Return True if an expression is the library's: by the name that it begins with, else by all its names."""
     return ours.get(root(node), all(ours.get(name, True) for name in names(node)))
 
 
-def counts(diagnostic: dict, tree: ast.Module, loose: set[str]) -> bool:
+def counts(diagnostic, tree, loose):
     """Return True if the library causes a complaint, rather than another package or a name that is `loose`."""
     if diagnostic["severity"] != "error":
         return False
@@ -171,7 +168,7 @@ def counts(diagnostic: dict, tree: ast.Module, loose: set[str]) -> bool:
     return not around or from_ours(min(around, key=size), ours)
 
 
-def size(node: ast.expr | ast.alias) -> tuple[int, int]:
+def size(node):
     return (node.end_lineno or 0) - node.lineno, (
         node.end_col_offset or 0
     ) - node.col_offset
@@ -250,7 +247,7 @@ def test_pyright_accepts_the_python_of_every_page(tmp_path):
 def test_a_stub_has_the_functions_of_its_module(stub):
     """With the same arguments; the first of an intrinsic is Numba's own."""
 
-    def functions(path: Path) -> dict[str, list[str]]:
+    def functions(path):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         found = [
             each

@@ -1,7 +1,5 @@
 """One vocabulary: the same names and arguments in every front end."""
 
-from __future__ import annotations
-
 import inspect
 
 import pytest
@@ -12,7 +10,7 @@ MODELS = ("DistributedModel", "ReducedModel", "ReducedModelPublished")
 ARGUMENTS = ["state", "twist", "normal_force", "dt"]
 
 
-def front_ends() -> list:
+def front_ends():
     """NumPy, PyTorch and JAX."""
     pytest.importorskip(
         "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
@@ -24,7 +22,7 @@ def front_ends() -> list:
     return [pf, planarfriction.torch, planarfriction.jax]
 
 
-def positional(function) -> list[str]:
+def positional(function):
     """Names of the arguments that may be given by their place."""
     kinds = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
     return [

@@ -1,16 +1,11 @@
 """The path of a call through the library: the figure in docs/maintaining.md shows the rooms that calls walk through."""
 
-from __future__ import annotations
-
 import functools
 import importlib
 import inspect
 import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
-from typing import Any
 
 import numpy as np
 import pytest
@@ -58,11 +53,11 @@ MODEL = pf.DistributedModel(pf.ContactPatch.disc(0.01, 7), LAW)
 TWISTS = 1e-3 * np.sin(np.arange(60.0).reshape(20, 3))
 
 
-def step(folder: Path) -> None:
+def step(folder):
     MODEL.step(MODEL.rest(), TWISTS[1], 2.0, 1e-3)
 
 
-def scene(folder: Path) -> None:
+def scene(folder):
     pf.simulate(
         pf.Scene(
             pf.Body(0.2, 1e-4, velocity=(0.1, 0.0, 0.0)), pf.Contact(MODEL, 2.0), 0.02
@@ -70,11 +65,11 @@ def scene(folder: Path) -> None:
     )
 
 
-def gradient(folder: Path) -> None:
+def gradient(folder):
     derivatives.rollout_vjp(MODEL, None, TWISTS, 2.0, 1e-3, np.ones_like(TWISTS))
 
 
-def log(folder: Path) -> None:
+def log(folder):
     time = 1e-3 * np.arange(60)
     twists = (
         0.02
@@ -97,14 +92,14 @@ def log(folder: Path) -> None:
 
 
 @functools.cache
-def torch_model() -> Any:
+def torch_model():
     pytest.importorskip("torch")
     return importlib.import_module("planarfriction.torch").DistributedModel(
         MODEL.patch, LAW
     )
 
 
-def torch_rollout(folder: Path) -> None:
+def torch_rollout(folder):
     model = torch_model()
     torch = sys.modules["torch"]
     ours = sys.modules["planarfriction.torch"]
@@ -113,7 +108,7 @@ def torch_rollout(folder: Path) -> None:
     wrenches.sum().backward()
 
 
-def export(folder: Path) -> None:
+def export(folder):
     library.export_c(MODEL, folder)
 
 
@@ -122,12 +117,12 @@ CALLS = {
 }  # fmt: skip
 
 
-def walked(call: Callable[[Path], None], folder: Path) -> set[tuple[str, ...]]:
+def walked(call, folder):
     """Return the rooms on the stack at every call of a function of the library, the outermost first."""
-    found: set[tuple[str, ...]] = set()
+    found = set()
     known = set()
 
-    def seen(frame: FrameType, event: str, _: object) -> None:
+    def seen(frame, event, _):
         pair = frame.f_code, frame.f_back and frame.f_back.f_code
         if event == "call" and pair not in known:
             known.add(pair)
@@ -141,13 +136,13 @@ def walked(call: Callable[[Path], None], folder: Path) -> set[tuple[str, ...]]:
     return found
 
 
-def _rooms(frame: FrameType | None) -> list[str]:
+def _rooms(frame):
     """Return the rooms from the outermost frame inwards.
 
     A generator that is asked for more is where it was begun; mathematics over arrays or symbols is no room, nor is the
     source of a kernel that is read symbol by symbol.
     """
-    found: list[str] = []
+    found = []
     while frame is not None:
         file = Path(frame.f_code.co_filename)
         inside = (
@@ -168,7 +163,7 @@ def _rooms(frame: FrameType | None) -> list[str]:
     return found[::-1]
 
 
-def ways() -> dict[str, list[str]]:
+def ways():
     """Return the rooms of each call from the figure."""
     figure = re.search(
         r"```text\n(step .*?)```", PAGE.read_text(encoding="utf-8"), re.S

@@ -1,7 +1,5 @@
 """Workflows call commands that run here too: each step is a target of the Makefile, with names that there are."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

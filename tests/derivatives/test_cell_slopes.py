@@ -1,7 +1,5 @@
 """The passes of a step of cells: the adjoint against changes forwards, which one long function computes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Derivatives of steps and rollouts: closed forms, kinks, differences, and backwards against forwards."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np
@@ -32,18 +30,18 @@ every_law = pytest.mark.parametrize("law", LAWS)
 
 
 @functools.cache
-def model_of(kind: str, law: str = "elasto-plastic"):
+def model_of(kind, law="elasto-plastic"):
     """A model by name: "distributed" or the reduced one with a kind of limit surface."""
     if kind == "distributed":
         return pf.DistributedModel(PATCH, LAWS[law])
     return pf.ReducedModelPublished(PATCH, LAWS[law], surface=SURFACES[kind](PATCH))
 
 
-def radius(model) -> float:
+def radius(model):
     return model.shape_at(LOAD).contact_radius
 
 
-def drive(model, seed: int = 0, steps: int = T):
+def drive(model, seed=0, steps=T):
     """A random walk in the space of twists that starts, slides, spins, turns back; loads; a state."""
     random = np.random.default_rng(seed)
     scale = np.array([1.0, 1.0, 1.0 / radius(model)])
@@ -273,54 +271,6 @@ def test_slopes_of_a_step_lie_between_those_of_its_sides(kind, law):
     check()
 
 
-@pytest.mark.parametrize("kind", ["distributed", *SURFACES])
-@every_law
-def test_jacobians_of_a_step_are_those_of_differences(kind, law):
-    model = model_of(kind, law)
-    for seed, size in enumerate((2e-7, 6e-7, 1.1e-6, 3e-6)):
-        random = np.random.default_rng(seed)
-        units = (
-            np.ones(model.state_shape)
-            if kind == "distributed"
-            else np.array([1.0, 1.0, radius(model)])
-        )
-        state = random.normal(size=model.state_shape) * size * units
-        twist = random.normal(size=3) * (5e-3, 5e-3, 1.0)
-        moves = (
-            random.normal(size=model.state_shape) * size * units,
-            random.normal(size=3) * (5e-3, 5e-3, 1.0),
-            0.7,
-        )
-        j = model.step_jacobians(state, twist, LOAD, DT)
-        if kind == "distributed":
-            got = (
-                np.einsum("abn,bn->an", j.state_state, moves[0])
-                + j.state_twist @ moves[1]
-            )
-            pulled = np.einsum("dbn,bn->d", j.wrench_state, moves[0])
-        else:
-            got = j.state_state @ moves[0] + j.state_twist @ moves[1]
-            pulled = j.wrench_state @ moves[0]
-        pulled = pulled + j.wrench_twist @ moves[1] + j.wrench_load * moves[2]
-        high, low = (
-            model.step(
-                state + h * moves[0], twist + h * moves[1], LOAD + h * moves[2], DT
-            )
-            for h in (1e-6, -1e-6)
-        )
-        # Rounding 1e-16/1e-6 of the values; truncation 1e-12 of the curvature, 1e-6 where that jumps.
-        expected = (high[0] - low[0]) / 2e-6
-        expected_wrench = (high[1] - low[1]) / 2e-6
-        assert got / units == pytest.approx(
-            expected / units, abs=1e-6 * np.abs(expected / units).max()
-        )
-        assert pulled == pytest.approx(
-            expected_wrench,
-            rel=1e-6,
-            abs=1e-6 * np.abs(expected_wrench[:2]).max() * 0.01,
-        )
-
-
 def test_a_bristle_brought_back_to_full_deflection_slides_along_the_cap():
     model = model_of("ellipsoid")
     scale = np.array([1.0, 1.0, radius(model)])
@@ -348,37 +298,6 @@ def test_a_bristle_brought_back_to_full_deflection_slides_along_the_cap():
         )
 
 
-@pytest.mark.parametrize("kind", ["distributed", "published"])
-def test_jacobians_of_a_batch_of_steps_are_those_of_each(kind):
-    model = model_of(kind)
-    random = np.random.default_rng(9)
-    states = random.normal(size=(3, 1, *model.state_shape)) * 1e-7
-    twists = random.normal(size=(2, 3)) * (1e-2, 1e-2, 2.0)
-    loads = np.array([0.0, 2.0])
-    batch = model.step_jacobians(states, twists, loads, DT)
-    for i, j in np.ndindex(3, 2):
-        one = model.step_jacobians(
-            states[i, 0].tolist(), tuple(twists[j]), float(loads[j]), DT
-        )
-        for name, value in one._asdict().items():
-            assert np.array_equal(getattr(batch, name)[i, j], value), name
-    for bad in (
-        {"normal_force": -1.0},
-        {"dt": np.nan},
-        {"twist": (0.0, 1.0)},
-        {"state": [0.0, 0.0, np.inf]},
-    ):
-        inputs = {
-            "state": model.rest(),
-            "twist": np.zeros(3),
-            "normal_force": 1.0,
-            "dt": DT,
-            **bad,
-        }
-        with pytest.raises(InvalidValueError, match=next(iter(bad))):
-            model.step_jacobians(**inputs)
-
-
 # ---------------------------------------------------------------------- batches
 
 
@@ -398,30 +317,6 @@ def test_one_load_for_each_contact_and_rest():
 
 
 # ---------------------------------------------------------------------- other models
-
-
-def test_a_rollout_of_any_model_takes_its_steps():
-    surface = pf.LimitSurfaceTablePublished(FINGER, segments=4, normal_force=1.0)
-    model = pf.ReducedModelPublished(FINGER, ELASTIC, surface)
-    twists = np.random.default_rng(3).normal(size=(2, 5, 3)) * (1e-3, 1e-3, 0.3)
-    loads = np.linspace(0.5, 1.5, 5)
-    steps = np.linspace(1e-4, 2e-4, 5)
-    end, wrenches = pf.rollout(model, None, twists, loads, steps)
-    state = model.rest()
-    for t in range(5):
-        state, wrench = model.step(state, twists[:, t], loads[t], steps[t])
-        assert np.array_equal(wrenches[:, t], wrench)
-    assert np.array_equal(end, state)
-    end, wrenches = pf.rollout(model, state[0], np.zeros((0, 3)), 1.0, 1e-4)
-    assert wrenches.shape == (0, 3) and np.array_equal(end, state[0])
-    with pytest.raises(InvalidValueError, match=r"twist must have shape \[..., T, 3\]"):
-        pf.rollout(model, None, np.zeros(3), 1.0, 1e-4)
-    with pytest.raises(
-        InvalidValueError, match="state, twist and normal_force must broadcast"
-    ):
-        pf.rollout(model, None, twists, np.ones((3, 5)), 1e-4)
-    with pytest.raises(InvalidValueError, match="model must"):
-        pf.rollout(model, None, twists, loads, steps, parameters=np.ones(7))
 
 
 # ---------------------------------------------------------------------- ends of the range

@@ -1,7 +1,5 @@
 """Changes of rollouts along changes of their inputs: forwards against backwards, differences, kinks, batches."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np
@@ -21,7 +19,7 @@ def model_of():
     return pf.ReducedModelPublished(PATCH, LAW, pf.LimitSurfaceTable(PATCH))
 
 
-def drive(seed: int = 0, shape: tuple[int, ...] = (3,)):
+def drive(seed=0, shape=(3,)):
     """A state, twists that start, slide, spin and turn back, one step without load, and changes of all of them."""
     random = np.random.default_rng(seed)
     sizes = np.array([1.0, 1.0, 150.0])

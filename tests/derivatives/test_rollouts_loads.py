@@ -1,7 +1,5 @@
 """Derivatives of rollouts on patches whose shape follows the load: closed forms, and the end of the range."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,7 @@ LOADS = np.linspace(1.031, 3.063, 12)
 DT, T, SIZES = 1e-4, len(LOADS), np.array([1.0, 1.0, 250.0])
 
 
-def drive(model: pf.models.FrictionModel, seed: int = 0):
+def drive(model, seed=0):
     """A state, and twists that start, slide, spin and turn back."""
     random = np.random.default_rng(seed)
     return random.normal(size=model.state_shape) * 3e-7, np.cumsum(

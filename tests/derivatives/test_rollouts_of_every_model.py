@@ -59,16 +59,16 @@ class Case(NamedTuple):
     """Relative difference of equal sums in another order; tables of three bristles amplify it less than maps."""
 
     @property
-    def model(self) -> Any:
+    def model(self):
         return made(self.make)
 
 
 @functools.cache
-def made(make: Callable[[], Any]) -> Any:
+def made(make):
     return make()
 
 
-def published(surface: str, law: str) -> Case:
+def published(surface, law):
     return Case(
         lambda: pf.ReducedModelPublished(
             PATCH, LAWS[law], surface=SURFACES[surface](PATCH)
@@ -77,7 +77,7 @@ def published(surface: str, law: str) -> Case:
     )
 
 
-def distributed(patch: pf.ContactPatch, law: str, speed: str = "around") -> Case:
+def distributed(patch, law, speed="around"):
     return Case(lambda: pf.DistributedModel(patch, LAWS[law]), SPEEDS[speed])
 
 
@@ -139,12 +139,12 @@ CASES = FIXED | SOFT | STIFF
 every_case = pytest.mark.parametrize("name", CASES)
 
 
-def twist_sizes(model: Any) -> np.ndarray:
+def twist_sizes(model):
     """Return the factors that turn speeds [m/s] into twists."""
     return np.array([1.0, 1.0, 1.0 / model.patch.contact_radius(LOAD)])
 
 
-def state_sizes(model: Any) -> np.ndarray:
+def state_sizes(model):
     """Return the factors that turn deflections [m] into states."""
     return (
         1.0 / twist_sizes(model)
@@ -153,9 +153,7 @@ def state_sizes(model: Any) -> np.ndarray:
     )
 
 
-def drive(
-    case: Case, seed: int = 0, steps: int = T
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def drive(case, seed=0, steps=T):
     """Return a state, a random walk of twists that starts, slides, spins and turns back, and loads."""
     random = np.random.default_rng(seed)
     model = case.model
@@ -172,7 +170,7 @@ def drive(
     return state, twists, random.uniform(1.0, 3.0, steps)
 
 
-def interrupted(case: Case, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def interrupted(case, seed=0):
     """Return such a motion with a rest, a step without load, and loads at and beside those of measured maps."""
     state, twists, loads = drive(case, seed)
     twists[8] = 0.0
@@ -182,7 +180,7 @@ def interrupted(case: Case, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.n
     return state, twists, loads
 
 
-def cotangents(model: Any, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+def cotangents(model, seed=1):
     """Return cotangents of wrenches and of the last state that weigh all of them alike."""
     random = np.random.default_rng(seed)
     wrenches = random.normal(size=(T, 3)) * twist_sizes(model)
@@ -230,7 +228,7 @@ def test_the_gradient_of_a_rollout_is_that_of_differences(name):
     }
     gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, *bars)
 
-    def value(of: str, change: np.ndarray) -> float:
+    def value(of, change):
         changed = {**inputs, of: inputs[of] + change * units[of]}
         run = derivatives.rollout(
             model, *list(changed.values())[:3], DT, parameters=changed["parameters"]

@@ -1,7 +1,5 @@
 """Sensitivities of a simulated scene: closed forms, similarity, and central differences of tight simulations."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 
@@ -33,7 +31,7 @@ FACTORS = dict.fromkeys(NAMES, 1.0)
 SURFACES = {"ellipsoid": pf.LimitSurfaceEllipsoid, "table": pf.LimitSurfaceTable}
 
 
-def model_of(kind: str, mu: float = 1.0, r: float = 1.0, law: pf.LuGre = LAW):
+def model_of(kind, mu=1.0, r=1.0, law=LAW):
     """A patch off its frame's origin, `r` times as large as it is."""
     law = dataclasses.replace(law, mu_c=mu * law.mu_c, mu_s=mu * law.mu_s)
     positions = np.array(
@@ -57,7 +55,7 @@ def model_of(kind: str, mu: float = 1.0, r: float = 1.0, law: pf.LuGre = LAW):
     )
 
 
-def slide(kind: str, force: bool = True, **factors: float) -> pf.Scene:
+def slide(kind, force=True, **factors):
     """A plate that slides, stops and is pushed off again, on a pad of its own and on two of the table."""
     by = FACTORS | factors
     model = model_of(kind, by["mu"], by["r"])
@@ -91,7 +89,7 @@ def slide(kind: str, force: bool = True, **factors: float) -> pf.Scene:
 
 
 @functools.cache
-def sensitivities(kind: str):
+def sensitivities(kind):
     return scene_sensitivities(slide(kind), NAMES)
 
 

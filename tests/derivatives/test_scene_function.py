@@ -1,7 +1,5 @@
 """The motion of a scene as one differentiable operation of PyTorch and JAX."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -21,7 +19,7 @@ SCALE = np.array([1.0, 1.0, 1e-3])
 """Torques that mean as much as the forces, so that one step of differences fits both."""
 
 
-def scene(stop: float | None = None) -> pf.Scene:
+def scene(stop=None):
     """A plate that slides and turns; with `stop` it comes to rest before the end."""
     body = pf.Body(0.4, 6e-4, velocity=(0.08, 0.03, 1.5), gravity=(0.0, 0.0))
     contacts = [
@@ -79,7 +77,7 @@ def test_forwards_and_backwards_are_each_other_s_transpose():
     values[1, :2] = 1.2, 0.8
     changes = rng.normal(size=values.shape) * np.maximum(np.abs(values), 1e-3)
     bars = tuple(rng.normal(size=(2, *shape)) for shape in function.results)
-    kept: dict = {}
+    kept = {}
     motion, _ = function.run(values, kept)
     bars = bars[0] / np.abs(motion).max(axis=1, keepdims=True), bars[1]
     for known in (kept, None):

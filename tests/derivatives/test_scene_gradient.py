@@ -1,7 +1,5 @@
 """Derivatives of scenes to the knots of their signals and to their start, forwards and in reverse."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 
@@ -21,7 +19,7 @@ START = {"vx": 1e-5, "omega": 1e-4, "x": 1e-6, "theta": 1e-4}
 
 
 @functools.cache
-def pushed(kind: str) -> pf.Scene:
+def pushed(kind):
     """The plate that slides, stops and is pushed off again, its load never zero: it may go down as well as up."""
     scene = slide(kind)
     load = pf.Signal([0.0, 0.2, 0.3, 0.36], [3.0, 2.0, 1.0, 2.5], "linear")
@@ -29,16 +27,14 @@ def pushed(kind: str) -> pf.Scene:
     return dataclasses.replace(scene, contacts=[own, scene.contacts[1]])
 
 
-def with_more(signal: pf.Signal, values) -> pf.Signal:
+def with_more(signal, values):
     """A signal plus values at the knots, joined as its own are."""
     times = np.union1d(signal.times, KNOTS)
     more = pf.Signal(KNOTS, values, signal.hold)
     return pf.Signal(times, signal(times) + more(times), signal.hold)
 
 
-def changed(
-    scene: pf.Scene, name: str, k: int, component: int, change: float
-) -> pf.Scene:
+def changed(scene, name, k, component, change):
     """The scene with one knot, or one component of the start, changed."""
     body = scene.body
     if name in START:
@@ -115,7 +111,7 @@ def test_a_sliding_block_loses_speed_to_each_knot_of_its_load():
     assert found.names == ("vx", *(f"contact.normal_force[{k}]" for k in range(3)))
 
 
-def agree(scene: pf.Scene, numbers: dict, of_motion: float, of_wrenches: float) -> None:
+def agree(scene, numbers, of_motion, of_wrenches):
     """The reverse against the product with the derivatives forwards, for costs with random slopes.
 
     Errors are shares of the sum of sizes: of terms of random signs little may be left.
@@ -236,9 +232,7 @@ def test_the_reverse_takes_contacts_that_move():
 def test_derivatives_through_friction_that_depends_on_the_direction(kind):
     """Cells with metrics and asymmetries of their own, one for all, and the root of a metric around a limit surface."""
 
-    def scene(
-        mu: float = 1.0, r: float = 1.0, load: float = 1.0, vy: float = 0.03
-    ) -> pf.Scene:
+    def scene(mu=1.0, r=1.0, load=1.0, vy=0.03):
         law = dataclasses.replace(LAW, mu_c=mu * LAW.mu_c, mu_s=mu * LAW.mu_s)
         law = dataclasses.replace(law, reference_load=2.0) if "fixed" in kind else law
         patch = pf.ContactPatch.points(
@@ -369,7 +363,7 @@ def test_windows_parts_and_a_shorter_motion_leave_no_trace(monkeypatch):
     """The same steps, but where the parts of the path end: to the accuracy of the derivatives."""
     scene = slide("ellipsoid")
 
-    def gradient(end: float) -> np.ndarray:
+    def gradient(end):
         options = SolverOptions(t_end=end)
         return scene_gradient(
             scene,

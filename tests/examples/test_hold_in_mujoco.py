@@ -1,7 +1,5 @@
 """The example that holds a plate in MuJoCo: what slips, with how much grip, beside the published rule."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

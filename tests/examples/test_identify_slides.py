@@ -1,7 +1,5 @@
 """The example that identifies slides, on slides that the library itself made."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +16,7 @@ MU = 0.31
 RATE = 148.0  # samples per second, as measured
 
 
-def slides(count: int = 8) -> pd.DataFrame:
+def slides(count=8):
     """Slides of a uniform square with friction MU, in the columns of the measured file.
 
     The first ends before the cube stops; the last two are one slide and its copy, turned by 1 rad.

@@ -1,7 +1,5 @@
 """The example that learns a pressure distribution: its numbers, its picture, and what it says about ambiguity."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The example that learns to turn a plate: its environment, its search, and what the policies do."""
 
-from __future__ import annotations
-
 import contextlib
 
 import numpy as np
@@ -27,7 +25,7 @@ def example():
     return script("examples/learn_to_turn.py")
 
 
-def missed(example, points, worlds=16) -> np.ndarray:
+def missed(example, points, worlds=16):
     """Angles [degrees] that are left at the end in each world."""
     with contextlib.closing(example.TurnInHand(worlds, points=points)) as env:
         _, history = example.episode(env, np.tile(POLICY, (worlds, 1)), seed=5)

@@ -1,7 +1,5 @@
 """The example of a disc in Newton against a disc with Coulomb friction, and the numbers of its page."""
 
-from __future__ import annotations
-
 import logging
 
 import pytest

@@ -1,7 +1,5 @@
 """examples/realtime: built from an exported model, and run beside the same loops in Python."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The example of the page on sweeps: what holds and what does not, by the limit surface, and its picture."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

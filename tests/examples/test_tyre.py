@@ -1,7 +1,5 @@
 """The example of a rolling tyre: the brush model's closed forms, the step of the library, its stated numbers."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

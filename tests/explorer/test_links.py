@@ -1,7 +1,5 @@
 """The state as JSON in a link: it comes back as it was, and what was tampered with is refused in one line."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -60,7 +58,7 @@ def test_a_link_of_the_most_cells_is_not_too_long():
     assert 2 * len(to_link(State(Drawing(pressures, 0.1 / 3)))) < MOST_TEXT
 
 
-def patch(**values: object) -> str:
+def patch(**values):
     return json.dumps({"patch": {"cell_size": 1e-3, "pressures": [[1.0]], **values}})
 
 

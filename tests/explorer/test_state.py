@@ -1,7 +1,5 @@
 """The explorer without its browser: what the state answers, what is drawn of it, and the code that it becomes."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import re
@@ -24,7 +22,7 @@ from planarfriction_explorer.state import PRESETS, State, answer, law_parameters
 PAINTED = Drawing.published("Square").painted(0.004, 0.002, radius=0.003, pressure=0.4)
 
 
-def saved(pressures: np.ndarray) -> bytes:
+def saved(pressures):
     buffer = io.BytesIO()
     np.save(buffer, pressures)
     return buffer.getvalue()
@@ -595,7 +593,7 @@ def test_a_film_is_one_file_beside_its_histories_and_can_be_cancelled(monkeypatc
     }.items():
         monkeypatch.setattr(f"planarfriction.plots.{name}", few)
     scene = ready_scene(State(Drawing.published("Line")), "free-slide", "reduced")
-    told: list[tuple[str, float]] = []
+    told = []
     page, histories = film(scene, lambda doing, share: told.append((doing, share)))
     assert (
         page.count("data:image/png;base64") >= 6
@@ -607,7 +605,7 @@ def test_a_film_is_one_file_beside_its_histories_and_can_be_cancelled(monkeypatc
     ] == pytest.approx(1.0)
     assert histories == pf.plots.plot_histories(pf.simulate(scene))._repr_png_()
 
-    def stop(doing: str, share: float) -> None:
+    def stop(doing, share):
         if doing == "drawing":
             raise KeyboardInterrupt
 

@@ -1,7 +1,5 @@
 """Implicit steps of a body in C, against `SlidingBody`, whose search is translated."""
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 

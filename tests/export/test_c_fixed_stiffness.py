@@ -1,7 +1,5 @@
 """C libraries of models whose stiffness does not grow with the load (see `test_c_library` for their steps)."""
 
-from __future__ import annotations
-
 import dataclasses
 import shutil
 

@@ -1,7 +1,5 @@
 """Promises of C libraries to a controller: what they call, keep and need, and that every compiler agrees."""
 
-from __future__ import annotations
-
 import platform
 import re
 import shutil

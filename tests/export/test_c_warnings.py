@@ -1,7 +1,5 @@
 """Every law with every model and precision is source that compilers have nothing to say about."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 

@@ -23,7 +23,7 @@ LAW = pf.LuGre(mu_s=1.2)
 class Tags(HTMLParser):
     """Names of the tags and of the attributes of a page."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text):
         super().__init__()
         self.names: set[str] = set()
         self.feed(text)

@@ -1,7 +1,5 @@
 """Checks of logs before they are fitted: each finds what was planted, and nothing in a log that is as it should be."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -261,7 +259,7 @@ def test_nothing_is_found_in_simulations(kind):
 # ------------------------------------------------------------------------------------------------ simulate, identify
 
 
-def pushed(seconds: float = 0.6) -> pf.Scene:
+def pushed(seconds=0.6):
     """A small body on one pad, off its centre of mass and turned, pushed about so that it slides and spins."""
     model = pf.ReducedModelPublished(PATCH, LAW)
     t = np.arange(0.0, seconds + 1e-9, 2e-3)

@@ -1,7 +1,5 @@
 """Decimation of long logs: nothing that happens is lost, wrenches are those of the whole log, memory is bounded."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np

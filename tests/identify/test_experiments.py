@@ -1,7 +1,5 @@
 """Plans of experiments: information in closed form, errors as fits have them, motions that tell what is missing."""
 
-from __future__ import annotations
-
 import dataclasses
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Angles that jump by whole turns, and logs without torques: mended and said, or refused; never a wrong estimate."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identification from slides that stop: friction and contact radius come out of motion alone."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -38,9 +36,7 @@ def ellipsoid(patch, law):
     return pf.ReducedModelPublished(patch, law, surface=pf.LimitSurfaceEllipsoid(patch))
 
 
-def slides(
-    count: int, noise: float = 1e-4, spin: float = 3.0, seed: int = 0
-) -> list[Slide]:
+def slides(count, noise=1e-4, spin=3.0, seed=0):
     """Slides at 150 samples a second, places off by `noise` [m], angles by `noise` over 3 cm, first twists by a lot."""
     random = np.random.default_rng(seed)
     model = ellipsoid(PATCH, LAW)
@@ -133,7 +129,7 @@ def test_what_slides_cannot_tell():
     assert "only 3 slides" in found.table()
 
 
-def pushed(strength: float, begin: float, end: float, noise: float = 1e-4) -> Slide:
+def pushed(strength, begin, end, noise=1e-4):
     """A straight slide at 0.6 m/s that friction MU brakes until it stops, with a push [m/s^2] for a while."""
     fine = np.arange(0.0, 0.45, 1e-4)
     speed = 0.6
@@ -201,7 +197,7 @@ def test_a_pushed_slide_is_named_and_changes_nothing(without, push, reason):
 # ---------------------------------------------------------------------- slides that are misread
 
 
-def remade(slide: Slide, time=1.0, pose=(1.0, 1.0, 1.0)) -> Slide:
+def remade(slide, time=1.0, pose=(1.0, 1.0, 1.0)):
     return Slide(time * slide.time, slide.pose * pose, name=slide.name)
 
 

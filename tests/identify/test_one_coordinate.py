@@ -1,7 +1,5 @@
 """Logs of one coordinate, as a slide or a joint gives them: kinds of bristles, spoiled samples, what was held."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -19,14 +17,7 @@ FEW = pf.ContactPatch.disc(0.01, cells=3)
 QUICK = {"model": "reduced-published", "starts": 1}
 
 
-def line(
-    axis: str = "x",
-    *,
-    law=LAW,
-    rate: float = 400.0,
-    load: float = LOAD,
-    duration: float = 5.0,
-) -> Log:
+def line(axis="x", *, law=LAW, rate=400.0, load=LOAD, duration=5.0):
     """A grown sine along one axis, with 0.5 % of noise on its wrench."""
     place = {"x": 0, "theta": 2}[axis]
     time = np.arange(round(duration * rate)) / rate

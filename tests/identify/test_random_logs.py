@@ -3,8 +3,6 @@
 `python -m tests.identify.test_random_logs FIRST LAST` prints the counts of more seeds.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 
@@ -20,7 +18,7 @@ from tests.support.identification_logs import truth
 RATE, DURATION = 200.0, 6.0
 
 
-def random_case(seed: int, varying: bool = False):
+def random_case(seed, varying=False):
     """A log of a random contact on a line, about a pivot, or in the plane; its patch, its law and its model.
 
     A load that varies does so by 30 to 100 %, and the stiffness follows it or not.
@@ -102,7 +100,7 @@ def random_case(seed: int, varying: bool = False):
     return Log(t, twist, wrench, load, f"{kind} {seed}"), patch, law, model, true, size
 
 
-def judged(seed: int, model: str | None = None, varying: bool = False):
+def judged(seed, model=None, varying=False):
     """Fit a random log; returns the result and the errors over standard errors of what is called identified."""
     log, patch, _, own, true, _ = random_case(seed, varying)
     found = identify_lugre(log, patch, model=model or own)

@@ -1,7 +1,5 @@
 """Effects of a rig on a log are estimated and widen intervals; a model that does not fit gives no estimate."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib
 import json

@@ -1,7 +1,5 @@
 """What a rig adds to wrenches, in closed form: columns, widths, derivatives, words; and the noise of several logs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,7 @@ from planarfriction.identify.rig import (
 FORCES = np.array([3.0, -2.0, 0.04])
 
 
-def log_of(count: int, share: float, name: str) -> Log:
+def log_of(count, share, name):
     """A log whose channels swing up to `share` of `FORCES`, from 1 s to 3 s."""
     time = np.linspace(1.0, 3.0, count)
     wave = np.sin(np.linspace(0.0, 20.0, count))
@@ -29,7 +27,7 @@ def log_of(count: int, share: float, name: str) -> Log:
 
 
 @pytest.fixture(scope="module")
-def rig() -> Rig:
+def rig():
     return Rig([log_of(41, 1.0, "a"), log_of(61, 0.5, "b")], ("delay", "bias", "load"))
 
 

@@ -1,7 +1,5 @@
 """Models that compete with the best one: they count where they fit as well over its noise."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import pytest
@@ -14,7 +12,7 @@ from planarfriction.scenes import driven
 
 
 def test_rivals_fit_as_well_over_the_noise_of_the_best():
-    def candidate(model: str, cost: float, rejected: bool = False) -> SimpleNamespace:
+    def candidate(model, cost, rejected=False):
         return SimpleNamespace(
             score=SimpleNamespace(model=model),
             uncertainty=SimpleNamespace(rejected=rejected),

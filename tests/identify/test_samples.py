@@ -1,7 +1,5 @@
 """Draws from an identification: its errors, correlations and bounds, as parameters of environments."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,7 @@ PATCH = pf.ContactPatch.disc(radius=0.01, cells=7)
 COUNT = 20_000
 
 
-def made(parameters, correlations=None, patch=PATCH) -> Identification:
+def made(parameters, correlations=None, patch=PATCH):
     """An identification with `{name: (estimate, standard error)}`."""
     values, errors = np.array(list(parameters.values())).T
     known = np.eye(len(values)) if correlations is None else np.array(correlations)

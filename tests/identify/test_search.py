@@ -1,7 +1,5 @@
 """The search for the least sum of squares: where it ends, and what it keeps."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,11 +11,11 @@ SHARE, LEFT = 1e-6, 3.0
 ANYWHERE = np.array([-np.inf]), np.array([np.inf])
 
 
-def descend(promised: float) -> tuple[Descent, list[float]]:
+def descend(promised):
     """Search for the number 1 beside a residual that nothing changes, whose derivative promises a change."""
     tried = []
 
-    def residuals(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def residuals(x):
         tried.append(float(x[0]))
         return np.array([x[0] - 1.0, LEFT]), np.array([[1.0], [promised]])
 

@@ -1,7 +1,5 @@
 """Slides that friction cannot explain, their weights and their influence, on made motions in closed form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -19,7 +17,7 @@ BODY = MassProperties(0.5, 0.5 * 0.03**2)
 TIME = np.arange(48) / 100.0
 
 
-def slide(speed, name: str = "slide", noise: float = 0.0) -> Slide:
+def slide(speed, name="slide", noise=0.0):
     """Motion along (0.6, 0.8) at `speed(t)` [m/s], with a spin that makes as much again of the energy."""
     way = np.concatenate(
         [[0.0], np.cumsum(0.5 * (speed(TIME[1:]) + speed(TIME[:-1])) / 100.0)]

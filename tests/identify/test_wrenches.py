@@ -1,7 +1,5 @@
 """Identification from logs of twist and wrench: what went in comes out, errors are honest, gaps are named."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

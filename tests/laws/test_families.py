@@ -1,7 +1,5 @@
 """Laws beside LuGre: closed forms of one bristle, with a patch and without; what models take and what they refuse."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 import planarfriction as pf
 from planarfriction.derivatives import rollout, rollout_jacobian
 from planarfriction.errors import InvalidValueError
-from planarfriction.formulas import LawNumbers
 
 POINT = pf.ContactPatch.points([(0.0, 0.0)])
 DISC = pf.ContactPatch.disc(0.01, 7)
@@ -110,7 +107,7 @@ def test_regularised_coulomb_relaxes_at_rest_within_its_time():
     assert after[0] / (before[0] + viscous) == pytest.approx(math.exp(-1.0), rel=1e-13)
 
 
-def creeping_block(share: float) -> pf.Scene:
+def creeping_block(share):
     """A block on a disc, pushed with a share of what it can hold."""
     model = pf.DistributedModel(DISC, SIMPLE)
     force = pf.Signal.constant([share * 0.5 * LOAD, 0.0, 0.0])
@@ -329,7 +326,7 @@ class Halved(pf.LuGre):
     """LuGre with half of its friction: what a user may derive."""
 
     @property
-    def numbers(self) -> LawNumbers:
+    def numbers(self):
         full = super().numbers
         return full._replace(mu_c=0.5 * full.mu_c, mu_s=0.5 * full.mu_s)
 

@@ -1,7 +1,5 @@
 """Friction laws: one-cell patches are the classical one-dimensional models; wrong parameters get one line."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -24,7 +22,7 @@ PARAMETERS = {
 }
 
 
-def one_cell(**changes) -> pf.DistributedModel:
+def one_cell(**changes):
     """The classical model: one bristle that carries the whole load."""
     return pf.DistributedModel(POINT, pf.LuGre(**{**PARAMETERS, **changes}))
 
@@ -159,7 +157,7 @@ def test_dahl_unloading_from_full_friction():
 # ---------------------------------------------------------------------- drift
 
 
-def positions(model, cycles: int) -> list[float]:
+def positions(model, cycles):
     """Position [m] of a light mass in stick after each cycle of 0.1 s of a force of 0.4 + 0.3 sin of Coulomb's.
 
     The mass is so light that the balance of forces decides its velocity: f(z, v) = -F(t), by Newton's method.

@@ -107,23 +107,6 @@ def test_lugre_written_down_is_lugre(patch):
     )
 
 
-def test_a_scene_with_lugre_written_down_ends_alike():
-    ends = []
-    for law in (Written(), LUGRE):
-        found = pf.simulate(
-            pf.scenes.in_hand(pf.DistributedModel(DISC, law), t_end=0.4),
-            rtol=1e-8,
-            atol=1e-8,
-        ).data
-        ends.append(
-            [
-                float(found[name][-1])
-                for name in ("x", "y", "theta", "vx", "vy", "omega")
-            ]
-        )
-    assert ends[0] == pytest.approx(ends[1], rel=1e-6, abs=1e-9)
-
-
 # ---------------------------------------------------------------------- steps
 
 

@@ -1,7 +1,5 @@
 """Limit surfaces against closed forms and published numbers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,7 +20,7 @@ SURFACES = [
 POINT = pf.ContactPatch.points([(0.1, 0.2)])
 
 
-def order(errors, refinement: float = 2.0) -> float:
+def order(errors, refinement=2.0):
     """Observed order of convergence: slope of the best line through the logarithms."""
     steps = np.arange(len(errors)) * math.log(refinement)
     return -np.polyfit(steps, np.log(np.abs(errors)), 1)[0]
@@ -42,7 +40,7 @@ def ring_dissipation(slide, spin, radius):
     )
 
 
-def ring(radius: float, points: int) -> pf.ContactPatch:
+def ring(radius, points):
     """Equal points on a circle, none of them on an axis."""
     angle = 2.0 * math.pi * (np.arange(points) + 0.25) / points
     return pf.ContactPatch.points(radius * np.stack([np.cos(angle), np.sin(angle)], -1))
@@ -298,7 +296,7 @@ def test_a_gradient_pulls_to_its_heavy_side(kind):
 # ---------------------------------------------------------------------- tables
 
 
-def smooth_disc(cells: int = 101) -> pf.ContactPatch:
+def smooth_disc(cells=101):
     """Disc whose pressure and its first derivatives vanish at the rim: its dissipation is smooth."""
     return pf.ContactPatch.disc_published(
         0.01,
@@ -309,7 +307,7 @@ def smooth_disc(cells: int = 101) -> pf.ContactPatch:
     )
 
 
-def some_twists(count: int = 300) -> np.ndarray:
+def some_twists(count=300):
     """Twists in all directions of the scaled sphere."""
     twist = np.random.default_rng(5).normal(size=(count, 3))
     return twist * (1.0, 1.0, 1.0 / 0.004)
@@ -356,7 +354,7 @@ def test_tables_converge():
     assert np.abs(miss).mean() < 4e-6
 
 
-def smooth_table_is_convex(patch) -> bool:
+def smooth_table_is_convex(patch):
     """No direction in which the stored dissipation curves downwards by more than rounding."""
     slopes = pf.LimitSurfaceTable(patch).jacobian(some_twists())
     r = patch.contact_radius()

@@ -1,7 +1,5 @@
 """`LimitSurface.compare`: differences that are known, in force and in velocity."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

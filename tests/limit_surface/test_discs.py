@@ -1,7 +1,5 @@
 """Limit surfaces of cells that are small discs: closed forms, gradients, twists, and the patches they stand for."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -26,7 +24,7 @@ SCALE = np.array([1.0, 1.0, 1.0 / R])
 """Scales of twists; wrenches over it are of the order of 1."""
 
 
-def some_twists(patch: pf.ContactPatch, count: int = 100) -> np.ndarray:
+def some_twists(patch, count=100):
     """Twists about the centre of pressure in all proportions of slide and spin."""
     directions = np.random.default_rng(5).normal(size=(count, 3))
     x, y = patch.centre_of_pressure()
@@ -34,7 +32,7 @@ def some_twists(patch: pf.ContactPatch, count: int = 100) -> np.ndarray:
     return np.stack([vx + omega * y, vy - omega * x, omega], -1)
 
 
-def surfaces(patch: pf.ContactPatch) -> list[pf.LimitSurface]:
+def surfaces(patch):
     kinds = (
         [pf.LimitSurfaceCells]
         if patch.root is not None and patch.root.ndim == 3

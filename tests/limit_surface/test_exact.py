@@ -1,7 +1,5 @@
 """The exact limit surface: closed forms, certificates over random pressure maps, and the table that stores it."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -20,12 +18,12 @@ ELL = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.01), (0.01, 0.01), (0.01, 0.04), (0.0, 
 """Vertices of a polygon that is not convex."""
 
 
-def scales(surface) -> np.ndarray:
+def scales(surface):
     """Scales of the wrench: forces against 1, torques against the contact radius."""
     return np.array([1.0, 1.0, surface.contact_radius])
 
 
-def twists(surface, count: int = 300, seed: int = 3) -> np.ndarray:
+def twists(surface, count=300, seed=3):
     """Twists in all directions of the scaled sphere, some nearly or quite a spin or a translation."""
     scaled = np.random.default_rng(seed).normal(size=(count, 3))
     scaled[:20, :2] *= 10.0 ** -np.arange(20.0)[:, None]
@@ -35,14 +33,14 @@ def twists(surface, count: int = 300, seed: int = 3) -> np.ndarray:
     return geometry.twist_at(scaled / scales(surface), -surface.centre_of_pressure)
 
 
-def apart(surface, other, twist) -> float:
+def apart(surface, other, twist):
     """Largest difference of the scaled wrenches."""
     return float(
         np.abs((surface.wrench(twist) - other.wrench(twist)) / scales(surface)).max()
     )
 
 
-def scaled_jacobian(surface, twist) -> np.ndarray:
+def scaled_jacobian(surface, twist):
     """`dW/dV` about the centre of pressure in scaled coordinates."""
     x, y = surface.centre_of_pressure
     inverse = np.linalg.inv(
@@ -51,7 +49,7 @@ def scaled_jacobian(surface, twist) -> np.ndarray:
     return inverse.T @ surface.jacobian(twist) @ inverse
 
 
-def without_outline(patch: pf.ContactPatch) -> pf.ContactPatch:
+def without_outline(patch):
     """The same cells, their outline forgotten."""
     bare = dataclasses.replace(patch)
     assert bare.outline is None

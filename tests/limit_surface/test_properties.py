@@ -1,7 +1,5 @@
 """Properties of every limit surface: dissipation, symmetry, covariance, and the inverse from wrench to twist."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -22,7 +20,7 @@ SUMS = [CELLS, EXACT]
 """Surfaces that, made of points, jump where the centre of rotation crosses one."""
 
 
-def random_map(seed: int) -> pf.ContactPatch:
+def random_map(seed):
     """A measured-looking pressure map without any symmetry."""
     pressure = np.random.default_rng(seed).uniform(size=(9, 7)) ** 4
     pressure[:3, 4:] = 0.0
@@ -48,14 +46,12 @@ polars = st.floats(0.01, math.pi - 0.01)
 """Polar angles of the twist's direction; 0 is a spin about the centre of pressure."""
 
 
-def scales(surface) -> np.ndarray:
+def scales(surface):
     """Scales of the wrench: forces against 1, torques against the contact radius."""
     return np.array([1.0, 1.0, surface.contact_radius])
 
 
-def twist_towards(
-    surface, polar: float, azimuth: float, speed: float = 1.0
-) -> np.ndarray:
+def twist_towards(surface, polar, azimuth, speed=1.0):
     """Twist about the origin with that direction in scaled coordinates at the centre of pressure."""
     scaled = [
         math.sin(polar) * math.cos(azimuth),
@@ -67,7 +63,7 @@ def twist_towards(
     )
 
 
-def lowest_speed(surface, twist) -> float:
+def lowest_speed(surface, twist):
     """Lowest speed of a cell, relative to the scaled twist: how near the centre of rotation is to one."""
     x, y = (surface.patch.positions - surface.centre_of_pressure).T
     vx, vy, omega = geometry.twist_at(twist, surface.centre_of_pressure)
@@ -343,7 +339,7 @@ def test_twist_of_the_wrench_of_a_twist(kind, name):
     check()
 
 
-def smooth_disc() -> pf.ContactPatch:
+def smooth_disc():
     """Many cells and a pressure that ends smoothly: the smooth table has no folds."""
     return pf.ContactPatch.disc_published(
         0.01,

@@ -1,7 +1,5 @@
 """The convex quartic: exact where the surface is one, certified to be convex, closer than the ellipsoid elsewhere."""
 
-from __future__ import annotations
-
 import functools
 import sys
 
@@ -38,18 +36,18 @@ twists = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3).filter(
 
 
 @functools.cache
-def fitted(name: str) -> pf.LimitSurfaceQuartic:
+def fitted(name):
     """The quartic of a patch."""
     return pf.LimitSurfaceQuartic(PATCHES[name])
 
 
-def samples(surface, count: int, seed: int = 0) -> np.ndarray:
+def samples(surface, count, seed=0):
     """Random twists in every direction of the scaled coordinates."""
     random = np.random.default_rng(seed).normal(size=(count, 3))
     return np.linalg.solve(surface._frame(), random.T).T
 
 
-def convex_quartic(*coefficients: float) -> np.ndarray:
+def convex_quartic(*coefficients):
     """`(x^2 + y^2 + z^2)^2` and a convex part: fourth powers of linear functions."""
     rows = np.array(
         [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 2.0, -1.0], [0.3, -1.0, 0.5]]

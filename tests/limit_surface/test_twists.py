@@ -1,7 +1,5 @@
 """Twists of wrenches: the certificate, what rests, what many twists share, and what cannot be found."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +56,7 @@ KINDS = {
 }
 
 
-def refused(kind: str, patch: str) -> bool:
+def refused(kind, patch):
     """Return True if a surface does not take a patch, or is a table of cells with metrics, which is not convex."""
     each = patch == "a grain in each cell"
     grained = patch in ("grain", "feet with a grain") or each
@@ -75,12 +73,12 @@ CASES = [
 ]
 
 
-def scaled_frame(surface) -> np.ndarray:
+def scaled_frame(surface):
     """Return the matrix that scales twists, `W_S = F'^-1 W`."""
     return surface._frame()
 
 
-def wrenches(surface, count: int) -> np.ndarray:
+def wrenches(surface, count):
     """Wrenches in directions spread over the scaled sphere, some with a vanishing part."""
     directions = np.random.default_rng(2).normal(size=(count, 3))
     directions[: count // 4] *= [1.0, 1.0, 1e-3]
@@ -88,7 +86,7 @@ def wrenches(surface, count: int) -> np.ndarray:
     return np.concatenate([directions, np.eye(3), -np.eye(3)]) @ scaled_frame(surface)
 
 
-def angles(surface, wrench, other) -> np.ndarray:
+def angles(surface, wrench, other):
     """Angles [rad] between wrenches in scaled coordinates."""
     first, second = (
         np.linalg.solve(scaled_frame(surface).T, each.T).T for each in (wrench, other)

@@ -1,7 +1,5 @@
 """Friction that depends on the direction: closed forms, properties, the whole sphere, derivatives."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -41,13 +39,13 @@ angles = st.floats(-math.pi, math.pi)
 checked = settings(deadline=None, max_examples=25)
 
 
-def steady(patch: pf.ContactPatch, twist, law=DRY) -> np.ndarray:
+def steady(patch, twist, law=DRY):
     """Wrench of the distributed model after long sliding, per newton."""
     model = pf.DistributedModel(patch, law)
     return model.step(model.rest(), twist, 1.0, 1e3)[1]
 
 
-def cell_sum(patch: pf.ContactPatch, twist) -> np.ndarray:
+def cell_sum(patch, twist):
     """`-sum w B' (u/|u| + a)`, written out."""
     total = np.zeros(3)
     for lever, lean, weight in zip(
@@ -58,7 +56,7 @@ def cell_sum(patch: pf.ContactPatch, twist) -> np.ndarray:
     return total
 
 
-def surfaces(patch: pf.ContactPatch, segments: int = 20) -> list:
+def surfaces(patch, segments=20):
     kinds = [
         pf.LimitSurfaceCells(patch),
         pf.LimitSurfaceTable(patch, segments=segments),
@@ -67,7 +65,7 @@ def surfaces(patch: pf.ContactPatch, segments: int = 20) -> list:
     return [*kinds, pf.LimitSurfaceEllipsoid(patch)] if uniform else kinds
 
 
-def slopes(function, at: np.ndarray, by) -> np.ndarray:
+def slopes(function, at, by):
     """Central differences `[*result, *at.shape]`."""
     columns = []
     for index in np.ndindex(at.shape):
@@ -79,7 +77,7 @@ def slopes(function, at: np.ndarray, by) -> np.ndarray:
     return np.stack(columns, -1).reshape(*columns[0].shape, *at.shape)
 
 
-def close(one, other, tolerance: float) -> None:
+def close(one, other, tolerance):
     """Agreement relative to the largest entry."""
     assert np.abs(one - other).max() <= tolerance * np.abs(other).max()
 

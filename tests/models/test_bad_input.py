@@ -1,7 +1,5 @@
 """Wrong input to a model is refused in one clear line."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

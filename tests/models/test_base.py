@@ -1,7 +1,5 @@
 """Models: steady states, bounds, symmetry, and analytic Jacobians."""
 
-from __future__ import annotations
-
 import functools
 import math
 
@@ -42,7 +40,7 @@ speeds = st.floats(1e-6, 10.0)
 
 
 @functools.cache
-def model_of(kind: str, law: str = "elasto-plastic", feet: bool = False):
+def model_of(kind, law="elasto-plastic", feet=False):
     """A model by name: "distributed" or the reduced one with a kind of limit surface."""
     patch = FEET if feet else PATCH
     if kind == "distributed":
@@ -54,7 +52,7 @@ every_model = pytest.mark.parametrize("kind", ["distributed", *SURFACES])
 every_law = pytest.mark.parametrize("law", LAWS)
 
 
-def twist_towards(patch, polar: float, azimuth: float, speed: float) -> np.ndarray:
+def twist_towards(patch, polar, azimuth, speed):
     """Twist about the origin with that direction, in scaled coordinates at the centre of pressure."""
     vx = speed * math.sin(polar) * math.cos(azimuth)
     vy = speed * math.sin(polar) * math.sin(azimuth)
@@ -211,7 +209,7 @@ def test_pre_sliding_stiffness():
 # ---------------------------------------------------------------------- covariance
 
 
-def some_state(model, seed: int, size: float = 1e-6):
+def some_state(model, seed, size=1e-6):
     """A random state of that deflection, about where slip begins."""
     state = np.random.default_rng(seed).normal(size=model.state_shape) * size
     return (
@@ -321,7 +319,7 @@ def differences(function, x, steps):
     return columns.reshape(*columns.shape[:-1], *x.shape)
 
 
-def state_scale(model) -> np.ndarray:
+def state_scale(model):
     """A millionth of full deflection for every entry of the state."""
     if model.state_shape == (3,):
         return 1e-12 * np.array([1.0, 1.0, model.patch.contact_radius()])
@@ -417,23 +415,6 @@ def test_jacobians_at_rest_are_finite_and_elastic(kind, law):
     # d wrench/d V of a slow twist, the damper: sigma_1 + sigma_2, negative definite.
     damping = at_rest.wrench_twist
     assert np.linalg.eigvalsh(0.5 * (damping + damping.T)).max() < 0.0
-
-
-@pytest.mark.parametrize("kind", ["distributed", *SURFACES])
-def test_jacobians_have_batch_axes(kind):
-    model = model_of(kind)
-    states = np.stack([some_state(model, seed) for seed in range(3)])
-    twists = np.random.default_rng(1).normal(size=(4, 1, 3)) * 0.01
-    loads = np.array([0.5, 1.0, 2.0])
-    batch = model.jacobians(states, twists, loads)
-    for i, j in np.ndindex(4, 3):
-        single = model.jacobians(states[j], twists[i, 0], loads[j])
-        for all_of_them, one in zip(batch, single, strict=True):
-            assert all_of_them.shape == (4, 3, *one.shape)
-            # Sums over cells in another order: rounding.
-            assert all_of_them[i, j] == pytest.approx(
-                one, rel=1e-9, abs=1e-12 * np.abs(one).max()
-            )
 
 
 @pytest.mark.parametrize("front", [None, "planarfriction.torch", "planarfriction.jax"])

@@ -4,8 +4,6 @@ BLAS rounds a product with one row differently from one with many, on most proce
 machine says little about the next, but elementwise products are the same everywhere.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -78,7 +76,7 @@ LAYOUTS = {
 layouts = pytest.mark.parametrize("layout", LAYOUTS.values(), ids=LAYOUTS)
 
 
-def same(batch, alone, index) -> None:
+def same(batch, alone, index):
     """All that a call returns, member by member."""
     batch, alone = (
         (values,) if isinstance(values, np.ndarray | float) else values

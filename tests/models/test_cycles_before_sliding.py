@@ -1,7 +1,5 @@
 """Small closed motions before sliding: springs take no energy; the published equations ratchet and give some."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -21,7 +19,7 @@ SPRINGS = {
 }
 
 
-def cycle() -> np.ndarray:
+def cycle():
     """Twists of a push, a turn and the straight way back, `[3, 3]`."""
     push = np.array([LEG, 0.0, 0.0])
     turn = np.array([0.0, 0.0, LEG / PATCH.contact_radius()])

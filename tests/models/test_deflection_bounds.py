@@ -1,7 +1,5 @@
 """Largest deflections of the bristles after steps of any length (docs/physics.md, "A step at a held twist")."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Work that steps do on the body beside the energy that bristles give: damped bristles that relax may give more."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ SOFT = {"mu_s": 1.6, "sigma_0": 1e4, "elasto_plastic": 0.9}
 """Bristles in which excess work is most frequent."""
 
 
-def _excess(law: pf.LuGre) -> np.ndarray:
+def _excess(law):
     """Work beyond the fall of the stored energy, as a share of both, in steps of 0.1 to 10 ms."""
     generator = np.random.default_rng(14)
     count = 4000

@@ -1,7 +1,5 @@
 """Numbers at both ends: too slow to be squared, up to the largest that is taken, and beyond."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

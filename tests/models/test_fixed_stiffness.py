@@ -25,11 +25,7 @@ METRIC = np.array([[1.3, 0.2], [0.2, 0.8]])
 _DISC = ContactPatch.disc(0.02, cells=5)
 
 
-def _patch(
-    radius: float,
-    metric: np.ndarray | None,
-    asymmetry: tuple[float, float] | None = None,
-) -> ContactPatch:
+def _patch(radius, metric, asymmetry=None):
     directions = {
         "metric": metric,
         "asymmetry": asymmetry,
@@ -50,7 +46,7 @@ LAWS = {
 }  # fmt: skip
 
 
-def _within_limits(patch: ContactPatch, given: dict) -> dict:
+def _within_limits(patch, given):
     """Return numbers of a law whose published steps never leave the limit at rest.
 
     Elasto-plastic bristles that lean do, by up to 0.12 |a| of it when they stop and turn back, where mu_s > mu_c.
@@ -66,7 +62,7 @@ every_patch = pytest.mark.parametrize("patch", PATCHES.values(), ids=PATCHES)
 every_law = pytest.mark.parametrize(("kind", "given"), LAWS.values(), ids=LAWS)
 
 
-def _twists(seed: int, count: int = 40):
+def _twists(seed, count=40):
     rng = np.random.default_rng(seed)
     return (
         rng.normal(size=(count, 3))

@@ -1,7 +1,5 @@
 """Contacts that are a point, or nearly: soft fingers that hardly touch, and patches whose one cell carries it all."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -25,11 +25,11 @@ MODELS = {
 
 
 @pytest.fixture(params=MODELS)
-def model(request) -> pf.models.FrictionModel:
+def model(request):
     return MODELS[request.param]
 
 
-def moments_at(centre, load) -> np.ndarray:
+def moments_at(centre, load):
     x, y = np.moveaxis(np.asarray(centre), -1, 0)
     return np.asarray(load)[..., None] * np.stack([y, -x], -1)
 

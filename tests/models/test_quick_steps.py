@@ -1,7 +1,5 @@
 """Small batches of steps and derivatives of single ones go straight to compiled code, and say what long ways say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,7 @@ TWISTS = GENERATOR.normal(size=(4, 3)) * [0.01, 0.01, 1.0]
 LOADS = np.array([1.0, 2.0, 0.0, 0.5])
 
 
-def _states(model) -> np.ndarray:
+def _states(model):
     scale = [1.0, 1.0, 0.01] if isinstance(model, pf.ReducedModelPublished) else 1.0
     return (
         GENERATOR.uniform(-0.6, 0.6, (4, *model.state_shape))

@@ -1,7 +1,5 @@
 """Rates and wrenches of the bristle models against their equations, written out in NumPy cell by cell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -19,9 +17,7 @@ ROUNDING = 1e-12
 """Relative: sums over 84 cells in another order, and polynomials in place of the C library's functions."""
 
 
-def decay(
-    law: pf.LuGre, z: np.ndarray, u: np.ndarray, speed: float, stretch: float
-) -> float:
+def decay(law, z, u, speed, stretch):
     """`k = beta |v| sigma_0/g`; the bristle is full at `stretch g/sigma_0`, and `speed = |u|/stretch`."""
     g = law.mu_c + (law.mu_s - law.mu_c) * np.exp(-((speed / law.v_s) ** law.gamma))
     if law.elasto_plastic is None:
@@ -33,7 +29,7 @@ def decay(
     return 0.5 * alpha * (speed + z @ u / (size * stretch)) * law.sigma_0 / g
 
 
-def sample(seed: int) -> tuple[np.ndarray, np.random.Generator]:
+def sample(seed):
     generator = np.random.default_rng(seed)
     return generator.normal(size=3) * [1.0, 1.0, 100.0] * 10.0 ** generator.uniform(
         -4.0, -1.0

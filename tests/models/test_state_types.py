@@ -1,7 +1,5 @@
 """States and twists of other types: converted or refused before compiled code sees them, which never compiles again."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np
@@ -67,7 +65,7 @@ every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 every_form = pytest.mark.parametrize("form", FORMS)
 
 
-def compiled() -> dict[str, int]:
+def compiled():
     """Return the number of compilations of each kernel."""
     modules = [
         module

@@ -1,15 +1,11 @@
 """Models used by many threads at once give what they give alone, to the last bit."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import sys
 import threading
 import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +20,7 @@ SOFT = pf.ContactPatch.rectangle(0.02, cells=9, pressure=FINGER)
 FIXED = pf.ContactPatch.disc(0.01, cells=7)
 LOADS = np.geomspace(0.7, 6.0, 160)
 
-MODELS: dict[str, Callable[[], Any]] = {
+MODELS = {
     "distributed": lambda: pf.DistributedModel(FIXED, LAW),
     "distributed soft": lambda: pf.DistributedModel(SOFT, LAW),
     "reduced": lambda: pf.ReducedModel(FIXED, PLAIN, cells=12),
@@ -45,14 +41,14 @@ MODELS: dict[str, Callable[[], Any]] = {
 }
 
 
-def numbers(results: Any) -> list[np.ndarray]:
+def numbers(results):
     """All arrays in a result."""
     if isinstance(results, tuple):
         return [array for each in results for array in numbers(each)]
     return [np.array(results)]
 
 
-def of_a_scene(model: Any, load: float) -> tuple:
+def of_a_scene(model, load):
     """A short run whose load changes."""
     ramp = pf.Signal.sampled([0.0, 0.01], [load, 1.1 * load], hold="linear")
     data = pf.simulate(
@@ -61,15 +57,15 @@ def of_a_scene(model: Any, load: float) -> tuple:
     return tuple(data[name].values for name in ("x", "y", "theta", "fx", "fy", "tau"))
 
 
-def of_a_batch(model: Any, load: float) -> tuple:
+def of_a_batch(model, load):
     loads = np.array([load, 0.0, 1.3 * load])
     return model.step(
         np.zeros((3, *model.state_shape)), np.full((3, 3), 0.01), loads, 1e-3
     )
 
 
-def of_one(what: str) -> Callable[[Any, float], tuple]:
-    def calculate(model: Any, load: float) -> tuple:
+def of_one(what):
+    def calculate(model, load):
         generator = np.random.default_rng(int(1e6 * load))
         state = 4e-7 * generator.normal(size=model.state_shape)
         twist = generator.normal(size=3) * [1e-3, 1e-3, 0.1]
@@ -79,7 +75,7 @@ def of_one(what: str) -> Callable[[Any, float], tuple]:
     return calculate
 
 
-CALLS: dict[str, Callable[[Any, float], tuple]] = {
+CALLS = {
     **{
         what: of_one(what)
         for what in ("step", "rate", "wrench", "jacobians", "step_jacobians")
@@ -95,12 +91,12 @@ CALLS: dict[str, Callable[[Any, float], tuple]] = {
 }
 
 
-def at_once(work: Callable[[int], Any]) -> list[Any]:
+def at_once(work):
     """`work(i)` of `THREADS` threads, which begin together and take turns every microsecond."""
     start = threading.Barrier(THREADS)
     interval = sys.getswitchinterval()
 
-    def begin(i: int) -> Any:
+    def begin(i):
         start.wait()
         return work(i)
 
@@ -112,7 +108,7 @@ def at_once(work: Callable[[int], Any]) -> list[Any]:
         sys.setswitchinterval(interval)
 
 
-def compare(name: str, rounds: int, seed: int) -> None:
+def compare(name, rounds, seed):
     """`rounds` random calls, shared by the threads, of one new model against those of another one used alone."""
     generator = np.random.default_rng(seed)
     chances = np.array(
@@ -123,7 +119,7 @@ def compare(name: str, rounds: int, seed: int) -> None:
     alone = MODELS[name]()
     together = MODELS[name]()
 
-    def run(i: int) -> list[list[np.ndarray]]:
+    def run(i):
         return [
             numbers(CALLS[call](together, load))
             for call, load in zip(calls[i::THREADS], loads[i::THREADS], strict=True)
@@ -202,7 +198,7 @@ def test_torch_models_share_nothing_that_changes():
 
     twist = torch.tensor([[0.01, 0.002, 0.3]]).expand(20, 3)
 
-    def work(model: Any) -> list[np.ndarray]:
+    def work(model):
         rolled = pft.rollout(model, None, twist, 1.3, 1e-3)
         stepped = model.step(model.rest(), twist[0], 1.3, 1e-3)
         gradients = torch.autograd.grad(

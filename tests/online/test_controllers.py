@@ -1,7 +1,5 @@
 """Controllers in the rig: parts are held with less grip than by the published rule, and slip as far as they shall."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -16,13 +14,13 @@ from planarfriction.online import (
     TurnBy,
 )
 from planarfriction.online.loops import friction_filter, grips
-from planarfriction_studies.rig import Gripper, Parts
+from planarfriction_studies.rig import Gripper
 from planarfriction_studies.rig.trials import known_model, random_parts, trial
 
 COUNT = 4
 
 
-def few(**changes) -> Parts:
+def few(**changes):
     return dataclasses.replace(random_parts(COUNT, 3, 1), **changes)
 
 
@@ -256,7 +254,7 @@ def test_a_clock_that_is_set_back_does_not_stop_a_grip(observer):
     assert hold.state["age"] == pytest.approx(0.388, abs=2e-3)  # all but ten samples
 
 
-def found(count=1, **changes) -> np.ndarray:
+def found(count=1, **changes):
     """Estimate of a part that slips under 1 N, a millisecond after the sample before."""
     one = np.zeros(count, friction_filter.ESTIMATE)
     given = {
@@ -275,7 +273,7 @@ def found(count=1, **changes) -> np.ndarray:
     return one
 
 
-def gripped(controller, changes, **state) -> float:
+def gripped(controller, changes, **state):
     """The next grip of one part in a state whose filters have settled."""
     for name, value in (
         {"age": 1.0, "span": 0.0, "start": 50.0, "grip": 10.0} | state

@@ -1,7 +1,5 @@
 """The observer: what it learns of a slip, what it does not of a part that sticks, and what bad samples do to it."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 
@@ -23,7 +21,7 @@ SURFACE = pf.LimitSurfaceTable(PATCH)
 MODEL = pf.ReducedModel(PATCH, LAW)
 
 
-def observer(**options) -> FrictionObserver:
+def observer(**options):
     """Observer of a sensor whose bias is below its noise, unless the options say otherwise."""
     return FrictionObserver(
         MODEL, surface=SURFACE, **{"bias": (0.01, 0.01, 1e-4)} | options
@@ -56,7 +54,7 @@ def sliding(mu=0.7, scale=1.1, load=4.0, count=1200, turning=True):
         yield Measurement(time[k], (0.5 if rests else fast) * wrench[k], load, velocity)
 
 
-def taken(own: FrictionObserver, samples):
+def taken(own, samples):
     for sample in samples:
         estimate = own.update(sample)
     return estimate

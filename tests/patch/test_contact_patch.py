@@ -1,7 +1,5 @@
 """Contact patches: the published table, shares of the load, plain data."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math
@@ -21,7 +19,7 @@ ROUNDING = 1e-13
 CELL = 0.02 / 21
 
 
-def soft(**changes) -> pf.SoftFinger:
+def soft(**changes):
     """The soft finger of the published runs with changing pressure."""
     return pf.SoftFinger(
         **{"c": 6 * CELL, "n": 1 / 3, "k": 2.0, "radius_max": 0.01, **changes}

@@ -1,7 +1,5 @@
 """Wrong contact patches are refused in one clear line."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Patches as a few discs: sums that they keep, symmetry, kinds of friction, and shapes that depend on the load."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import json
@@ -42,12 +40,12 @@ EXACT = 1e-13
 """Rounding of sums over a few hundred cells."""
 
 
-def own(patch: pf.ContactPatch) -> np.ndarray:
+def own(patch):
     """Second moments of the cells about themselves."""
     return (patch.cell_extents() ** 2).sum(axis=1) / 12.0
 
 
-def kept(discs: pf.ContactPatch, patch: pf.ContactPatch) -> None:
+def kept(discs, patch):
     """Load, centre and second moment of the areas of cells are those of the discs."""
     w = patch.tile_weights()
     centre = w @ patch.positions
@@ -64,15 +62,13 @@ def kept(discs: pf.ContactPatch, patch: pf.ContactPatch) -> None:
     assert discs.areas.sum() == pytest.approx(patch.areas.sum(), rel=EXACT)
 
 
-def rows(patch: pf.ContactPatch) -> np.ndarray:
+def rows(patch):
     """Positions, shares and radii, sorted, in micrometres and parts of a million."""
     numbers = 1e6 * np.column_stack([patch.positions, patch.weights(), patch.radii])
     return numbers[np.lexsort(np.round(numbers[:, :2], 3).T)]
 
 
-def wrench_error(
-    discs: pf.ContactPatch, patch: pf.ContactPatch, load: float | None = None
-) -> float:
+def wrench_error(discs, patch, load=None):
     """Largest error of the force over `mu f_N` while both slide about the same points of the patch."""
     rng = np.random.default_rng(0)
     centres = patch.positions[rng.integers(patch.cells, size=300)] + 1e-4 * rng.normal(

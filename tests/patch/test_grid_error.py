@@ -1,7 +1,5 @@
 """`ContactPatch.grid_error`: closed forms on lines, the order of convergence, points."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

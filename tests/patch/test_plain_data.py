@@ -1,7 +1,5 @@
 """Plain data keep every bit: files, digests and caches rely on it."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 
@@ -16,7 +14,7 @@ checked = settings(deadline=None, max_examples=20)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def maps(random: np.random.Generator, count: int) -> list[np.ndarray]:
+def maps(random, count):
     """Maps of one size with empty cells, each at its own scale."""
     empty = random.random((4, 7)) < random.random()
     empty[2, 3] = False
@@ -28,7 +26,7 @@ def maps(random: np.random.Generator, count: int) -> list[np.ndarray]:
     ]
 
 
-def patches(seed: int) -> list[pf.ContactPatch]:
+def patches(seed):
     """One patch of each kind, all their numbers random."""
     random = np.random.default_rng(seed)
     sizes = random.uniform(1e-3, 0.1, 2)
@@ -73,7 +71,7 @@ def patches(seed: int) -> list[pf.ContactPatch]:
     ]
 
 
-def numbers(patch: pf.ContactPatch) -> list[np.ndarray]:
+def numbers(patch):
     """All that models and surfaces take from a patch."""
     load = 1.05 if patch.depends_on_load else None
     return [

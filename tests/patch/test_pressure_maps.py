@@ -1,7 +1,5 @@
 """Pressure maps from arrays and files: orientation, kinds of files, and what is said about broken ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

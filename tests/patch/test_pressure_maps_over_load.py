@@ -1,7 +1,5 @@
 """Pressure maps measured at several loads."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -16,7 +14,7 @@ HEAVY = np.array([[30.0, 10.0, 0.0], [0.0, 20.0, 40.0]])
 LOADS = [2.0, 6.0]
 
 
-def both() -> pf.ContactPatch:
+def both():
     return pf.ContactPatch.from_pressure([LIGHT, HEAVY], 0.001, loads=LOADS)
 
 

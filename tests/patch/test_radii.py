@@ -1,7 +1,5 @@
 """Cells that are small discs: their radii, what they add to sums over the patch, and the levers of their bristles."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -14,7 +12,7 @@ from planarfriction.errors import InvalidValueError
 SQUARE = pf.ContactPatch.rectangle(0.02, cells=3)
 
 
-def with_radii(patch: pf.ContactPatch, radii) -> pf.ContactPatch:
+def with_radii(patch, radii):
     return dataclasses.replace(patch, radii=np.broadcast_to(radii, patch.cells))
 
 

@@ -1,7 +1,5 @@
 """Shapes of contact patches: closed forms and orders of convergence."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

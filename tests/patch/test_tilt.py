@@ -12,13 +12,13 @@ RECTANGLE = pf.ContactPatch.rectangle(0.1, 0.06)
 X, Y = RECTANGLE.positions.T
 
 
-def follow(patch: pf.ContactPatch, centre) -> np.ndarray:
+def follow(patch, centre):
     """Return the weights with the centre of pressure asked for."""
     x, y = np.moveaxis(np.asarray(centre), -1, 0)
     return patch.weights(LOAD, moments=LOAD * np.stack([y, -x], -1))
 
 
-def centre(patch: pf.ContactPatch, weights: np.ndarray) -> np.ndarray:
+def centre(patch, weights):
     return weights @ patch.positions
 
 

@@ -1,7 +1,5 @@
 """Grip plans reach what was asked for and hold, and the smallest grip is that of the limit surface."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math
@@ -32,7 +30,7 @@ SOFT = pf.ContactPatch.disc(
 HALF = math.radians(30.0)
 
 
-def plate(offset: float = 0.025, model=MODEL) -> pf.Scene:
+def plate(offset=0.025, model=MODEL):
     return pf.scenes.in_hand(
         model, centre_of_mass=(offset, 0.0), normal_force=4.0, t_end=1.0
     )
@@ -43,7 +41,7 @@ def turning():
     return plan_grip(plate(), {"angle": -HALF})
 
 
-def at_the_end(solution: pf.Solution) -> dict[str, float]:
+def at_the_end(solution):
     return {
         name: float(solution.data[name][-1])
         for name in ("x", "y", "theta", "vx", "vy", "omega")
@@ -78,7 +76,7 @@ def test_a_plate_turns_by_thirty_degrees_slides_little_and_is_held():
     ).all()  # it starts where something gives way
 
 
-def load_and_level(scene: pf.Scene) -> tuple[np.ndarray, float]:
+def load_and_level(scene):
     load = load_on(scene, 0, 0.0, np.zeros(2), 0.0)
     return load, holding_load(load, PATCH, LAW.mu_c)
 
@@ -94,7 +92,7 @@ def test_a_plate_slides_by_ten_millimetres_without_turning(offset):
     assert abs(end["vy"]) < 1e-9
 
 
-def held_at_first(grip: float) -> pf.Scene:
+def held_at_first(grip):
     scene = pf.scenes.in_hand(
         MODEL, centre_of_mass=(0.025, 0.0), normal_force=grip, t_end=1.0
     )
@@ -147,7 +145,7 @@ def test_slopes_of_ends_are_differences():
     times = np.array([0.0, 0.08, 0.15])
     values = np.array([2.0, 2.8, 3.5])
 
-    def vector(change) -> np.ndarray:
+    def vector(change):
         return grips.ends(
             pf.Signal(times, values + change, "linear"), [1.0], rtol=1e-9
         )[0]

@@ -1,7 +1,5 @@
 """The grip that holds while it falls: brackets of simulations, its order in the time of the fall, refusals."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -33,7 +31,7 @@ LOAD = np.array([0.0, -WEIGHT, -LEVER * WEIGHT])
 PLATE = {"mass": 0.1, "inertia": 0.1 * ((0.15**2 + 0.08**2) / 12 + LEVER**2)}
 
 
-def moved(model, grip: pf.Signal) -> float:
+def moved(model, grip):
     """Distance [m] that the plate of the published runs moves as its grip changes."""
     scene = pf.scenes.in_hand(
         model, centre_of_mass=(LEVER, 0.0), normal_force=grip, t_end=0.6

@@ -1,7 +1,5 @@
 """Quasi-static pushes: motion cones, the way a slider turns, symmetries, order, plans."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -38,11 +36,11 @@ SURFACES = {
 MU = 0.3
 
 
-def straight(begin, end) -> pf.Signal:
+def straight(begin, end):
     return pf.Signal.sampled([0.0, 1.0], [begin, end], "linear")
 
 
-def slider(kind: str = "ellipsoid") -> Slider:
+def slider(kind="ellipsoid"):
     return Slider(SURFACES[kind], SQUARE)
 
 

@@ -1,7 +1,5 @@
 """Moving pictures: what their frames show is what the solution says, and what cannot be written says why."""
 
-from __future__ import annotations
-
 import dataclasses
 import io
 import re
@@ -41,13 +39,13 @@ def coarse(monkeypatch):
         monkeypatch.setattr(f"planarfriction.plots.panels.{name}", 12)
 
 
-def film_of(run: pf.Solution, frames: int = 5, follow: bool = True) -> Film:
+def film_of(run, frames=5, follow=True):
     times = np.asarray(run.histories["time"].values)
     track = track_of(run, np.linspace(times[0], times[-1], frames))
     return Film(run, track, follow=follow, pace="", dpi=50.0)
 
 
-def changed(run: pf.Solution, **values) -> pf.Solution:
+def changed(run, **values):
     """The solution with other values of some of its variables."""
     data = run.data.assign(
         {name: (run.data[name].dims, each) for name, each in values.items()}
@@ -55,7 +53,7 @@ def changed(run: pf.Solution, **values) -> pf.Solution:
     return dataclasses.replace(run, histories=data)
 
 
-def panels(film: Film, kind: type) -> list:
+def panels(film, kind):
     return [each for each in film.panels if isinstance(each, kind)]
 
 
@@ -138,7 +136,7 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
 # ---------------------------------------------------------------------- which cells slip
 
 
-def field(displacements: np.ndarray, cells: int = 21):
+def field(displacements, cells=21):
     model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, cells), LAW))
     times = 0.01 * np.arange(len(displacements) + 1)
     loads = np.full(len(displacements) + 1, 2.0)
@@ -435,7 +433,7 @@ def test_a_patch_in_steady_sliding_has_its_wrench_on_the_limit_surface():
     assert np.ravel(panel.head.get_data_3d()) == pytest.approx(points[100], abs=1e-9)
 
 
-def soft_finger() -> pf.Solution:
+def soft_finger():
     soft = pf.ContactPatch.rectangle(
         0.02, cells=9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01)
     )
@@ -492,12 +490,12 @@ def test_the_share_that_slips_is_that_of_the_load():
 # ---------------------------------------------------------------------- the view
 
 
-def far(way: float = 1.0) -> pf.Solution:
+def far(way=1.0):
     run = synthetic.solution(synthetic.scene(mounted_on="body"))
     return changed(run, x=way * np.linspace(0.0, 1.0, 201))
 
 
-def sides(film: Film) -> np.ndarray:
+def sides(film):
     return np.diff(film.views, axis=-1)[..., 0]
 
 
@@ -545,14 +543,14 @@ class Own:
     law = "tape"
 
 
-def with_model(model) -> pf.Solution:
+def with_model(model):
     scene = synthetic.scene()
     return synthetic.solution(
         dataclasses.replace(scene, contacts=[pf.Contact(model, 2.0, name="pad")])
     )
 
 
-def one_sample() -> pf.Solution:
+def one_sample():
     run = synthetic.solution()
     return dataclasses.replace(run, histories=run.data.isel(time=slice(1)))
 
@@ -618,7 +616,7 @@ def test_no_word_of_a_frame_is_cut_or_covered(contacts):
 
 
 def test_a_gif_has_its_frames_at_their_pace(tmp_path):
-    seen: list[float] = []
+    seen = []
     path = synthetic.solution(t_end=0.3).animate(
         tmp_path / "motion.gif", slow=1.0, dpi=30.0, progress=seen.append
     )
@@ -634,7 +632,7 @@ def test_a_gif_has_its_frames_at_their_pace(tmp_path):
     assert max(seen) == pytest.approx(0.3)
 
 
-def coloured(number: int) -> np.ndarray:
+def coloured(number):
     """A frame of 60 x 40 pixels: white, two frequent colours, and 30 rare ones that change from frame to frame."""
     pixels = np.full((60, 40, 3), 255, dtype=np.uint8)
     pixels[:20] = (0, 114, 178)
@@ -721,7 +719,7 @@ def test_ctrl_c_leaves_what_was_there(tmp_path, kind):
     path.write_text("kept")
     calls = []
 
-    def stop(time: float) -> None:
+    def stop(time):
         calls.append(time)
         # The colours are chosen from 6 frames before the first is written.
         if len(calls) == 9:
@@ -742,11 +740,11 @@ def test_an_ffmpeg_that_fails_is_named_and_one_that_is_stopped_is_not(
 
     whole = FFMpegWriter.finish
 
-    def fails(self) -> None:
+    def fails(self):
         whole(self)
         raise subprocess.CalledProcessError(255, "ffmpeg")
 
-    def stop(time: float) -> None:
+    def stop(time):
         if stopped:
             raise KeyboardInterrupt
 

@@ -1,7 +1,5 @@
 """Plots: what is drawn is what the numbers say, with units, and no label is cut off."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import subprocess
@@ -38,7 +36,7 @@ DRAWING = 1e-9  # [mm], [N], ...: coordinates are scaled once on their way to th
 CUT = 1.0  # [pixel]: the box of a letter is rounded up to whole pixels
 
 
-def overhang(figure) -> float:
+def overhang(figure):
     """Return the distance [pixel] by which labels or other parts of a figure stick out of it, 0 if none does."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
@@ -49,7 +47,7 @@ def overhang(figure) -> float:
     )
 
 
-def labels(axes) -> set[str]:
+def labels(axes):
     return {axes.get_xlabel(), axes.get_ylabel()}
 
 
@@ -293,7 +291,7 @@ def test_every_contact_has_its_line_and_its_entry():
     assert entries["b, pad 3"].get_linestyle() == force[5].get_linestyle()
 
 
-def with_values(run: pf.Solution, **values) -> pf.Solution:
+def with_values(run, **values):
     """The solution with other values of some of its variables."""
     data = run.data.assign(
         {name: (run.data[name].dims, each) for name, each in values.items()}
@@ -301,7 +299,7 @@ def with_values(run: pf.Solution, **values) -> pf.Solution:
     return pf.Solution(data, run.statistics, run.status, run.message, run.scene)
 
 
-def panels(figure) -> dict:
+def panels(figure):
     return {axes.get_ylabel().split(" [")[0]: axes for axes in figure.axes}
 
 
@@ -327,7 +325,7 @@ def test_the_kick_at_the_start_does_not_hide_the_rest():
 # ---------------------------------------------------------------------- motion
 
 
-def outlines(figure) -> list[np.ndarray]:
+def outlines(figure):
     """Closed lines of five corners, in mm: the outlines of the plate."""
     axes = figure.axes[0]
     drawn = [line for line in axes.lines if len(line.get_xdata()) == 5]
@@ -630,7 +628,7 @@ def test_what_cannot_be_drawn_is_named_in_one_line(call, message):
 # ---------------------------------------------------------------------- nothing cut, covered or empty
 
 
-def changed(run: pf.Solution, every: float = 1.0, **values) -> pf.Solution:
+def changed(run, every=1.0, **values):
     """The solution with other values of some variables, and its times so many times as long."""
     run = with_values(run, **values)
     return dataclasses.replace(
@@ -638,7 +636,7 @@ def changed(run: pf.Solution, every: float = 1.0, **values) -> pf.Solution:
     )
 
 
-def scaled(by: float) -> pf.Solution:
+def scaled(by):
     """All lengths and forces so many times as large; the body and its patch stay as they are."""
     run = synthetic.solution()
     return with_values(
@@ -649,7 +647,7 @@ def scaled(by: float) -> pf.Solution:
     )
 
 
-def resting() -> pf.Solution:
+def resting():
     run = synthetic.solution()
     return with_values(
         run,
@@ -730,7 +728,7 @@ PATCHES = {
 }
 
 
-def tiny_patch() -> pf.ContactPatch:
+def tiny_patch():
     with pytest.warns(UserWarning, match="are its lengths in metres"):
         return pf.ContactPatch.disc(1e-9, 11)
 

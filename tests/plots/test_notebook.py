@@ -1,7 +1,5 @@
 """Notebook views: the rows beside a picture are numbers of the record, and the picture is drawn from its data."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

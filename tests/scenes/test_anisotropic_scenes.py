@@ -1,7 +1,5 @@
 """Direction-dependent friction in scenes and files, and who refuses it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -20,13 +20,11 @@ DISCS = ContactPatch(
 LEANING = dataclasses.replace(DISCS, asymmetry=(0.3, -0.2))
 
 
-def _body(mass: float = 0.1, inertia: float = 1e-4) -> Body:
+def _body(mass=0.1, inertia=1e-4):
     return Body(mass, inertia, gravity=(0.0, 0.0))
 
 
-def _swinging(
-    mean: float, share: float, rate: float, t_end: float, steps: int
-) -> Signal:
+def _swinging(mean, share, rate, t_end, steps):
     time = np.linspace(0.0, t_end, steps + 1)
     return Signal(
         time, mean * (1.0 + share * np.sin(2.0 * np.pi * rate * time)), "linear"
@@ -172,7 +170,7 @@ def test_an_equilibrium_follows_the_load(patch, load):
     """Near the limit, where some bristles are bent as far as they can be."""
     body = Body(0.1, 1e-4, (0.008, 0.0), gravity=(0.0, 0.0))
 
-    def scene(load: float) -> Scene:
+    def scene(load):
         model = DistributedModel(
             patch, LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=1.0)
         )

@@ -1,7 +1,5 @@
 """Moving supports of contacts: driven pads, belts, turntables, and the ready scene with them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -27,7 +25,7 @@ SWAY = pf.Signal.sampled(
 )
 
 
-def led(model, frame=(0.0, 0.0), mass: float = 0.3) -> pf.Scene:
+def led(model, frame=(0.0, 0.0), mass=0.3):
     """A plate on a table, led by a pad, seen from a frame that moves with minus `frame` [m/s]."""
     body = pf.Body(mass, 4e-4, velocity=(*frame, 0.0), gravity=(0.0, 0.0))
     drift = np.array([*frame, 0.0])
@@ -166,7 +164,7 @@ def test_order_with_something_that_moves():
 
 
 def test_derivatives_follow_what_moves():
-    def run(mu: float = 1.0, mass: float = 1.0) -> pf.Scene:
+    def run(mu=1.0, mass=1.0):
         law = dataclasses.replace(LAW, mu_c=mu * LAW.mu_c, mu_s=mu * LAW.mu_s)
         return led(pf.DistributedModel(PATCH, law), mass=0.3 * mass)
 

@@ -1,7 +1,5 @@
 """Motions in windows: where a window ends leaves no trace, and what a run takes of memory does not grow with it."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import numpy as np
@@ -29,12 +27,12 @@ MODELS = {
 }
 
 
-def ramp(*samples: tuple[float, float]) -> pf.Signal:
+def ramp(*samples):
     times, values = zip(*samples, strict=True)
     return pf.Signal.sampled(times, values, hold="linear")
 
 
-def free(model) -> pf.Scene:
+def free(model):
     """Loads that rise, hold, vanish, return and fall; a second contact of fixed shape; a force that bends."""
     load = ramp(
         (0.0, 0.8),
@@ -64,7 +62,7 @@ def free(model) -> pf.Scene:
     )
 
 
-def driven(model) -> pf.Scene:
+def driven(model):
     twist = pf.Signal.sampled(
         [0.0, 0.01, 0.02],
         [[0.0, 0, 0], [0.02, 0, 3.0], [0.0, 0.01, 0.0]],
@@ -79,7 +77,7 @@ def driven(model) -> pf.Scene:
     )
 
 
-def recorded(scene: pf.Scene, **options) -> dict[str, np.ndarray]:
+def recorded(scene, **options):
     """Everything that a run gives."""
     solution = pf.simulate(scene, bristles="all", **options)
     counts = solution.statistics
@@ -91,7 +89,7 @@ def recorded(scene: pf.Scene, **options) -> dict[str, np.ndarray]:
     }
 
 
-def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
+def assert_same(one, other):
     assert one.keys() == other.keys()
     for name, values in one.items():
         np.testing.assert_array_equal(values, other[name], err_msg=name)
@@ -217,7 +215,7 @@ def test_interruption_in_a_later_window_keeps_what_is_done(monkeypatch):
     monkeypatch.setattr(packing, "BATCH", 3)
     seen = []
 
-    def stop(time: float) -> None:
+    def stop(time):
         seen.append(time)
         if time > 0.015:
             raise KeyboardInterrupt
@@ -248,7 +246,7 @@ def test_interruption_while_shapes_are_built_keeps_what_is_done(monkeypatch):
     assert 0.003 < float(caught.value.solution.data.time[-1]) < 0.012
 
 
-def peak(t_end: float, name: str) -> float:
+def peak(t_end, name):
     """Largest memory [B] that a run takes."""
     scene = pf.Scene(
         pf.Body(0.1, 1e-4),

@@ -52,7 +52,7 @@ def slide(
 
 
 @functools.cache
-def reference(twist) -> np.ndarray:
+def reference(twist):
     """Return x, y [m] and the angle [rad] at which a plate of 40 x 40 cells stops, under `p_0 (1 + a x + b y)`.
 
     The three numbers of the plane are those with which all cells carry the weight and no moment tips the body.
@@ -236,9 +236,7 @@ def test_friction_takes_energy_while_the_pressure_moves(name):
     assert taken[-1] > 0.05
 
 
-def pushed(
-    name: str, mu=1.0, r=1.0, mass=1.0, load=1.0, push=0.0, height=0.03
-) -> pf.Scene:
+def pushed(name, mu=1.0, r=1.0, mass=1.0, load=1.0, push=0.0, height=0.03):
     """A box that is pushed while it slides, on cells some of which lift."""
     law = dataclasses.replace(LAW, mu_c=mu * MU, mu_s=1.2 * mu * MU, v_s=5e-3)
     patch = pf.ContactPatch.rectangle(r * SIZE[0], r * SIZE[1], 7)

@@ -1,7 +1,5 @@
 """When a body counts as at rest: slow, and held by friction for good."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -13,9 +11,7 @@ G = 9.81
 MU = 0.5
 
 
-def law(
-    sigma_1: float, elasto_plastic: float | None = None, mu_s: float = MU
-) -> pf.LuGre:
+def law(sigma_1, elasto_plastic=None, mu_s=MU):
     return pf.LuGre(
         mu_c=MU,
         mu_s=mu_s,
@@ -26,25 +22,23 @@ def law(
     )
 
 
-def name_of(model) -> str:
+def name_of(model):
     return f"{type(model).__name__}-{model.law.sigma_1:g}-{model.law.elasto_plastic is not None}"
 
 
 LAWS = [law(800.0), law(800.0, 0.9), law(100.0), law(0.0), law(0.0, 0.9)]
 
 
-def run(model, body: pf.Body, load, t_end: float, **more) -> pf.Solution:
+def run(model, body, load, t_end, **more):
     contact = pf.Contact(model, load, mounted_on="body")
     return pf.simulate(pf.Scene(body, [contact], t_end, stop_speed=1e-4, **more))
 
 
-def level(speed: float = 0.0) -> pf.Body:
+def level(speed=0.0):
     return pf.Body(1.0, 1e-4, velocity=(speed, 0.0, 0.0), gravity=(0.0, 0.0))
 
 
-def on_a_slope(
-    model, steepness: float, t_end: float, speed: float = 0.0
-) -> pf.Solution:
+def on_a_slope(model, steepness, t_end, speed=0.0):
     """A body on an incline of `steepness`, in parts of the friction coefficient, thrown up it with `speed`."""
     angle = np.arctan(steepness * MU)
     body = pf.Body(

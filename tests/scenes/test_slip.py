@@ -1,7 +1,5 @@
 """When contacts slip, against closed forms and against what the scene does to them."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -172,7 +172,7 @@ def test_files_that_are_no_solutions_get_one_line(tmp_path):
 # ---------------------------------------------------------------------- damage
 
 
-def damaged(content: bytes, random: np.random.Generator) -> bytes:
+def damaged(content, random):
     """The content with one kind of damage somewhere: bits, bytes, a lost end, a lost or repeated block, noise."""
     kind = random.integers(6)
     place = int(random.integers(len(content)))

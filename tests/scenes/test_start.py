@@ -1,7 +1,5 @@
 """Initial states of bristles: under the load of a body that stands still, or as in steady sliding."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -22,7 +20,7 @@ BRUSHED = PATCH.with_friction_metric(pf.friction_metric(0.3, 0.7, 1.0), (0.2, 0.
 WEIGHT = 0.2 * 9.81
 
 
-def model_name(model) -> str:
+def model_name(model):
     return f"{type(model).__name__}-{model.state_shape}-{model.patch.name}-{model.law.elasto_plastic is not None}"
 
 
@@ -44,7 +42,7 @@ MODELS = [
 ]
 
 
-def held(model, load: float = 6.0, **more) -> pf.Scene:
+def held(model, load=6.0, **more):
     """A plate that the grip holds off its centre of mass."""
     scene = pf.scenes.in_hand(
         model, centre_of_mass=(0.015, 0.0), normal_force=load, t_end=0.1
@@ -189,7 +187,7 @@ def test_starts_that_make_no_sense_are_refused():
         dataclasses.replace(driven, start="equilibrium")
 
 
-def held_by_two(change: str = "", by: float = 0.0) -> pf.Scene:
+def held_by_two(change="", by=0.0):
     """A plate in equilibrium on two pads, some of whose cells are bent as far as they can be, that then slips."""
     more = {name: by * (name == change) for name in ("grip", "push", "mass")}
     grip = pf.Signal([0.0, 0.02, 0.06], [2.6 + more["grip"], 1.0, 3.6], "linear")
@@ -214,7 +212,7 @@ def test_derivatives_follow_an_equilibrium():
         held_by_two(), ("mass", "inertia"), signals=knots
     )
 
-    def end(change: str, by: float) -> np.ndarray:
+    def end(change, by):
         histories = pf.simulate(
             held_by_two(change, by), rtol=1e-10, atol=1e-10
         ).histories

@@ -1,7 +1,5 @@
 """Pivoting, the turning foot and the curling stone against closed forms, published numbers and Coulomb's equations."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -29,7 +27,7 @@ FINGERTIP = pf.ContactPatch.disc(
 )
 
 
-def held_torque(load: float) -> float:
+def held_torque(load):
     """Torque [N m] that two Hertz contacts of 6 mm at 1 N hold in a spin, mu = 1: r is 3 pi/16 of their radius."""
     return 2.0 * load * 3.0 * math.pi / 16.0 * 0.006 * load ** (1.0 / 3.0)
 
@@ -96,7 +94,7 @@ def test_a_grip_holds_from_the_load_that_the_torque_needs(share, holds):
 PAD = pf.ContactPatch.disc(0.03, 15)
 
 
-def yaw_bound(share: float, length: float = 0.16) -> float:
+def yaw_bound(share, length=0.16):
     """Largest torque without a force [N m] of both pads, mu = 1: least dissipation of a unit spin about any point."""
     middle = np.array([0.5 * length, 0.0])
     cells = np.concatenate([PAD.positions - middle, PAD.positions + middle])
@@ -164,7 +162,7 @@ def test_a_foot_has_two_patches_and_shares_its_weight():
 # ---------------------------------------------------------------------- curling stones and discs
 
 
-def ring_friction(v: float, u: float) -> tuple[float, float]:
+def ring_friction(v, u):
     """Force and torque/R of a ring, mu f_N = 1, that slides with v and turns with the rim speed u: d Phi/dv, d Phi/du.
 
     `Phi = (2/pi)(v + u) E(m)`, `m = 4 v u/(v + u)^2`.
@@ -177,7 +175,7 @@ def ring_friction(v: float, u: float) -> tuple[float, float]:
     return (big + small) / (math.pi * v), (big - small) / (math.pi * u)
 
 
-def annulus_friction(v: float, u: float, inner: float = 0.0) -> tuple[float, float]:
+def annulus_friction(v, u, inner=0.0):
     """The same of a uniform annulus from `inner` R to R: rings weighed with their radius."""
     area = 0.5 * (1.0 - inner**2)
     at = [v / u] if inner < v / u < 1.0 else None
@@ -190,7 +188,7 @@ def annulus_friction(v: float, u: float, inner: float = 0.0) -> tuple[float, flo
     )
 
 
-def terminal_ratio(gyration: float, inner: float = 0.0) -> float:
+def terminal_ratio(gyration, inner=0.0):
     """v/(omega R) [-] that stays as it is while both stop: `F/v = T/(gyration^2 u)`."""
 
     def drift(ratio):
@@ -200,9 +198,7 @@ def terminal_ratio(gyration: float, inner: float = 0.0) -> float:
     return brentq(drift, 0.02, 50.0)
 
 
-def ratios(
-    patch, gyration: float, start: float, kind=pf.DistributedModel
-) -> tuple[np.ndarray, np.ndarray]:
+def ratios(patch, gyration, start, kind=pf.DistributedModel):
     """Speed [m/s] and v/(omega R) [-] of a slide that starts with v = 1 m/s; R is 0.04 m."""
     law = pf.LuGre(mu_c=0.2, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
     inertia = (0.04 * gyration) ** 2

@@ -1,7 +1,5 @@
 """The structured solver: its linear algebra, order, stops, dense output, statistics and outcomes."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -32,7 +30,7 @@ def _solve(system, piece, since, y, shift, r, dy, out):
     call(own.solve, (system, piece, since, y, shift, r, out))
 
 
-def free_scene() -> pf.Scene:
+def free_scene():
     """Two kinds of contact, on the world and on the body, displaced, turned, counted twice, with changing loads."""
     plain = pf.LuGre(mu_c=0.5, mu_s=0.7, v_s=0.02, sigma_0=1e4, sigma_1=20.0, gamma=1.5)
     contacts = [
@@ -53,7 +51,7 @@ def free_scene() -> pf.Scene:
     )
 
 
-def moving_scene() -> pf.Scene:
+def moving_scene():
     """The same, on a finger that moves and turns and over a turntable that speeds up."""
     scene = free_scene()
     finger, foot, pad = scene.contacts
@@ -69,7 +67,7 @@ def moving_scene() -> pf.Scene:
     )
 
 
-def driven_scene() -> pf.Scene:
+def driven_scene():
     twist = pf.Signal.sampled(
         [0.0, 1.0], [[0.01, 0.002, 0.3], [0.02, -0.01, 1.0]], hold="linear"
     )
@@ -94,7 +92,7 @@ def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
         y[-6:-3] = scene.velocity(0.0)
     dy = np.empty_like(y)
 
-    def rate(state: np.ndarray) -> np.ndarray:
+    def rate(state):
         out = np.empty_like(state)
         right_hand_side(system.address, 0, 0.3, state, out)
         return out
@@ -115,7 +113,7 @@ def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
         np.testing.assert_allclose(out / scale, expected / scale, rtol=0.0, atol=2e-5)
 
 
-def smooth_scene() -> pf.Scene:
+def smooth_scene():
     """Soft bristles, a slow Stribeck curve and linear inputs: sliding and spinning without a stop."""
     law = pf.LuGre(mu_c=0.4, mu_s=0.6, v_s=0.3, sigma_0=2e3, sigma_1=5.0, sigma_2=0.3)
     load = pf.Signal.sampled([0.0, 0.4], [6.0, 14.0], hold="linear")
@@ -128,9 +126,7 @@ def smooth_scene() -> pf.Scene:
     return pf.Scene(moving, [contact], 0.4, force=force)
 
 
-def observed_order(
-    scene: pf.Scene, method, coarse: float, fine: float, reference: pf.Solution
-) -> float:
+def observed_order(scene, method, coarse, fine, reference):
     """Slope of error against number of steps between two tolerances."""
     errors = []
     steps = []
@@ -171,7 +167,7 @@ def test_agrees_with_another_integrator():
     packed = SegmentBatches(scene, 0.02, most=MOST_PIECES)
     system = next(iter(packed))
 
-    def rate(t: float, y: np.ndarray) -> np.ndarray:
+    def rate(t, y):
         out = np.empty(len(y))
         right_hand_side(system.address, 0, t, np.ascontiguousarray(y), out)
         return out
@@ -193,7 +189,7 @@ def test_turning_the_whole_scene_turns_the_solution():
     turn = lambda vector: pf.geometry.rotate(np.asarray(vector, dtype=float), angle)
     model = pf.DistributedModel(SMALL, ELASTIC)
 
-    def run(rotate) -> pf.Solution:
+    def run(rotate):
         turned = rotate is turn
         start = pf.Body(
             0.3,
@@ -408,7 +404,7 @@ def test_a_run_ends_after_max_steps_and_keeps_what_is_done():
 
 
 def test_interruption_keeps_what_is_done():
-    def stop(time: float) -> None:
+    def stop(time):
         if time > 0.3:
             raise KeyboardInterrupt
 

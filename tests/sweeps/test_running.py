@@ -37,11 +37,11 @@ FRESH = multiprocessing.get_context("spawn")
 GRIPS, MASSES = [1.0, 2.0, 3.0], [0.1, 0.2]
 
 
-def grip(grip: float, mass: float = 0.2, t_end: float = 0.03) -> pf.Scene:
+def grip(grip, mass=0.2, t_end=0.03):
     return pf.scenes.in_hand(MODEL, normal_force=grip, mass=mass, t_end=t_end)
 
 
-def end(solution: pf.Solution) -> dict[str, float]:
+def end(solution):
     return {
         name: each.values[-1]
         for name, each in solution.histories.items()
@@ -49,7 +49,7 @@ def end(solution: pf.Solution) -> dict[str, float]:
     }
 
 
-def crossed(grip: float, mass: float) -> pf.Scene:
+def crossed(grip, mass):
     """Fails in the solver's input where both are large."""
     return pf.scenes.in_hand(
         MODEL, normal_force=grip if grip + mass < 3.0 else -grip, t_end=0.02
@@ -118,7 +118,7 @@ def test_a_measurement_is_what_it_returns():
 
 
 def test_runs_of_different_length_share_their_instants():
-    def slide(speed: float, t_end: float) -> pf.Scene:
+    def slide(speed, t_end):
         return pf.scenes.free_slide(
             MODEL, twist=(speed, 0.0, 0.0), t_end=t_end, save_every=0.01
         )
@@ -137,7 +137,7 @@ def test_runs_of_different_length_share_their_instants():
 
 
 def test_values_of_any_kind_have_labels():
-    def with_model(model: pf.ReducedModel, kind: str, load: int) -> pf.Scene:
+    def with_model(model, kind, load):
         assert type(load) is int and isinstance(model, pf.ReducedModel)
         return dataclasses.replace(
             pf.scenes.in_hand(model, normal_force=load, t_end=0.01), name=kind
@@ -161,7 +161,7 @@ def test_values_of_any_kind_have_labels():
 
 
 def test_equal_scenes_are_one_run_and_others_are_others():
-    def digest(scene: pf.Scene, measure=None) -> str:
+    def digest(scene, measure=None):
         return keys.Keys(measure, kept=False).key(scene)
 
     scene = grip(2.0)
@@ -197,7 +197,7 @@ def test_equal_scenes_are_one_run_and_others_are_others():
     assert digest(scene, end) != digest(scene)
 
 
-def measure_in(file: Path, lines: str):
+def measure_in(file, lines):
     """Return the function `measure` of a file with these lines."""
     file.write_text(lines)
     linecache.checkcache()
@@ -225,7 +225,7 @@ def test_a_measurement_counts_by_its_name_and_source(tmp_path):
 def test_runs_of_a_nameless_measurement_are_not_kept(tmp_path):
     """They could not be found again; in memory it may be anything."""
 
-    def near(limit: float):
+    def near(limit):
         return lambda solution: float(solution.histories["y"].values[-1] < limit)
 
     for nameless in (near(1.0), functools.partial(end), lambda solution: 1.0):
@@ -243,7 +243,7 @@ def test_runs_of_a_model_that_files_do_not_know_are_not_kept(tmp_path):
     class Mine(pf.DistributedModel):
         """A class that is not registered."""
 
-    def make(grip: float) -> pf.Scene:
+    def make(grip):
         return pf.scenes.in_hand(Mine(PATCH, LAW), normal_force=grip, t_end=0.01)
 
     assert (
@@ -260,15 +260,15 @@ def test_a_run_of_another_library_does_not_count(tmp_path, monkeypatch):
     assert found(tmp_path, [1.0]) == 0
 
 
-def found(folder: Path, grips: list[float], **options) -> int:
+def found(folder, grips, **options):
     """Return the number of runs that a folder of a sweep holds."""
-    told: list[sweeps.Progress] = []
+    told = []
     pf.sweep(grip, {"grip": grips}, out=folder, progress=told.append, **options)
     assert told[-1].done == told[-1].runs == len(grips)
     return told[-1].found
 
 
-def kept(folder: Path) -> dict[str, records.Record]:
+def kept(folder):
     """Return the runs in the files of a folder, by their keys."""
     runs = {}
     for file in folder.glob("runs-*.npz"):
@@ -282,7 +282,7 @@ def kept(folder: Path) -> dict[str, records.Record]:
 def test_a_sweep_goes_on_where_another_has_ended(tmp_path):
     values = {"grip": GRIPS, "mass": MASSES}
     pf.sweep(grip, {"mass": MASSES, "grip": GRIPS[:2]}, out=tmp_path)
-    told: list[sweeps.Progress] = []
+    told = []
     data = pf.sweep(grip, values, out=tmp_path, progress=told.append)
     assert data.identical(reference())  # whichever came from files
     assert told[-1][:5] == (6, 6, 4, 0, 0) and str(told[-1]) == "6 of 6 runs (4 found)"
@@ -322,7 +322,7 @@ def test_damaged_files_do_not_count(tmp_path):
     content[len(content) // 2] ^= 1
     changed.write_bytes(bytes(content))
     (tmp_path / ".planarfriction-0123.part").write_bytes(whole.read_bytes()[:100])
-    told: list[sweeps.Progress] = []
+    told = []
     again = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path, progress=told.append)
     assert (
         told[-1].found == 1
@@ -382,7 +382,7 @@ def test_failures_are_recorded_with_reason_and_scene_and_are_no_end(tmp_path):
         data.failure.values[2, 0]
     )
 
-    def picky(solution: pf.Solution) -> float:
+    def picky(solution):
         if solution.histories["normal_force"].values[-1, 0] == 2.0:
             raise ValueError("two\nis bad")
         return 1.0
@@ -420,7 +420,7 @@ def test_a_run_that_worked_at_last_is_no_failure_any_more(tmp_path, monkeypatch)
 
 
 def test_what_does_not_fit_the_first_run_is_a_failure():
-    def uneven(solution: pf.Solution) -> dict:
+    def uneven(solution):
         return {
             "a": np.zeros(
                 2 if solution.histories["normal_force"].values[-1, 0] < 3.0 else 3
@@ -436,7 +436,7 @@ def test_what_does_not_fit_the_first_run_is_a_failure():
     assert data.a[2].isnull().all()
 
 
-MEASURED: list[pf.Solution] = []
+MEASURED = []
 """Solutions that were measured: a measurement of kept runs uses no values from around it."""
 
 
@@ -444,17 +444,17 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
     """In this process, in its main thread, while threads work."""
     main = threading.main_thread().ident
 
-    def press(progress: sweeps.Progress) -> None:
+    def press(progress):
         if progress.done >= 2 and not pressed:
             pressed.append(progress.done)
             signal.pthread_kill(main, signal.SIGINT)
 
-    def slow(solution: pf.Solution) -> dict[str, float]:
+    def slow(solution):
         time.sleep(0.3)  # so that progress is asked for in between
         MEASURED.append(solution)
         return end(solution)
 
-    pressed: list[int] = []
+    pressed = []
     MEASURED.clear()
     values = {"grip": np.linspace(1.0, 2.0, 40)}
     with pytest.raises(SweepInterrupted) as stop:
@@ -474,7 +474,7 @@ pf.sweep(t.grip, {"grip": np.linspace(1.0, 3.0, int(sys.argv[2]))}, out=sys.argv
 """
 
 
-def kill_on_the_way(folder: Path, runs: int, after: int) -> int:
+def kill_on_the_way(folder, runs, after):
     """Begin a sweep in another process, kill it when some runs are there; returns how many there are then.
 
     That they are found afterwards shows too that digests are the same in every process.
@@ -499,7 +499,7 @@ def kill_on_the_way(folder: Path, runs: int, after: int) -> int:
     return len(kept(folder))
 
 
-def after_a_kill(folder: Path, runs: int, after: int) -> None:
+def after_a_kill(folder, runs, after):
     there = kill_on_the_way(folder, runs, after)
     assert after <= there < runs
     grips = np.linspace(1.0, 3.0, runs).tolist()
@@ -538,7 +538,7 @@ def test_long_sweeps_have_few_files(tmp_path, monkeypatch):
 
 
 def test_a_ctrl_c_while_a_result_is_collected_ends_the_sweep(monkeypatch, tmp_path):
-    asked: list[concurrent.futures.Future] = []
+    asked = []
 
     def pressed(ask):
         def answer(future, timeout=None):
@@ -571,7 +571,7 @@ def test_any_executor_gives_the_same_bits():
 class Handed(concurrent.futures.ThreadPoolExecutor):
     """Records how many scenes it is handed at a time, and refuses to hand on one of them."""
 
-    def __init__(self, refused: float = 0.0) -> None:
+    def __init__(self, refused=0.0):
         super().__init__(1)
         self.batches: list[int] = []
         self._refused = refused
@@ -588,7 +588,7 @@ class Handed(concurrent.futures.ThreadPoolExecutor):
         return super().submit(function, batch)
 
 
-def late(solution: pf.Solution) -> dict[str, float]:
+def late(solution):
     """Take longer for the last runs than a worker keeps results to itself."""
     if solution.histories["normal_force"].values[-1, 0] > 2.0:
         time.sleep(1.1 * records.TURN)
@@ -627,7 +627,7 @@ def test_batches_become_smaller_towards_the_end():
 class Silent(concurrent.futures.Executor):
     """Tells no number of workers, and does nothing before it is asked to; records how much it holds."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.held: list[tuple] = []
         self.batches: list[int] = []
         self.ended = False
@@ -638,7 +638,7 @@ class Silent(concurrent.futures.Executor):
         self.batches.append(len(batch.scenes))
         return future
 
-    def work(self) -> None:
+    def work(self):
         """Do what is held, the first of it after a while in which nothing more comes."""
         count = -1
         while count < len(self.held):
@@ -681,7 +681,7 @@ def test_what_cannot_be_sent_fails_alone():
     assert data.failure.sel(grip=3.0) == "TypeError: cannot pickle it"
 
 
-def leave(solution: pf.Solution) -> float:
+def leave(solution):
     os._exit(1)
 
 
@@ -705,7 +705,7 @@ def test_processes_give_the_same_bits_take_no_lambda_and_may_die(tmp_path):
 def test_a_run_is_what_its_scene_gives_alone():
     """Parts that are kept from run to run belong to the run that uses them."""
 
-    def make(mu: float, size: float, load: float) -> pf.Scene:
+    def make(mu, size, load):
         model = pf.ReducedModel(
             pf.ContactPatch.disc(size, cells=11), pf.LuGre(mu_c=mu, mu_s=1.2 * mu)
         )
@@ -728,12 +728,12 @@ def test_models_are_built_once_for_equal_scenes():
     """A `make_scene` that makes a new model for every run shares its maps all the same."""
     seen = set()
 
-    def make(grip: float) -> pf.Scene:
+    def make(grip):
         return pf.scenes.in_hand(
             pf.ReducedModel(PATCH, LAW, cells=8), normal_force=grip, t_end=0.01
         )
 
-    def look(solution: pf.Solution) -> float:
+    def look(solution):
         seen.add(id(solution.scene.contacts[0].model))
         return 0.0
 

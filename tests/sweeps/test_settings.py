@@ -1,7 +1,5 @@
 """Values of scenes by dotted path, as `--set` spells them, and the command `sweep`."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 
@@ -41,7 +39,7 @@ SMALL = '{ kind = "reduced", cells = 8 }'
 
 
 @pytest.fixture
-def file(tmp_path, monkeypatch) -> str:
+def file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(SCENE.format(model=SMALL))
     return "scene.toml"
@@ -160,7 +158,7 @@ def test_run_takes_values_of_files_and_of_ready_scenes(file):
     assert list(by_label) == ["distributed"]
 
 
-def fails(capsys, *arguments: str) -> str:
+def fails(capsys, *arguments):
     assert main(arguments) == 2
     captured = capsys.readouterr()
     assert (

@@ -1,7 +1,5 @@
 """Sweeps beside what the extra [sweep] brings: datasets as zarr stores, and a dask cluster that loses a worker."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time
@@ -21,7 +19,7 @@ pytestmark = pytest.mark.sweep
 VALUES = {"grip": GRIPS, "mass": MASSES}
 
 
-def stored(data, path: Path):
+def stored(data, path):
     """Return a dataset as xarray reads it from the zarr store that it has written."""
     pytest.importorskip(
         "zarr", reason="needs zarr: pip install 'planarfriction[sweep]'"
@@ -32,7 +30,7 @@ def stored(data, path: Path):
     return xr.open_zarr(path, consolidated=False)
 
 
-def same(there, data) -> None:
+def same(there, data):
     """Check that a store holds the data of a sweep."""
     assert set(there.variables) == set(data.variables)
     for name, each in data.variables.items():
@@ -60,7 +58,7 @@ def test_a_folder_becomes_a_store_finished_or_not(tmp_path, measure):
     )
 
 
-def slow_end(solution: pf.Solution) -> dict[str, float]:
+def slow_end(solution):
     time.sleep(0.02)
     return end(solution)
 
@@ -70,9 +68,9 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path):
         "distributed", reason="needs dask: pip install 'planarfriction[sweep]'"
     )
     values = {"grip": np.linspace(1.0, 3.0, 60)}
-    killed: list[int] = []
+    killed = []
 
-    def kill(progress: sweeps.Progress) -> None:
+    def kill(progress):
         if progress.done >= 5 and not killed:
             killed.append(next(iter(cluster.workers.values())).process.pid)
             os.kill(killed[0], signal.SIGKILL)

@@ -3,8 +3,6 @@
 Points and discs with a friction metric and with asymmetric friction too, whose bristles are the same source.
 """
 
-from __future__ import annotations
-
 import functools
 import importlib
 
@@ -23,7 +21,7 @@ DT = 1e-4
 
 
 @functools.cache
-def patch(kind: str) -> pf.ContactPatch:
+def patch(kind):
     found = pf.ContactPatch.from_pressure(PRESSURE, 0.002)
     if "turned" in kind:
         found = found.with_friction_metric(METRIC)
@@ -40,7 +38,7 @@ class Torch:
 
     name = "torch"
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.library = pytest.importorskip("torch")
         self.models = importlib.import_module("planarfriction.torch")
         self.double = self.library.float64
@@ -72,7 +70,7 @@ class Jax:
 
     name = "jax"
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.library = pytest.importorskip("jax")
         self.models = importlib.import_module("planarfriction.jax")
 

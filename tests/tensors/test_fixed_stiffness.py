@@ -1,7 +1,5 @@
 """Stiffness that does not grow with the load in PyTorch and JAX: values of NumPy's models, slopes by differences."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

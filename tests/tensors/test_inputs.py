@@ -1,7 +1,5 @@
 """Wrong input to steps and rollouts of PyTorch and JAX: refused in one line, or friction that never drives."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -67,7 +65,7 @@ def refuses(call, name, rule):
 class Torch:
     """The front end of PyTorch."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.torch = pytest.importorskip("torch", reason="needs PyTorch")
         import planarfriction.torch as front
 
@@ -93,7 +91,7 @@ class Torch:
 class Jax:
     """The front end of JAX."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.jax = pytest.importorskip("jax", reason="needs JAX")
         self.jax.config.update("jax_enable_x64", True)
         import planarfriction.jax as front

@@ -1,7 +1,5 @@
 """Arrays with a mask that masks nothing are plain numbers."""
 
-from __future__ import annotations
-
 import importlib
 
 import numpy as np

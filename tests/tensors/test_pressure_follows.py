@@ -1,7 +1,5 @@
 """Steps of JAX whose pressure follows the moments of the load: those of NumPy, with derivatives by the moments."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The reduced model in PyTorch and JAX: the numbers of NumPy's, and one line for the options that it had."""
 
-from __future__ import annotations
-
 import importlib
 
 import pytest

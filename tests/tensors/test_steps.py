@@ -1,7 +1,5 @@
 """The tensor floor: it imports neither PyTorch nor JAX, and any array library can take its steps."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -27,7 +25,7 @@ NUMPY = Namespace(
 )
 
 
-def contact_of(kind: str):
+def contact_of(kind):
     """Return the equations of a model, its contact over NumPy, and the model itself."""
     numbers = LAW_OF_TEST.numbers
     if kind == "distributed":

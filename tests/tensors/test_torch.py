@@ -1,7 +1,5 @@
 """The PyTorch modules: closed forms, agreement with the NumPy models, valid ranges, gradients at and off the kinks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -175,22 +173,6 @@ def test_a_patch_that_depends_on_the_load_keeps_its_surface_s_shape():
     )
     with pytest.raises(pf.FrictionError, match="normal_force must be"):
         DistributedModel(patch, PLAIN)
-
-
-@every_surface
-def test_float32_is_as_close_as_its_digits(surface):
-    state, twist, load = samples(40, np.random.default_rng(5))
-    # Off the steep part of the Stribeck curve.
-    twist[9:] *= 0.1 / np.linalg.norm(twist[9:], axis=1, keepdims=True)
-    single = reduced(surface=surface, dtype=torch.float32)
-    z, wrench = single.step(*(tensor(a).float() for a in (state, twist, load)), 1e-4)
-    assert z.dtype == wrench.dtype == torch.float32
-    exact = reduced(surface=surface).step(
-        tensor(state), tensor(twist), tensor(load), 1e-4
-    )[1]
-    assert (
-        (wrench - exact).abs().max() / exact.abs().max()
-    ).item() < 2e-4  # 1e-7 times steep slopes
 
 
 # ---------------------------------------------------------------------------------------- parameters

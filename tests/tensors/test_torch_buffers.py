@@ -1,7 +1,5 @@
 """Buffers of PyTorch modules: each module holds its own numbers of its patch, for every method and in state dicts."""
 
-from __future__ import annotations
-
 import copy
 import functools
 
@@ -46,13 +44,11 @@ every_way = pytest.mark.parametrize(
 )
 
 
-def module(
-    kind: str, patch: pf.ContactPatch = PATCH, law: pf.LuGre = ELASTIC, **options
-):
+def module(kind, patch=PATCH, law=ELASTIC, **options):
     return MODELS[kind](patch, law, **{"dtype": torch.float64, **options})
 
 
-def twists() -> torch.Tensor:
+def twists():
     t = 1e-4 * torch.arange(T, dtype=torch.float64)
     return torch.stack(
         [
@@ -64,7 +60,7 @@ def twists() -> torch.Tensor:
     )
 
 
-def wrenches(model, method: str) -> torch.Tensor:
+def wrenches(model, method):
     return rollout(model, None, twists(), 2.0, 1e-4, method=method).wrenches
 
 
@@ -115,16 +111,16 @@ def test_models_that_are_stacked_keep_each_its_own_patch(kind, method):
 class _Run(torch.nn.Module):
     """A rollout as what a module does."""
 
-    def __init__(self, model, method: str) -> None:
+    def __init__(self, model, method):
         super().__init__()
         self.model = model
         self.method = method
 
-    def forward(self) -> torch.Tensor:
+    def forward(self):
         return wrenches(self.model, self.method)
 
 
-def _inside(values: dict) -> dict:
+def _inside(values):
     return {f"model.{name}": value for name, value in values.items()}
 
 
@@ -133,7 +129,7 @@ def test_the_adjoint_of_stacked_models_takes_shared_inputs():
     parameters, buffers = torch.func.stack_module_state(models)
 
     class Run(torch.nn.Module):
-        def __init__(self, model) -> None:
+        def __init__(self, model):
             super().__init__()
             self.model = model
 

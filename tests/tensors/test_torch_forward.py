@@ -1,7 +1,5 @@
 """Forward mode and second derivatives of PyTorch rollouts: the adjoint forwards, or one line that says what else."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -26,14 +24,14 @@ T = 8
 every_model = pytest.mark.parametrize("kind", ["reduced", "published", "smooth table"])
 
 
-def module(kind: str):
+def module(kind):
     if kind == "reduced":
         return ReducedModel(PATCH, LAW, cells=9, dtype=torch.float64)
     surface = pf.LimitSurfaceTable(PATCH) if kind == "smooth table" else None
     return ReducedModelPublished(PATCH, LAW, surface, dtype=torch.float64)
 
 
-def inputs(model) -> tuple[torch.Tensor, ...]:
+def inputs(model):
     """State, twists, loads and parameters."""
     t = 1e-4 * torch.arange(T, dtype=torch.float64)
     twists = torch.stack(
@@ -53,7 +51,7 @@ def inputs(model) -> tuple[torch.Tensor, ...]:
     return state, twists, 1.0 + torch.cos(500 * t), model.physical().detach()
 
 
-def wrenches(model, method: str):
+def wrenches(model, method):
     return lambda *given: (
         rollout(model, *given[:3], 1e-4, parameters=given[3], method=method).wrenches
     )

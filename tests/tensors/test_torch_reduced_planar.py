@@ -1,7 +1,5 @@
 """The paper's model built from numbers: the NumPy values, true gradients, the right torque, scripts that run."""
 
-from __future__ import annotations
-
 import inspect
 
 import numpy as np
@@ -40,7 +38,6 @@ SURFACES = {
     "cells": pf.LimitSurfaceCells(LOPSIDED),
     "published": pf.LimitSurfaceTablePublished(LOPSIDED),
 }
-every_surface = pytest.mark.parametrize("surface", SURFACES.values(), ids=SURFACES)
 
 
 def tensor(value):
@@ -180,50 +177,6 @@ def test_equals_the_numpy_model(surface):
         state, wrench = reference.step(state, twist, 2.0, 1e-3)
         wrenches.append(wrench)
     assert_equal([simulate(model, profile(50), 2.0, 1e-3)], [np.array(wrenches)])
-
-
-@pytest.mark.parametrize("surface", [None, *SURFACES.values()], ids=["none", *SURFACES])
-def test_bristles_of_steady_sliding_rest(surface):
-    model = build(radius=0.03, surface=surface)
-    x, y = (0.0, 0.0) if surface is None else LOPSIDED.centre_of_pressure()
-    _, twist, _ = samples()
-    vx, vy, omega = twist.T
-    at_centre = np.stack([vx - omega * y, vy + omega * x, 0.03 * omega], -1)
-    z = model.steady_state_z(tensor(at_centre))
-    speed = np.linalg.norm(at_centre, axis=1)
-    rate = model.bristle_rate(z, tensor(twist)).detach().numpy() / [1.0, 1.0, 0.03]
-    # the difference of two speeds that are equal to rounding
-    assert (np.abs(rate).max(axis=1) <= 1e-14 * speed).all()
-    g = 0.7 + 0.2 * np.exp(-((speed / 2e-3) ** 1.7))
-    np.testing.assert_allclose(model.g(tensor(speed)).detach(), g, rtol=1e-12)
-    np.testing.assert_allclose(model.g(tensor(-speed)).detach(), g, rtol=1e-12)
-    if surface is None:
-        wanted = (
-            at_centre
-            / np.where(speed > 0.0, speed, 1.0)[:, None]
-            * (g / 2e5)[:, None]
-            * [1.0, 1.0, 0.03]
-        )
-        assert_equal([z], [wanted])
-
-
-@pytest.mark.parametrize("surface", [None, *SURFACES.values()], ids=["none", *SURFACES])
-@pytest.mark.parametrize("radius", [0.05, 0.004])
-def test_the_steady_torque_of_a_spin_is_bounded(surface, radius):
-    # A published snippet forgets one factor r: it gives 1 N m where 0.05 N m is the bound.
-    model = build(mu_c=1.0, mu_s=1.2, sigma_2=0.0, radius=radius, surface=surface)
-    f_n = 2.0
-    x, y = (0.0, 0.0) if surface is None else LOPSIDED.centre_of_pressure()
-    for speed in (1e-4, 2e-3, 1.0):  # of the rim, r omega
-        omega = speed / radius
-        # About the centre of pressure.
-        spin = tensor([omega * y, -omega * x, omega]).expand(60, 3)
-        fx, fy, tau = simulate(model, spin, f_n, 1.0)[-1].tolist()
-        torque = tau - (x * fy - y * fx)
-        assert abs(torque) <= 1.2 * f_n * radius * (1 + 1e-9)
-        g = 1.0 + 0.2 * np.exp(-((speed / 2e-3) ** 1.7))
-        # that of a spin is g f_n r whatever the surface; the smooth table interpolates it at its pole to rounding
-        assert torque == pytest.approx(-g * f_n * radius, rel=1e-6)
 
 
 # ---------------------------------------------------------------------------------------- size

@@ -1,7 +1,5 @@
 """Rollouts of the PyTorch modules: eager against the adjoint, batches, training, clear refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -207,21 +205,6 @@ def test_vmap(method):
     rows = parameters.clone().requires_grad_()
     wrenches(rows)[1, 5, 2].backward()
     torch.testing.assert_close(jacobian[1, 5, 2], rows.grad, rtol=1e-9, atol=1e-15)
-
-
-def test_float32_goes_through_the_adjoint():
-    single = reduced(dtype=torch.float32)
-    double = reduced()
-    v, _ = profile(40)
-    wrenches = rollout(single, None, tensor(v).float(), 1.0, DT).wrenches
-    assert wrenches.dtype == torch.float32
-    exact = rollout(double, None, tensor(v), 1.0, DT).wrenches
-    torch.testing.assert_close(wrenches.double(), exact, rtol=1e-4, atol=1e-4)
-    wrenches.square().sum().backward()
-    exact.square().sum().backward()
-    for a, b in zip(single.parameters(), double.parameters(), strict=True):
-        assert a.grad.dtype == torch.float32
-        assert a.grad.item() == pytest.approx(b.grad.item(), rel=1e-2, abs=1e-3)
 
 
 def test_gradients_to_raw_parameters_agree_with_central_differences():

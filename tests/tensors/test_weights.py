@@ -1,7 +1,5 @@
 """Gradients of compiled rollouts to the weights of cells in PyTorch and JAX, and patches of trained weights."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

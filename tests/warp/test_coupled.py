@@ -1,7 +1,5 @@
 """The step in contact space as a Warp kernel against the compiled one, on Warp's CPU device."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -13,7 +11,6 @@ from tests.support.coupling_problems import (
     SHAPES,
     abrupt_run,
     random_bodies,
-    random_law,
     random_run,
 )
 
@@ -198,37 +195,6 @@ def test_fixed_stiffness():
         pf.FrictionError, match="moments must be None for a law with a reference_load"
     ):
         kernel.step(kernel.rest(), given(wp.float32, host), 1e-3, kernel.results())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("dtype", KINDS, ids=["double", "float"])
-def test_many(dtype, seed):
-    generator = np.random.default_rng(seed)
-    kinds = pf.ReducedModel, pf.ReducedModelPublished
-    patches = CoupledPatches(
-        [
-            kinds[generator.integers(2)](
-                SHAPES[generator.integers(3)], random_law(generator)
-            )
-            for _ in range(1 + seed)
-        ]
-    )
-    runs = both_runs(patches, 500, 25, seed=10 + seed)
-    tolerance = 1e-13 if dtype is wp.float64 else 1e-9
-    error, residual, speed, both, own, _ = statistics(patches, dtype, runs, tolerance)
-    if dtype is wp.float64:
-        assert (both > 0).mean() > 0.999 and np.quantile(error[both > 0], 0.999) < 1e-9
-    else:
-        assert (own > 0).mean() > 0.999 and (
-            residual <= 1e-5 * speed + 1e-9
-        ).mean() > 0.999
-    print(
-        np.quantile(error[both > 0], [0.5, 0.9, 0.99, 0.999, 1.0]),
-        (own == 0).sum(),
-        (both == 0).sum(),
-        len(own),
-    )
 
 
 def test_lost():

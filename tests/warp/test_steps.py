@@ -81,13 +81,6 @@ def test_steps(name, dtype):
     assert np.quantile(error, 0.999) < (1e-12 if dtype is wp.float64 else 1e-5)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MODELS)
-def test_million_steps(name):
-    error = errors(MODELS[name](), wp.float32, 10_000, 100)
-    assert np.quantile(error, 0.999) < 1e-5 and error.max() < 1e-3
-
-
 # ---------------------------------------------------------------------- parameters
 
 
