@@ -288,19 +288,22 @@ LEAST_MU = 0.52 * np.exp(-3.0902 * 0.32)
 
 
 @pytest.mark.parametrize("make", KINDS.values(), ids=KINDS)
-@pytest.mark.parametrize("absent", ["wrench", "load", "frozen load", "weight"])
+@pytest.mark.parametrize(
+    "absent", ["wrench", "load", "frozen load", "frozen slip", "weight"]
+)
 def test_an_absent_measurement_keeps_the_load_and_raises_the_grip(
     observer, make, absent
 ):
-    """A wrench or a load that is not there, a load that does not follow the grip, a wrench below half of the weight."""
+    """What is not there; a load that does not follow the grip, a frozen velocity, a wrench below half of the weight."""
     control = make(observer)
     wrench = {"wrench": (0.0, np.nan, 0.0), "weight": (0.0, 0.45, 0.0)}.get(
         absent, (0.0, 1.0, 0.0)
     )
+    velocity = (0.0, -2e-3 * (absent == "frozen slip"), 0.0)
     sample = {
-        "seen": int(absent in ("frozen load", "weight")),
+        "seen": int(absent not in ("wrench", "load")),
         "slip": 0.0,
-        "velocity": 0.0,
+        "velocity": velocity,
         "wrench": wrench,
     }
     known = {
@@ -313,6 +316,7 @@ def test_an_absent_measurement_keeps_the_load_and_raises_the_grip(
         "grip": 8.0,
     }
     known |= {
+        "usual": 2.0,
         "felt": 4.0,
         "sent": 8.0 if absent != "frozen load" else 12.0,
         "still": 0.2,
@@ -333,6 +337,43 @@ def test_the_grip_does_not_fall_while_a_measurement_is_absent(observer):
     assert gripped(
         hold, {"slip": 0.0}, load=2.0, lately=2.0, weight=2.0
     ) == pytest.approx(10.0 * np.exp(-1e-3))
+
+
+@pytest.mark.parametrize(
+    "spin, usual, absent", [(0.1, 2.0, True), (3.0, 2.0, False), (0.1, 1.4, False)]
+)
+def test_a_part_that_loses_a_third_of_its_load_slips_fast_or_a_sensor_is_wrong(
+    observer, spin, usual, absent
+):
+    """1 N on a part that slips at 0.5 or 15 mm/s, and needs a half or two thirds of the grip that it needed of late."""
+    turn = TurnBy(observer, -0.8)
+    gripped(
+        turn,
+        {"slip": 0.0},
+        velocity=(0.0, 0.0, -spin),
+        usual=usual,
+        pressed=4.0,
+        lately=2.0,
+    )
+    assert (turn.state["mute"] > 0.0).tolist() == [absent]
+
+
+@pytest.mark.parametrize("span, overdue", [(0.018, False), (0.022, True)])
+def test_the_grip_does_not_fall_while_a_slip_velocity_is_overdue(
+    observer, span, overdue
+):
+    """Two and a half periods of the 120 Hz at which they come are 21 ms."""
+    slide = SlideBy(observer, -0.02)
+    grip = gripped(slide, {}, balance=4.0, began=0.5, span=span)
+    assert grip == 10.0 if overdue else grip < 10.0
+    assert slide.blind.tolist() == [overdue]
+
+
+@pytest.mark.parametrize("speed, moves", [(1e-3, True), (1e-5, False)])
+def test_a_hinge_moves_if_its_slip_sensor_counts(observer, speed, moves):
+    hinge = Hinge(observer)
+    gripped(hinge, {}, found=1.0, velocity=(0.0, -speed, 0.0), since=0.0)
+    assert (hinge.state["since"] == 0.0).tolist() == [moves]
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,13 @@ NOISE = np.random.default_rng(0).normal(size=(40, 48))
 FRAMES = np.clip(LOAD[:, None] * PAD.ravel() + 0.1 * NOISE, 0.0, None)
 """A grip in time: a row of 48 taxels for each sample."""
 
+AWAY = [
+    (X - 3.5 - 2.5 * np.cos(6.0 * t)) ** 2 + (Y - 2.5 - 1.5 * np.sin(4.0 * t)) ** 2
+    for t in TIME
+]
+MOVING = np.clip(4.0 - np.reshape(AWAY, (40, 48)) + 0.1 * NOISE, 0.0, None)
+"""A pad that rolls over the sensor."""
+
 PLACES = np.column_stack([0.25 * X.ravel(), 0.3 * Y.ravel(), PAD.ravel()])
 OFFSET = 100.0 + 20.0 * PAD + NOISE[:6, :8]
 WAVES = np.sin(0.3 + 0.2 * np.arange(12))[:, None] * (np.arange(14) % 4 < 2)
@@ -179,6 +186,25 @@ FORMS = {  # what the file is: its kind, its content, options, and what it gives
         {"frame_shape": (6, 8), "frame": 7},
         FRAMES[7],
     ),
+    "frames whose pattern moves": ("csv", csv(MOVING), {}, SHAPE),
+    "frames whose pattern moves above an offset": (
+        "npy",
+        saved("npy", 100.0 + MOVING),
+        {},
+        SHAPE,
+    ),
+    "frames whose pattern moves, with time": (
+        "csv",
+        csv(np.column_stack([TIME, MOVING])),
+        {},
+        LABELS,
+    ),
+    "frames whose pattern moves and the shape": (
+        "csv",
+        csv(MOVING),
+        {"frame_shape": (6, 8), "frame": 7},
+        MOVING[7],
+    ),
     "frames in an array": ("npy", saved("npy", FRAMES), {}, SHAPE),
     "time in an array": ("npz", saved("npz", np.c_[TIME, FRAMES]), {}, LABELS),
     "time in an array, told": (
@@ -278,6 +304,7 @@ def read(kind, path, names=("time", "fx"), **options):
 ROUND = [np.hypot(X - 3.5, Y - 2.5) < radius for radius in (1.2, 2.2, 3.0)]
 FINGERS = sum(np.clip(1.0 - (np.mgrid[:20, :60][1] - c) ** 2 / 25 - (np.mgrid[:20, :60][0] - 10) ** 2 / 64, 0, None)
               for c in (8, 22, 37, 51))  # fmt: skip
+RIBS = np.mgrid[:30, :60][1] % 10 < 6
 MAPS = {
     "a uniform pad": np.ones((6, 8)),
     "a noisy uniform pad": 1.0 + 0.05 * NOISE[:6, :8],
@@ -293,6 +320,11 @@ MAPS = {
     "four fingers": FINGERS,
     "four fingers of one pressure": FINGERS > 0.0,
     "three columns of counts": np.random.default_rng(1).integers(0, 6, (20, 3)),
+    "fingers of a hand": FINGERS[:, :56]
+    * (np.abs(np.mgrid[:20, :56][0] - 11) < 6 + 2 * (np.mgrid[:20, :56][1] // 28)),
+    "oblique grooves": (np.mgrid[:20, :48][0] + np.mgrid[:20, :48][1]) % 8 < 4,
+    "ribs of a tyre": RIBS
+    * (np.abs(np.mgrid[:30, :60][0] - 15) < 12 - np.mgrid[:30, :60][1] / 10),
     "a strip": np.array([[3.0, 5.0, 4.0, 4.0, 9.0, 1.0, 0.0, 2.0]]),
 }
 """Maps as sensors and formulas give them."""

@@ -38,6 +38,18 @@ ALIKE = 0.03
 HUMPS = 3
 """Number of peaks along a row, each next to values below half of the largest, from which it may be several rows."""
 
+REPEATS = 0.8
+"""Difference of a row from itself a row of the sensor further on, over the largest at shorter shifts, up to which the
+row repeats itself."""
+
+MOVES = 0.55
+"""Standard deviation of the centre of a pattern over its radius of gyration from which the pattern moves: rows through
+ribs of a slanted tyre and through fingers have up to 0.52."""
+
+PARTED = 0.5
+"""Load that neighbours share across the ends of a sensor's rows, over the mean along a row, up to which the ends part
+the pattern: oblique grooves are alike everywhere."""
+
 FLAT = 0.1
 """Share of the pressure above the rim within which a rim is flat."""
 
@@ -64,7 +76,8 @@ def refuse_other_tables(what: str, table: np.ndarray, index: bool | None) -> Non
     - A list of places: three columns, of which two next to each other have few values in equal steps and no pair twice,
       in the order of one of them.
     - A column of time (unless `index` is False): the first one goes in equal steps, and others do not.
-    - Frames in rows: all rows with a load are one pattern of at least three humps, as rows of a sensor in a row are.
+    - Frames in rows: all rows with a load are one pattern of at least three humps, as rows of a sensor in a row are, or
+      they repeat themselves with a period, and fold to patterns of which the centre moves.
     """
     with np.errstate(all="ignore"):
         if not (table.size and np.isfinite(table).all()):
@@ -80,13 +93,13 @@ def refuse_other_tables(what: str, table: np.ndarray, index: bool | None) -> Non
         if (
             index is None
             and steady[0]
-            and (not others.all() or _are_frames(table[:, 1:]))
+            and (not others.all() or _are_frames(table[:, 1:]) or _move(table[:, 1:]))
         ):
             shown = ", ".join(f"{value:g}" for value in table[:3, 0])
             text = "labels (index = true), times (frame_shape = [rows, columns]) or pressures (index = false)?"
             raise FileError(f"{what}: the first column is {shown}, ...: {text}")
-        if _are_frames(table):
-            text = "its rows are one pattern: frames (frame_shape = [rows, columns], frame) or one map"
+        if _are_frames(table) or _move(table):
+            text = "its rows repeat one pattern: frames (frame_shape = [rows, columns], frame) or one map"
             raise FileError(f"{what}: {text} (frame_shape = {list(table.shape)})?")
 
 
@@ -161,6 +174,47 @@ def _are_frames(table: np.ndarray) -> bool:
     some = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_FRAMES)).astype(int)]
     first, second = np.linalg.svd(some / some.max(), compute_uv=False)[:2]
     return bool(second <= ALIKE * first)
+
+
+def _move(table: np.ndarray) -> bool:
+    """Return True if the rows with a load fold to frames of some width whose pattern moves."""
+    above = np.clip(table - np.quantile(table, 0.25), 0.0, None)
+    sums = above.sum(axis=1, keepdims=True)
+    rows = above / sums
+    rows = rows[sums[:, 0] > LOADED * sums.max()]
+    size = rows.shape[1]
+    if len(rows) < FEWEST_FRAMES or size < HUMPS * HUMPS:
+        return False
+    shifts = range(1, size // HUMPS + 1)
+    unlike = [
+        np.abs(rows[:, s:] - rows[:, :-s]).sum() / (rows[:, s:] + rows[:, :-s]).sum()
+        for s in shifts
+    ]
+    common = np.minimum(rows[:, 1:], rows[:, :-1]).sum(axis=0)
+    for width in shifts[HUMPS - 1 :]:
+        frames = (
+            rows.reshape(len(rows), -1, width)
+            if size % width == 0
+            else rows[:, :0, None]
+        )
+        repeats = unlike[width - 1] <= REPEATS * max(unlike[: width - 1])
+        parted = common[width - 1 :: width].mean() <= PARTED * common.mean()
+        if (
+            frames.size
+            and repeats
+            and parted
+            and max(_motion(frames.sum(axis)) for axis in (1, 2)) >= MOVES
+        ):
+            return True
+    return False
+
+
+def _motion(loads: np.ndarray) -> float:
+    """Return the standard deviation of the centre of loads `[frames, places]` over their radius of gyration."""
+    places = np.arange(loads.shape[1])
+    centre = loads @ places
+    spread = loads @ places**2 - centre**2
+    return float(centre.std() / np.sqrt(max(spread.mean(), 1e-300)))
 
 
 def _humps(pattern: np.ndarray) -> int:

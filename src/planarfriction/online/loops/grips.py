@@ -38,7 +38,16 @@ STATE = np.dtype(
         ),
         *(
             (name, float)
-            for name in ("mute", "weighed", "pulls", "felt", "sent", "still", "silent")
+            for name in (
+                "mute",
+                "weighed",
+                "pulls",
+                "felt",
+                "sent",
+                "still",
+                "silent",
+                "usual",
+            )
         ),
         ("same", float, 3),
         *((name, float, EARLY) for name in ("forces", "loads")),
@@ -53,8 +62,9 @@ grips and holding loads of the first samples; of slips on purpose: holding load 
 loose, time since a dip of the grip began [s], and displacement then; of all: filtered size of the wrench, and the
 largest since the part stuck [N], time since a slip velocity along the wrench [s], time since wrench and load were
 plausible [s], first force and filtered force of the part [N], the last grip force that was measured, the grip that was
-asked for when it came [N], and the time for which it has been the same [s], 1 while no slip velocity comes, and number
-of slip velocities in a row that were equal, each component."""
+asked for when it came [N], and the time for which it has been the same [s], 1 while no slip velocity comes and OVERDUE
+while one is due, mean holding load of late [N], and number of slip velocities in a row that were equal, each component.
+"""
 
 _FAR = math.inf
 FRESH = (
@@ -69,7 +79,7 @@ FRESH = (
     1.0,
     *[0.0] * 8,
     _FAR,
-    *[0.0] * 12,
+    *[0.0] * 13,
     _FAR,
     _FAR,
 )
@@ -84,6 +94,9 @@ SETTLED = 0.03
 PAUSE = 0.1
 """Longest time between samples that grips and loads go on by, and between slip velocities while a part is let slip [s].
 """
+
+OVERDUE = 0.5
+"""Share of the time for which a slip sensor may be silent from which the grip does not fall [-]."""
 
 LOST = 0.08
 """Share of the wrench that a part loses only if it slips, while the grip is first
@@ -100,6 +113,12 @@ LATE = 0.02
 HALF = 0.5
 """Share of its first force that a part in the hand keeps at least, unless a sensor is wrong or it falls [-]."""
 
+KEEPS = 0.65
+"""Share of its mean load of late that a part keeps while it is let slip, unless it accelerates or a sensor is wrong."""
+
+FAST = 4.0
+"""Speed in quanta from which a part accelerates, and slips whatever the wrench says [-]."""
+
 FOLLOWS = 0.2
 """Change of the asked grip after which a sensor of the grip force that always says the same is dead [-]."""
 
@@ -108,6 +127,9 @@ COUNTED = 0.5
 
 REPEATS = 4.0
 """Repetitions from which a slip velocity that is not 0 is that of a frozen sensor [-]."""
+
+FROZEN = 8.0
+"""Repetitions from which such a sensor leaves no measurement that a grip may follow [-]."""
 
 UNSURE = 1.2
 """Grip of a part whose friction cannot be found, over the one that its load needs at the least friction [-]."""
@@ -223,11 +245,23 @@ def _median(row, count):
 
 
 @kernel
-def _follow(c, e, least_load, quantum, turns):
+def _speed(c, e):
+    """Return the size of the last slip velocity at the rim of the contact, 0 of one that repeats itself."""
+    if max(c.same[0], max(c.same[1], c.same[2])) >= REPEATS:
+        return 0.0
+    return math.hypot(
+        math.hypot(c.velocity[0], c.velocity[1]), e.radius * c.velocity[2]
+    )
+
+
+@kernel
+def _follow(c, e, least_load, quantum, turns, keeps):
     """Take in what an observer found; return the grip at mu = 1 that holds the present load, and the time step.
 
-    A wrench or a load that is missing, or with which the part would have lost its weight, leaves the load as it was.
-    `turns` is the share of the torque that counts in the wrench that the part bears.
+    A wrench or a load that is missing, or with which the part would have lost its weight, leaves the load as it was; so
+    does a slip sensor that is frozen, as the observer learns from it.
+    `turns` is the share of the torque that counts in the wrench that the part bears, `keeps` that of the mean load of
+    late which a part keeps unless it slips fast: below it, the load is missing.
     """
     if c.age < 0.0 and not e.normal_force > least_load:
         return 0.0, 0.0  # nothing begins before the hand grips
@@ -247,17 +281,22 @@ def _follow(c, e, least_load, quantum, turns):
     frozen = c.still >= PAUSE and abs(c.grip - c.sent) > FOLLOWS * c.sent
     if frozen:
         c.sent = 0.0  # until the sensor says something else
-    bears = (
-        e.seen > 0 and not frozen and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
-    )
-    c.mute = 0.0 if bears else c.mute + dt
     # Filtered as the gauge is, else a grip that falls fast seems to lose load.
     if e.seen > 0:
         grown = c.pressed + (e.normal_force - c.pressed) * (
             1.0 - math.exp(-dt / SEEN_TIME)
         )
         c.pressed = grown if c.pressed > 0.0 else e.normal_force
-    needed = e.gauge * c.pressed if bears else c.lately
+    needed = e.gauge * c.pressed
+    lacks = needed < keeps * c.usual and _speed(c, e) < FAST * quantum
+    repeats = max(c.same[0], max(c.same[1], c.same[2])) >= FROZEN
+    bears = (
+        e.seen > 0
+        and not (frozen or lacks or repeats)
+        and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
+    )
+    c.mute = 0.0 if bears else c.mute + dt
+    needed = needed if bears else c.lately
     c.load = max(needed, c.load * math.exp(-dt / LOAD_TIME))
     c.age = max(c.age, 0.0) + dt
     c.span += dt
@@ -289,6 +328,11 @@ def _follow(c, e, least_load, quantum, turns):
         c.weighed = c.pulls
     if bears:
         c.lately += share * (min(needed, 1.5 * c.lately) - c.lately)
+        c.usual += (
+            min(dt / LOAD_TIME, 1.0) * (c.lately - c.usual)
+            if c.age >= SETTLED
+            else c.lately - c.usual
+        )
     return needed, dt
 
 
@@ -307,8 +351,12 @@ def _unsure(c, e, dt, silence, seeks, lost):
             c.blind + dt if c.quiet > LATE and c.borne < (1.0 - lost) * c.stood else 0.0
         )
     none = c.span < 0.0 and c.age >= max(silence, PAUSE)
-    c.silent = 1.0 if c.span >= silence or none else 0.0
-    return c.silent > 0.0 or c.blind >= LATE or c.mute >= LATE or e.flags >= NO_SIGN
+    c.silent = (
+        1.0
+        if c.span >= silence or none
+        else (OVERDUE if c.span > OVERDUE * silence else 0.0)
+    )
+    return c.silent == 1.0 or c.blind >= LATE or c.mute >= LATE or e.flags >= NO_SIGN
 
 
 @kernel
@@ -323,9 +371,9 @@ def _begin(c, value, most):
 def _set(c, asked, most):
     """Set the grip that is asked for; before the filters have settled and a slip velocity may have come, leave it.
 
-    It does not fall while wrench or load are missing.
+    It does not fall while wrench or load are missing, or a slip velocity is overdue.
     """
-    asked = asked if c.mute == 0.0 else max(asked, c.grip)
+    asked = max(asked, c.grip) if c.mute > 0.0 or c.silent == OVERDUE else asked
     ready = c.age >= SETTLED and (c.span >= 0.0 or c.age >= PAUSE)
     c.grip = min(max(asked if ready else c.grip, 0.0), most)
 
@@ -348,7 +396,7 @@ def hold(
     for p in range(states.shape[0]):
         c = states[p]
         e = found[p]
-        _, dt = _follow(c, e, least_load, quantum, 1.0)
+        _, dt = _follow(c, e, least_load, quantum, 1.0, 0.0)
         slips = e.slip > 0.5
         slid = c.slid
         v = c.velocity
@@ -394,8 +442,8 @@ def slip(
     for p in range(states.shape[0]):
         c = states[p]
         e = found[p]
-        needed, dt = _follow(c, e, least_load, quantum, 1.0)
-        slips = e.slip > 0.5
+        needed, dt = _follow(c, e, least_load, quantum, 1.0, KEEPS)
+        slips = e.slip > 0.5 or (_speed(c, e) > FAST * quantum and c.span <= LATE)
         goal = abs(c.goal)
         sign = 1.0 if c.goal > 0.0 else -1.0
         v = sign * c.velocity[axis] if slips else 0.0
@@ -476,7 +524,7 @@ def hinge(states, found, least_load, quantum, silence, most, least_mu, reserve, 
         c = states[p]
         e = found[p]
         # a part that is to turn loses torque, but carries its weight
-        _, dt = _follow(c, e, least_load, quantum, 1.0 - c.found)
+        _, dt = _follow(c, e, least_load, quantum, 1.0 - c.found, 0.0)
         force = math.hypot(e.wrench[0], e.wrench[1])
         torque = e.wrench[2]
         if xp.in_range(force) and xp.in_range(torque):
@@ -488,7 +536,7 @@ def hinge(states, found, least_load, quantum, silence, most, least_mu, reserve, 
         if slips and c.age >= SETTLED:
             c.found = 1.0
         # Near the surface a slip is probable, unseen.
-        moves = slips and (v[0] != 0.0 or v[1] != 0.0 or v[2] != 0.0)
+        moves = slips and _speed(c, e) >= COUNTED * quantum
         c.since = 0.0 if moves else c.since + dt
         sticks = c.since > STICKS + BRAKES
         brakes = c.found > 0.0 and STICKS < c.since < STICKS + BRAKES
