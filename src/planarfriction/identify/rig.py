@@ -68,6 +68,8 @@ CLIP_VARIANCE = 0.9733
 CLIPPED = 5
 """Rounds of leaving differences out."""
 
+TINY = np.finfo(float).tiny
+
 LEAST_NOISE = 1e-3
 """Least noise of a sensor, as a share of the largest force or torque."""
 
@@ -252,8 +254,8 @@ def jitter(values: np.ndarray) -> np.ndarray:
 def least_noise(logs: Sequence[Log]) -> np.ndarray:
     """Return the least noise `[3]` of a wrench that sensors can have."""
     largest = np.max([np.abs(log.wrench).max(axis=0) for log in logs], axis=0)
-    force = max(largest[:2].max(), np.finfo(float).tiny)
-    return LEAST_NOISE * np.array([force, force, max(largest[2], np.finfo(float).tiny)])
+    force = largest[:2].max()
+    return LEAST_NOISE * np.maximum([force, force, largest[2]], TINY)
 
 
 def wrench_noise(logs: Sequence[Log], *residuals: Sequence[np.ndarray]) -> np.ndarray:
@@ -291,21 +293,19 @@ class SmoothTwist(NamedTuple):
     @property
     def noisy(self) -> np.ndarray:
         """Mask `[3]` of the channels whose remaining error counts."""
-        size = np.maximum(
-            np.sqrt(np.mean(self.values**2, axis=0)), np.finfo(float).tiny
-        )
-        return self.left > QUIET * size
+        return self.left > QUIET * _size(self.values)
 
     def error(self, random: np.random.Generator) -> np.ndarray:
         """Draw an error that the values may have, `[T, 3]`: noise through the same smoother."""
         drawn = random.standard_normal(self.values.shape)
-        for k, weight in enumerate(self.weights):
-            if weight > 0.0:
-                drawn[:, k] = _solved(drawn[:, k], weight)
-            drawn[:, k] *= self.left[k] / max(
-                np.sqrt(np.mean(drawn[:, k] ** 2)), np.finfo(float).tiny
-            )
-        return drawn
+        for k in np.flatnonzero(self.weights):
+            drawn[:, k] = _solved(drawn[:, k], self.weights[k])
+        return drawn * (self.left / _size(drawn))
+
+
+def _size(values: np.ndarray) -> np.ndarray:
+    """Compute the root mean square of the columns `[T, C]`, not quite zero."""
+    return np.maximum(np.sqrt(np.mean(values**2, axis=0)), TINY)
 
 
 def smoothed(log: Log) -> SmoothTwist:
@@ -317,8 +317,7 @@ def smoothed(log: Log) -> SmoothTwist:
         return _joined([smoothed(part) for part in log.parts])
     found = as_measured(log)
     if log.even and len(log.time) >= LEAST_TO_SMOOTH:
-        size = np.maximum(np.sqrt(np.mean(log.twist**2, axis=0)), np.finfo(float).tiny)
-        for k in np.flatnonzero(found.noise > QUIET * size):
+        for k in np.flatnonzero(found.noise > QUIET * _size(log.twist)):
             found.values[:, k], found.noise[k], found.left[k], found.weights[k] = (
                 _smooth(log.twist[:, k])
             )
@@ -334,61 +333,44 @@ def as_measured(log: Log) -> SmoothTwist:
 def _joined(parts: Sequence[SmoothTwist]) -> SmoothTwist:
     """Join the parts of a log: mean squares of errors, and the median weights."""
     sizes = [len(part.values) for part in parts]
+    values, noise, left, weights = zip(*parts, strict=True)
     noise, left = (
-        np.sqrt(
-            np.average(
-                [getattr(part, name) ** 2 for part in parts], axis=0, weights=sizes
-            )
-        )
-        for name in ("noise", "left")
+        np.sqrt(np.average(np.square(each), axis=0, weights=sizes))
+        for each in (noise, left)
     )
-    weights = np.median([part.weights for part in parts], axis=0)
-    return SmoothTwist(
-        np.concatenate([part.values for part in parts]), noise, left, weights
-    )
+    return SmoothTwist(np.concatenate(values), noise, left, np.median(weights, axis=0))
 
 
-def _smooth(values: np.ndarray) -> tuple[np.ndarray, float, float, float]:
+def _smooth(values: np.ndarray) -> tuple[Any, ...]:
     """Smooth values `[T]`; returns them with their noise, their remaining error, and the weight of third differences.
 
     The weight minimises the generalised cross-validation; the remaining error is Stein's estimate.
 
     Sources: Eilers 2003 (the smoother); Golub, Heath, Wahba 1979 (the weight); Stein 1981.
     """
-    count = len(values)
     stiffness = (2.0 - 2.0 * np.cos(np.linspace(0.0, np.pi, 4001))) ** ORDER
-    best = (np.inf, values, 0.0, 0.0, 0.0)
-    for weight in SMOOTHNESS:
+
+    def tried(weight: float) -> tuple[Any, ...]:
         smooth = _solved(values, weight)
-        freedom = float(np.mean(1.0 / (1.0 + weight * stiffness))) + ORDER / count
-        square = float(np.mean((values - smooth) ** 2))
-        score = square / (1.0 - freedom) ** 2
-        if score < best[0]:
-            variance = square / (1.0 - freedom)
-            error = max(
-                square + 2.0 * variance * freedom - variance, variance * freedom
-            )
-            best = (
-                score,
-                smooth,
-                float(np.sqrt(variance)),
-                float(np.sqrt(error)),
-                float(weight),
-            )
-    return best[1:]
+        freedom = np.mean(1.0 / (1.0 + weight * stiffness)) + ORDER / len(values)
+        square = np.mean((values - smooth) ** 2)
+        variance = square / (1.0 - freedom)
+        error = max(square + 2.0 * variance * freedom - variance, variance * freedom)
+        score = variance / (1.0 - freedom)
+        return score, smooth, np.sqrt(variance), np.sqrt(error), weight
+
+    return min(map(tried, SMOOTHNESS), key=lambda each: each[0])[1:]
 
 
 def _solved(values: np.ndarray, weight: float) -> np.ndarray:
     """Solve `(1 + weight D'D) x = values` for x `[T]`, with D the matrix of third differences."""
     from scipy.linalg import solveh_banded
 
-    count = len(values)
-    row = (-1.0, 3.0, -3.0, 1.0)
-    bands = np.zeros((ORDER + 1, count))
-    for shift in range(ORDER + 1):  # upper bands
-        for i in range(ORDER + 1 - shift):
-            bands[ORDER - shift, i + shift : count - ORDER + i + shift] += (
-                weight * row[i] * row[i + shift]
-            )
+    row = np.array([-1.0, 3.0, -3.0, 1.0])
+    ones = np.ones(len(values) - ORDER)
+    bands = np.zeros((ORDER + 1, len(values)))
+    for k in range(ORDER + 1):  # upper bands
+        products = row[: len(row) - k] * row[k:]
+        bands[ORDER - k, k:] = weight * np.convolve(ones, products)
     bands[ORDER] += 1.0
     return solveh_banded(bands, values)

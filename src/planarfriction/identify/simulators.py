@@ -97,12 +97,9 @@ class DistributedSimulator(PublishedSimulator):
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         self._radius = float(patch.contact_radius())
         self._centre = patch.centre_of_pressure()
-        few = (
-            patch.discs(DISCS)
-            if self.model_class is DistributedModel and patch.cells > CELLS
-            else patch
-        )
-        self._model = self.model(few, law, surface)
+        if self.model_class is DistributedModel and patch.cells > CELLS:
+            patch = patch.discs(DISCS)
+        self._model = self.model(patch, law, surface)
 
     @classmethod
     def model(cls, patch, law, surface):
@@ -119,9 +116,7 @@ class DistributedSimulator(PublishedSimulator):
         s = vector[RADIUS] / self._radius
         dx, dy = vector[CENTRE] - s * self._centre
         vx, vy, omega = twists.T
-        inner = np.ascontiguousarray(
-            np.stack([vx - omega * dy, vy + omega * dx, s * omega], -1)
-        )
+        inner = np.stack([vx - omega * dy, vy + omega * dx, s * omega], -1)
         fx, fy, tau = np.moveaxis(work(inner), 1, 0)
         return np.stack([fx, fy, s * tau + dx * fy - dy * fx], 1)
 
@@ -197,11 +192,9 @@ class Prediction:
         self.simulator = simulator
         self.log = log
         length = log.time[-1] - log.time[0]
-        steps = (
-            len(log.time) - 1
-            if log.even
-            else int(np.ceil(length / np.diff(log.time).min()))
-        )
+        steps = len(log.time) - 1
+        if not log.even:
+            steps = int(np.ceil(length / np.diff(log.time).min()))
         self.steps = min(steps * refine, MOST_STEPS)
         self._half = 0.5 * length / self.steps
         grid = np.linspace(log.time[0], log.time[-1], self.steps + 1)
@@ -287,18 +280,12 @@ class PartsPrediction(Prediction):
         self.simulator = simulator
         self.log = log
         ends = np.cumsum([len(part.time) for part in log.parts])
-        self._parts = [
-            Prediction(
-                simulator,
-                part,
-                own,
-                begins=begins if number == 0 else "rest",
-                refine=refine,
+        self._parts: list[Prediction] = []
+        for part, own in zip(log.parts, np.split(twist, ends[:-1]), strict=True):
+            self._parts.append(
+                Prediction(simulator, part, own, begins=begins, refine=refine)
             )
-            for number, (part, own) in enumerate(
-                zip(log.parts, np.split(twist, ends[:-1]), strict=True)
-            )
-        ]
+            begins = "rest"
         self.steps = sum(part.steps for part in self._parts)
         pieces = []
         self._spans = []
