@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.checks import check_slides
-from planarfriction.identify.logs import as_tuple
+from planarfriction.identify.logs import Arrays, Linear, as_tuple
 from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
 from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
@@ -216,7 +216,7 @@ class SlideProblem(Problem):
             patch = scaled_patch(patch, radius / float(patch.contact_radius()))
         return self.build(patch, self.fitted_law(values))
 
-    def poses(self, values: np.ndarray) -> list[np.ndarray]:
+    def poses(self, values: np.ndarray) -> Arrays:
         """Simulate the poses `[T, 3]` of each slide from its best start so far."""
         model = self.fitted_model(values)
         both = zip(self.slides, self.starts, strict=True)
@@ -224,14 +224,14 @@ class SlideProblem(Problem):
             slide_poses(model, self.body, slide.time, start) for slide, start in both
         ]
 
-    def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
+    def even_sigma(self, noise: np.ndarray) -> Arrays:
         rows = np.broadcast_to(noise, (len(self.slides), 3))
         both = zip(rows, self.slides, strict=True)
         return [np.broadcast_to(row, slide.pose.shape) for row, slide in both]
 
     def estimate_noise(
         self, values: np.ndarray, noise: np.ndarray
-    ) -> tuple[np.ndarray, list[np.ndarray]]:
+    ) -> tuple[np.ndarray, Arrays]:
         """Estimate the noise `[S, 3]`, equal for x and y, from the residuals at `values`, and sigma of each sample."""
         both = zip(self.slides, self.poses(values), strict=True)
         residuals = [slide.pose - poses for slide, poses in both]
@@ -250,9 +250,7 @@ class SlideProblem(Problem):
             noise = np.maximum(channels, LEAST_NOISE) / np.sqrt(weighed)[:, None]
         return noise, self.even_sigma(noise)
 
-    def linearised(
-        self, values: np.ndarray, sigma: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(self, values: np.ndarray, sigma: Arrays) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, at the best starts, and derivatives `[M, F]` with the starts free.
 
         The start answers every change: `q' = -B^+ (r, J)` with B of the poses from which it is estimated.

@@ -16,7 +16,7 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.logs import Log
+from planarfriction.identify.logs import Linear, Log
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.patch import ContactPatch, SoftFinger
 
@@ -208,7 +208,7 @@ class Coordinates:
             result[self._mu_s] = values[self._mu_s] / self._mu(values) - 1.0
         return np.clip(result, *self.bounds())
 
-    def prior(self, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def prior(self, coordinates: np.ndarray) -> Linear:
         """Compute a weak pull to the start, `[F + K]`, and its derivatives `[F + K, F + K]`.
 
         It keeps parameters that the data cannot determine at their start. In units of the noise of one residual it is
@@ -326,7 +326,7 @@ class VectorMap:
         """Return the vector `[P]` of the model for values `[F]`."""
         return self.linearised(values)[0]
 
-    def linearised(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(self, values: np.ndarray) -> Linear:
         """Compute the vector and its derivatives with respect to the values, `[P, F]`."""
         vector = self.base.copy()
         slopes = np.zeros((len(PARAMETERS), len(self.names)))

@@ -12,7 +12,7 @@ import numpy as np
 from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.identify import parameters as known
 from planarfriction.identify.decimation import redrawn
-from planarfriction.identify.logs import Log, mean_load
+from planarfriction.identify.logs import Arrays, Linear, Log, mean_load
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import (
     RADIUS,
@@ -57,7 +57,7 @@ FEW = 0.1
 """Share of spoiled residuals up to which a robust fit ends without them."""
 
 
-def softened(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def softened(residual: np.ndarray) -> Linear:
     """Return residuals whose squares are the loss "soft_l1" at a scale of `SOFT`, `[M]`, and their derivatives."""
     root = np.sqrt(1.0 + (residual / SOFT) ** 2)
     # No difference of like numbers at small residuals.
@@ -77,10 +77,10 @@ class Problem:
     """Number of measured numbers."""
     sizes: Callable[..., list[int]]
     """Return the number of residuals of each log or slide."""
-    linearised: Callable[..., tuple[np.ndarray, np.ndarray]]
-    even_sigma: Callable[..., list[np.ndarray]]
+    linearised: Callable[..., Linear]
+    even_sigma: Callable[..., Arrays]
     """Return the same noise for all samples, `[T, 3]` of each log or slide."""
-    estimate_noise: Callable[..., tuple[np.ndarray, list[np.ndarray]]]
+    estimate_noise: Callable[..., tuple[np.ndarray, Arrays]]
 
     names: tuple[str, ...]
     """Names of the parameters of the contact, `[F]`."""
@@ -104,7 +104,7 @@ class Problem:
         """Return the optimiser's coordinates for a search from values `[F]`."""
         return Coordinates(self.names, start, self.law.mu_c)
 
-    def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
+    def refine_steps(self, values: np.ndarray, sigma: Arrays) -> bool:
         """Take more steps between two samples if the estimates ask for it; returns True if they do."""
         return False
 
@@ -112,11 +112,11 @@ class Problem:
         """Forget derivatives that were kept, from other steps or other values."""
 
     def residuals(
-        self, coordinates: Coordinates, sigma: Sequence[np.ndarray]
-    ) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        self, coordinates: Coordinates, sigma: Arrays
+    ) -> Callable[[np.ndarray], Linear]:
         """Return the function of the coordinates that least squares minimises, with its derivatives."""
 
-        def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def evaluate(x: np.ndarray) -> Linear:
             residual, jacobian = self.linearised(coordinates.values(x), sigma)
             pull, per_pull = coordinates.prior(x)
             return np.concatenate([residual, pull]), np.concatenate(
@@ -166,8 +166,8 @@ class LogProblem(Problem):
             self.fixed_patch = dataclasses.replace(patch, pressure=density)
         self.maps = self._maps(loads)
         self.rig = Rig(logs, options.nuisance)
-        self.noisy = "twist" in options.nuisance
-        self.twists = [(smoothed if self.noisy else as_measured)(log) for log in logs]
+        known_twist = "twist" not in options.nuisance
+        self.twists = [(as_measured if known_twist else smoothed)(log) for log in logs]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
         first = int(options.begins == "rest")
         self.used = [log.inner[first:] for log in logs]
@@ -208,7 +208,7 @@ class LogProblem(Problem):
     def _predictions(
         self,
         steps: int,
-        twists: Sequence[np.ndarray] | None = None,
+        twists: Arrays | None = None,
         logs: Sequence[Log] | None = None,
     ) -> list[Prediction]:
         twists = twists or [each.values for each in self.twists]
@@ -243,7 +243,7 @@ class LogProblem(Problem):
     def sizes(self) -> list[int]:
         return [3 * len(used) for used in self.used]
 
-    def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
+    def refine_steps(self, values: np.ndarray, sigma: Arrays) -> bool:
         """Take as many steps as keep the estimates within `COARSE` standard errors; returns True if these are more.
 
         Their number follows from the change of the residuals with twice as many steps, as errors fall with its square.
@@ -288,7 +288,7 @@ class LogProblem(Problem):
         rig = values[count:]
         return values[:count], rig if len(rig) else np.zeros(len(self.rig.columns))
 
-    def shown(self, values: np.ndarray) -> list[np.ndarray]:
+    def shown(self, values: np.ndarray) -> Arrays:
         """Compute the wrenches `[T, 3]` that the sensors of each log should show, for values `[F]` or `[F + K]`."""
         if self._shown is None or not np.array_equal(self._shown[0], values):
             self._shown = values.copy(), self._wrenches(values, self.predictions)
@@ -296,7 +296,7 @@ class LogProblem(Problem):
 
     def _wrenches(
         self, values: np.ndarray, predictions: Sequence[Prediction]
-    ) -> list[np.ndarray]:
+    ) -> Arrays:
         contact, rig = self.split(values)
         result = []
         both = zip(predictions, self.maps, strict=True)
@@ -305,9 +305,7 @@ class LogProblem(Problem):
             result.append(self.rig.added(i, rig, wrench, np.zeros_like(wrench))[0])
         return result
 
-    def linearised(
-        self, values: np.ndarray, sigma: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(self, values: np.ndarray, sigma: Arrays) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, and derivatives `[M, F + K]`, at `values` or nearby (`NEARBY`)."""
         if self._slopes is None or not self._near(values, self._slopes[0]):
             self._derive(values)
@@ -326,8 +324,8 @@ class LogProblem(Problem):
         names: Sequence[str],
         held: np.ndarray,
         values: np.ndarray,
-        sigma: Sequence[np.ndarray],
-    ) -> tuple[np.ndarray, np.ndarray]:
+        sigma: Arrays,
+    ) -> Linear:
         """Compute the residuals `[M]` at `values`, and derivatives `[M, H]` by `names` of the law, `held` at these."""
         wide = copy.copy(self)
         wide.names = (*self.names, *names)
@@ -371,36 +369,32 @@ class LogProblem(Problem):
         self._shown = values.copy(), wrenches
         self._slopes = values.copy(), slopes
 
-    def residual(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
+    def residual(self, values: np.ndarray, sigma: Arrays) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, as the loss counts them."""
         return self._counted(values, sigma)[0]
 
-    def _counted(
-        self, values: np.ndarray, sigma: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _counted(self, values: np.ndarray, sigma: Arrays) -> Linear:
         """Compute the residuals `[M]` as the loss counts them, and their derivatives by those over `sigma`."""
         residual = self.distances(values, sigma)
         if self.options.loss == "linear":
             return residual, np.ones_like(residual)
         return softened(residual)
 
-    def distances(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
+    def distances(self, values: np.ndarray, sigma: Arrays) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, whatever the loss."""
         return self._scaled(self.shown(values), sigma)
 
-    def _scaled(
-        self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]
-    ) -> np.ndarray:
+    def _scaled(self, wrenches: Arrays, sigma: Arrays) -> np.ndarray:
         """Subtract the measured wrenches and divide by `sigma`; returns all used samples flat."""
         rows = zip(self._apart(wrenches, sigma), self.used, strict=True)
         return np.concatenate([each[used].ravel() for each, used in rows])
 
-    def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
+    def even_sigma(self, noise: np.ndarray) -> Arrays:
         return [np.broadcast_to(noise, log.wrench.shape) for log in self.logs]
 
     def estimate_noise(
         self, values: np.ndarray, noise: np.ndarray
-    ) -> tuple[np.ndarray, list[np.ndarray]]:
+    ) -> tuple[np.ndarray, Arrays]:
         """Estimate the noise of each channel `[3]`, unless it is given, and sigma `[T, 3]` of each log's residuals."""
         if self.options.noise is None:
             both = zip(self.shown(values), self.logs, strict=True)
@@ -418,16 +412,14 @@ class LogProblem(Problem):
                 ]
         return noise, sigma
 
-    def _apart(
-        self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]
-    ) -> list[np.ndarray]:
+    def _apart(self, wrenches: Arrays, sigma: Arrays) -> Arrays:
         """Subtract the measured wrenches and divide by `sigma`, `[T, 3]` of each log."""
         both = zip(wrenches, self.logs, sigma, strict=True)
         return [
             (wrench - log.wrench) * (log.channels / each) for wrench, log, each in both
         ]
 
-    def sigma(self, values: np.ndarray, noise: np.ndarray) -> list[np.ndarray]:
+    def sigma(self, values: np.ndarray, noise: np.ndarray) -> Arrays:
         """Compute the standard deviation `[T, 3]` of each log's residuals from the noise `[3]` and that of the twist.
 
         The latter adds, to first order, the change of each sample if the twists before it were all off by the error
@@ -440,7 +432,7 @@ class LogProblem(Problem):
         ):
             square = np.broadcast_to(noise**2, log.wrench.shape).copy()
             vector = each.vector(contact)
-            channels = np.diag(twist.noisy & self.noisy)
+            channels = np.diag(twist.noisy)
             base = prediction.wrenches(vector) if channels.any() else None
             for one in channels[channels.any(axis=1)]:
                 square += (
@@ -450,13 +442,13 @@ class LogProblem(Problem):
         return sigma
 
     def twist_residuals(
-        self, values: np.ndarray, sigma: Sequence[np.ndarray], draws: int
+        self, values: np.ndarray, sigma: Arrays, draws: int
     ) -> np.ndarray | None:
         """Compute the changes `[draws, M]` of the residuals over `sigma` for drawn errors of the twists.
 
         The draws are always the same ones. Returns None if no twist has noise.
         """
-        noisy = [twist.noisy & self.noisy for twist in self.twists]
+        noisy = [twist.noisy for twist in self.twists]
         if not np.any(noisy):
             return None
         random = np.random.default_rng(0)
@@ -477,7 +469,7 @@ class LogProblem(Problem):
             result.append(self._scaled(change, sigma))
         return np.array(result)
 
-    def coefficients(self, values: np.ndarray) -> list[np.ndarray]:
+    def coefficients(self, values: np.ndarray) -> Arrays:
         """Compute friction over load [-], `[T]` of each log; NaN without load."""
         contact, _ = self.split(values)
         result = []

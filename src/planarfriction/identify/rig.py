@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction._support import validation
-from planarfriction.identify.logs import Log
+from planarfriction.identify.logs import Arrays, Log
 
 GROUPS = ("delay", "bias", "load", "twist")
 """Groups of disturbances: delay, zeros of the channels, scale and drift of the load cell, noise of the twist."""
@@ -258,7 +258,7 @@ def least_noise(logs: Sequence[Log]) -> np.ndarray:
     return LEAST_NOISE * np.maximum([force, force, largest[2]], TINY)
 
 
-def wrench_noise(logs: Sequence[Log], *residuals: Sequence[np.ndarray]) -> np.ndarray:
+def wrench_noise(logs: Sequence[Log], *residuals: Arrays) -> np.ndarray:
     """Estimate the noise `[3]` of the wrench from the jitter of the logs or of the residuals `[T, 3]`, if that is less.
 
     A fit takes the sharp turns of friction out of the signal; its errors extend over many samples and so leave the
@@ -315,19 +315,19 @@ def smoothed(log: Log) -> SmoothTwist:
     """
     if len(log.parts) > 1:
         return _joined([smoothed(part) for part in log.parts])
-    found = as_measured(log)
+    noise = jitter(log.twist)
+    found = SmoothTwist(log.twist.copy(), noise, noise.copy(), np.zeros(3))
     if log.even and len(log.time) >= LEAST_TO_SMOOTH:
-        for k in np.flatnonzero(found.noise > QUIET * _size(log.twist)):
-            found.values[:, k], found.noise[k], found.left[k], found.weights[k] = (
-                _smooth(log.twist[:, k])
+        for k in np.flatnonzero(noise > QUIET * _size(log.twist)):
+            found.values[:, k], noise[k], found.left[k], found.weights[k] = _smooth(
+                log.twist[:, k]
             )
     return found
 
 
 def as_measured(log: Log) -> SmoothTwist:
-    """Return the twist of a log as it was measured, with the noise that it has."""
-    noise = jitter(log.twist)
-    return SmoothTwist(log.twist.copy(), noise, noise.copy(), np.zeros(3))
+    """Return the twist of a log that has no noise."""
+    return SmoothTwist(log.twist, *np.zeros((3, 3)))
 
 
 def _joined(parts: Sequence[SmoothTwist]) -> SmoothTwist:

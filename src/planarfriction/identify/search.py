@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from planarfriction.errors import IdentificationInterrupted
+from planarfriction.identify.logs import Arrays, Linear
 from planarfriction.identify.parameters import ALL, Coordinates
 from planarfriction.identify.problem import LogProblem, Problem
 from planarfriction.identify.uncertainty import Fit, Uncertainty, covariance_of, finite
@@ -54,9 +55,7 @@ SCATTER = 0.7
 """Standard deviation of the logarithms of starts around a given one."""
 
 
-def multistart(
-    problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray
-) -> Fit:
+def multistart(problem: Problem, starts: Arrays, *, noise: np.ndarray) -> Fit:
     """Find the best rough fit from starts `[F]` or `[F + K]`, with the same noise for all samples of a channel."""
     coordinates = problem.coordinates(starts[0])
     sigma = problem.even_sigma(noise)
@@ -87,7 +86,7 @@ def refine(fit: Fit) -> Fit:
 
 
 def warm_start(
-    problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray
+    problem: LogProblem, lead: Fit, guesses: Arrays, *, noise: np.ndarray
 ) -> Fit:
     """Find the best rough fit of another model than that of `lead`, from where this ended and from the best guess.
 
@@ -124,7 +123,7 @@ class Descent:
 
     def __init__(
         self,
-        residuals: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
+        residuals: Callable[[np.ndarray], Linear],
         x: np.ndarray,
         share: float,
     ):
@@ -169,9 +168,9 @@ class Descent:
 def _best(
     problem: Problem,
     coordinates: Coordinates,
-    points: Sequence[np.ndarray],
+    points: Arrays,
     noise: np.ndarray,
-    sigma: list[np.ndarray],
+    sigma: Arrays,
     change: float,
 ) -> Fit:
     """Minimise the sum of squares from coordinates `[F + K]` until the cost changes by less than `change`.
@@ -184,7 +183,7 @@ def _best(
     share = max(change / (0.5 * problem.numbers), problem.least_change)
     found = []
 
-    def told(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def told(x: np.ndarray) -> Linear:
         problem.report(
             f"start {len(found)} of {len(points)}, evaluation {next(evaluations)}"
         )
@@ -214,9 +213,7 @@ def _best(
     )
 
 
-def condensed(
-    residual: np.ndarray, jacobian: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def condensed(residual: np.ndarray, jacobian: np.ndarray) -> Linear:
     """Reduce residuals `[M]` and derivatives `[M, F]` to `F + 1` rows with the same sums of squares and products.
 
     They are the triangle of `[J, r] = Q R`: all that least squares needs, at a fraction of the cost.
@@ -241,7 +238,7 @@ def guess_starts(
     starts: int,
     seed: int,
     noise: np.ndarray,
-) -> list[np.ndarray]:
+) -> Arrays:
     """Return `starts` vectors of values `[F]`, the best first.
 
     A whole law as start (`given` is None) leads, scattered copies follow. Otherwise the best points of a grid over
@@ -257,7 +254,7 @@ def guess_starts(
     return ranked[:starts] + scattered
 
 
-def _grid(problem: LogProblem, given: dict[str, float]) -> list[np.ndarray]:
+def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
     """Return the values at all points of the grid; a parameter that is not estimated or is given has one value."""
     base = problem.start_values()
     law = problem.law
@@ -285,7 +282,7 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> list[np.ndarray]:
     return results
 
 
-def _friction(problem: LogProblem, speeds: list[np.ndarray]) -> tuple[float, float]:
+def _friction(problem: LogProblem, speeds: Arrays) -> tuple[float, float]:
     """Estimate the friction coefficients of fast sliding and of the largest friction."""
     coefficient = np.concatenate(problem.coefficients(problem.start_values()))
     usable = np.isfinite(coefficient)
@@ -305,9 +302,7 @@ def _speeds(speeds: np.ndarray) -> np.ndarray:
     return np.geomspace(max(low, 1e-3 * high), high, SPEEDS)
 
 
-def _stiffnesses(
-    problem: LogProblem, speeds: list[np.ndarray], mu_c: float
-) -> np.ndarray:
+def _stiffnesses(problem: LogProblem, speeds: Arrays, mu_c: float) -> np.ndarray:
     """Return stiffnesses to try [1/m]: full deflection after a tenth of a usual step up to a tenth of all travel."""
     steps = np.concatenate(
         [s * log.durations for s, log in zip(speeds, problem.logs, strict=True)]
@@ -386,7 +381,7 @@ def _stretch(fit: Fit, i: int, way: np.ndarray, sign: float) -> float:
         if not own.low < target < own.high:
             break
 
-        def held(x: np.ndarray, at: float = target) -> tuple[np.ndarray, np.ndarray]:
+        def held(x: np.ndarray, at: float = target) -> Linear:
             rows, slopes = residuals(x)
             off = coordinates.values(x)[i] / at - 1.0
             slope = coordinates.slopes(x)[i] / at

@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction._engine.compiler import threads
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.identify.decimation import DecimatedLog
-from planarfriction.identify.logs import EVEN, Log
+from planarfriction.identify.logs import EVEN, Linear, Log
 from planarfriction.identify.parameters import RADIUS, SHAPE
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
@@ -70,9 +70,7 @@ class PublishedSimulator:
         """Compute the wrenches `[N, 3]`."""
         return rollout(self._model, None, twists, loads, dt, parameters=vector).wrenches
 
-    def sensitivities(
-        self, twists, loads, dt, vector, names: Sequence[str]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def sensitivities(self, twists, loads, dt, vector, names: Sequence[str]) -> Linear:
         """Compute the wrenches `[N, 3]` and their derivatives `[N, 3, P]`."""
         found = rollout_jacobian(
             self._model, None, twists, loads, dt, names, parameters=vector
@@ -247,7 +245,7 @@ class Prediction:
         """Return the values at the nodes among those at the ends of all steps."""
         return values[self._first :: 2]
 
-    def _read(self, nodes: Any, delay: float) -> tuple[np.ndarray, np.ndarray]:
+    def _read(self, nodes: Any, delay: float) -> Linear:
         """Interpolate values at the samples, later by `delay` [s]; returns them and their derivatives over time."""
         step = 2.0 * self._half
         wanted = (self.log.time - self.log.time[0] - delay) / step

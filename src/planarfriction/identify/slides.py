@@ -15,7 +15,7 @@ from numpy.polynomial import polynomial
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Checked, checked
 from planarfriction.derivatives.scene_inputs import STATES
-from planarfriction.identify.logs import increasing, unwrapped
+from planarfriction.identify.logs import Linear, increasing, unwrapped
 from planarfriction.identify.options import check_noise
 from planarfriction.identify.verdicts import Verdict, caution, few_of
 from planarfriction.scenes import simulate
@@ -144,7 +144,7 @@ def slide_poses(
 
 def start_slopes(
     model: Any, body: MassProperties, slide: Slide, start: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Linear:
     """Simulate poses `[T, 3]` from a start (pose, then twist, `[6]`), with derivatives `[T, 3, 6]` by differences.
 
     The start pose shifts the motion as a whole; the start angle of a contact that is not round changes more than that,

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction.identify.logs import Arrays
 from planarfriction.identify.parameters import ALL, LAW, PRIOR, Coordinates, fitted_law
 from planarfriction.identify.rig import TINY
 
@@ -69,7 +70,7 @@ class Fit(NamedTuple):
     """Mask of the coordinates that lie on a bound, `[F + K]`."""
     noise: np.ndarray
     """Noise of each channel, `[3]`, or of the channels of each slide, `[S, 3]`."""
-    sigma: list[np.ndarray]
+    sigma: Arrays
     """Standard deviation of each residual, `[T, 3]` of each log or slide."""
     starts: tuple[int, int]
     """Number of starting points that led to this minimum, and number of all."""

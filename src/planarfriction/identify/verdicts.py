@@ -13,7 +13,7 @@ import numpy as np
 
 from planarfriction._support.described import described
 from planarfriction.identify.decimation import samples_of
-from planarfriction.identify.logs import TWO_LOADS, Log
+from planarfriction.identify.logs import TWO_LOADS, Arrays, Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.problem import SPOILED
 from planarfriction.identify.rig import CHANNELS
@@ -170,7 +170,7 @@ class Candidate(NamedTuple):
             estimates=problem.by_name(self.fit.values),
         )
 
-    def cost(self, sigma: list[np.ndarray]) -> float:
+    def cost(self, sigma: Arrays) -> float:
         """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""
         fit = self.fit
         pull = fit.coordinates.prior(fit.x)[0]

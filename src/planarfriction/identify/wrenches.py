@@ -391,7 +391,7 @@ def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:
             result.append(
                 Nuisance(f"noise_{channel}", unit, float(noise), float(error), name)
             )
-    return result if problem.noisy else []
+    return result if "twist" in problem.rig.groups else []
 
 
 def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
