@@ -257,7 +257,7 @@ class Sliding(NamedTuple):
         )
         lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
         cosines = (a * b).sum(axis=1) / np.where(lengths > 0.0, lengths, 1.0)
-        return float(np.degrees(np.median(np.arccos(np.clip(cosines, -1.0, 1.0)))))
+        return np.degrees(np.median(np.arccos(np.clip(cosines, -1.0, 1.0))))
 
     def best(
         self, twist: np.ndarray, wrench: np.ndarray, scales: np.ndarray = NEAR
@@ -448,7 +448,7 @@ def check_frozen(slide: Slide) -> Finding | None:
     steps = np.hypot(*np.diff(slide.pose[:, :2], axis=0).T)
     speed = steps / np.diff(slide.time)
     for k in range(STILL, len(speed) - 3):
-        after = float(np.median(speed[k + 1 : k + 4]))
+        after = np.median(speed[k + 1 : k + 4])
         if speed[k - STILL : k].max() < SLOWED * after and speed[k] > JUMP * after:
             moving = np.flatnonzero(speed[:k] >= SLOWED * after) + 1
             rest = slide.time[k] - slide.time[moving.max(initial=0)]
@@ -461,7 +461,7 @@ def check_frozen(slide: Slide) -> Finding | None:
 
 def _load(log: Log) -> float:
     loaded = log.normal_force[log.normal_force > 0.0]
-    return float(np.median(loaded)) if len(loaded) else 1.0
+    return np.median(loaded) if len(loaded) else 1.0
 
 
 def size_of(log: Log, patch: ContactPatch) -> float:
@@ -471,7 +471,7 @@ def size_of(log: Log, patch: ContactPatch) -> float:
 
 def _size_at(load: float, patch: ContactPatch) -> float:
     """Return the contact radius at a load [m]. Raises InvalidValueError for a single point."""
-    size = float(patch.contact_radius(load))
+    size = patch.contact_radius(load)
     if not size > 0.0:
         rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"
         found = f"{patch.cells} cell with a contact radius of {size:g} m"

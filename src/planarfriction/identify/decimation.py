@@ -114,7 +114,7 @@ def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> Decimate
     speed = np.zeros(len(log.time))
     still = []
     for values, scale in zip(log.twist.T, (1.0, 1.0, size), strict=True):
-        still.append(float(NOISE * jitter(values[:, None])[0]))
+        still.append(NOISE * jitter(values[:, None])[0])
         speed += scale * np.where(np.abs(values) > still[-1], np.abs(values), 0.0)
     path = np.concatenate([[0.0], np.cumsum(speed[1:] * np.diff(log.time))])
     chosen = farthest(features(log, edges, still), count)
@@ -152,7 +152,7 @@ def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:
     lengths = np.diff(edges)
     columns = [starts / edges[-1]]
     for values, noise in zip(log.twist.T, still, strict=True):
-        largest = max(float(np.abs(values).max()), TINY)
+        largest = max(np.abs(values).max(), TINY)
         least = max(noise, LEAST_SPEED * largest)
         for end in (np.minimum, np.maximum):
             scaled = np.arcsinh(end.reduceat(values, starts) / least)
@@ -160,7 +160,7 @@ def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:
     load = log.normal_force / max(log.normal_force.max(), TINY)
     columns += [end.reduceat(load, starts) for end in (np.minimum, np.maximum)]
     for values in log.wrench.T:
-        largest = max(float(np.abs(values).max()), TINY)
+        largest = max(np.abs(values).max(), TINY)
         mean, square = (
             np.add.reduceat((values / largest) ** power, starts) / lengths
             for power in (1, 2)

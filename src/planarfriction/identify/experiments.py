@@ -23,14 +23,19 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log, as_tuple
 from planarfriction.identify.options import FitOptions, check_noise
 from planarfriction.identify.parameters import (
     ALL,
+    LAW,
     PRIOR,
+    SHAPE,
     SHAPE_PRIOR,
+    SOFT_FINGER,
+    USUAL,
     Coordinates,
+    check_names,
+    check_patch,
     fitted_law,
 )
 from planarfriction.identify.problem import LogProblem
@@ -39,7 +44,6 @@ from planarfriction.identify.rig import GROUPS, check_groups, wrench_noise
 from planarfriction.identify.uncertainty import finite
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 NOISE = 0.01
 """Noise over the largest sliding friction, unless it is given."""
@@ -136,7 +140,7 @@ def design_experiment(
     *,
     logs: Log | Sequence[Log] = (),
     motions: Log | Sequence[Log] | None = None,
-    parameters: Sequence[str] = known.USUAL,
+    parameters: Sequence[str] = USUAL,
     wanted: Sequence[str] | None = None,
     noise: Sequence[float] | None = None,
     nuisance: Sequence[str] = GROUPS,
@@ -169,10 +173,9 @@ def design_experiment(
     InvalidValueError
         A parameter breaks its rule, or a motion does not move.
     """
-    names = known.check_names(parameters)
+    names = check_names(parameters)
     groups = check_groups("nuisance", nuisance)
-    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
-    refuse_anisotropy(patch, "design_experiment")
+    check_patch(patch, "design_experiment")
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
         raise InvalidValueError(
@@ -183,7 +186,7 @@ def design_experiment(
     before = ()
     if not isinstance(logs, (list, tuple)) or logs:
         before = as_tuple("logs", logs, Log)
-    chosen = names if wanted is None else known.check_names(wanted, names)
+    chosen = names if wanted is None else check_names(wanted, names)
     if motions is None:
         loads = {float(f"{np.median(log.normal_force):.3g}") for log in before}
         motions = candidate_motions(patch, law, normal_force=sorted(loads) or [1.0])
@@ -212,12 +215,12 @@ def design_experiment(
         errors.append(information.errors(after))
     order = np.argsort(-np.array(gains), kind="stable")
     return MotionPlan(
-        names=names,
-        values=information.values,
-        motions=tuple(expected[i] for i in order),
-        gains=np.array(gains)[order],
-        errors_so_far=information.errors(start),
-        errors=np.array(errors)[order],
+        names,
+        information.values,
+        tuple(expected[i] for i in order),
+        np.array(gains)[order],
+        information.errors(start),
+        np.array(errors)[order],
     )
 
 
@@ -239,10 +242,10 @@ def current_estimate(
     }
     good = {*given, "centre_x", "centre_y"}
     for name, (low, high) in found.intervals().items():
-        held = name in known.LAW and name not in (*given, "breakaway_ratio")
+        held = name in LAW and name not in (*given, "breakaway_ratio")
         if held and not low <= getattr(law, name) <= high:
             given[name] = 0.5 * (low + high)
-    shape = {*known.SHAPE, *known.SOFT_FINGER} & set(found.names)
+    shape = {*SHAPE, *SOFT_FINGER} & set(found.names)
     if shape and shape <= good:
         patch = found.model.patch
     return patch, fitted_law(law, given)
@@ -284,7 +287,7 @@ class _Information:
 
     def prior(self) -> np.ndarray:
         """Return the information `[F + S, F + S]` a priori: a factor of 20 either way, and the rig's widths."""
-        centre = float(self._probe.fixed_patch.contact_radius()) / self._scale
+        centre = self._probe.fixed_patch.contact_radius() / self._scale
         width = np.where(np.isin(self.names, ("centre_x", "centre_y")), centre, PRIOR)
         width[np.isin(self.names, ("gamma", "mu_s"))] = SHAPE_PRIOR
         shared = sum(column.log is None for column in self._probe.rig.columns)
@@ -343,10 +346,10 @@ def _noise(
         return check_noise("noise", given)
     if logs:
         return wrench_noise(logs)
-    load = max(float(motion.normal_force.max()) for motion in motions)
+    load = max(motion.normal_force.max() for motion in motions)
     validation.positive("normal_force of the motions", load)
     force = NOISE * law.mu_c * load
-    return np.array([force, force, force * float(patch.contact_radius(load))])
+    return np.array([force, force, force * patch.contact_radius(load)])
 
 
 # ---------------------------------------------------------------------- motions to choose from

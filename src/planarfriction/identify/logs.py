@@ -300,12 +300,12 @@ def one_coordinate(logs: Sequence[Log]) -> bool:
 def load_ratio(logs: Sequence[Log]) -> float:
     """Return the largest load over the least, of which no log has 5 % of its samples beyond."""
     spans = np.array([np.quantile(loads(log), (0.05, 0.95)) for log in logs])
-    return float(spans[:, 1].max() / spans[:, 0].min())
+    return spans[:, 1].max() / spans[:, 0].min()
 
 
 def mean_load(log: Log) -> float:
     """Return the mean of the loads > 0 of a log [N], or raise InvalidValueError."""
-    return float(loads(log).mean())
+    return loads(log).mean()
 
 
 def loads(log: Log) -> np.ndarray:

@@ -12,7 +12,12 @@ from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.checks import check_slides
 from planarfriction.identify.logs import Arrays, Linear, as_tuple
-from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
+from planarfriction.identify.parameters import (
+    check_names,
+    check_patch,
+    fitted_law,
+    scaled_patch,
+)
 from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.search import interruptible, multistart, refine
@@ -43,7 +48,6 @@ from planarfriction.identify.verdicts import (
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 MOTION_PARAMETERS = ("mu_c", "mu_s", "v_s", "gamma", "sigma_2", "contact_radius")
 """Parameters that slides can determine; `mu_s` equals `mu_c` if only the latter is estimated."""
@@ -145,8 +149,7 @@ def identify_motion(
     # A subclass may compute something else from the parameters that are fitted.
     if type(start) is not LuGre:
         raise InvalidValueError("start", "be a LuGre law", start)
-    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
-    refuse_anisotropy(patch, "identify_motion")
+    check_patch(patch, "identify_motion")
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)
     robust = validation.choice("loss", loss, ("robust", "squares")) == "robust"

@@ -19,6 +19,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import Linear, Log
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.patch import ContactPatch, SoftFinger
+from planarfriction.patch.metric import refuse_anisotropy
 
 
 @dataclass(frozen=True)
@@ -120,6 +121,12 @@ def check_names(
             ", ".join(names),
         )
     return names
+
+
+def check_patch(patch: Any, by: str) -> None:
+    """Raise InvalidValueError unless `by` can take a patch: a ContactPatch without a friction metric."""
+    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
+    refuse_anisotropy(patch, by)
 
 
 def check_loads(
@@ -245,7 +252,7 @@ class Coordinates:
         return result
 
     def _mu(self, values: np.ndarray) -> float:
-        return self._held_mu_c if self._mu_c is None else float(values[self._mu_c])
+        return self._held_mu_c if self._mu_c is None else values[self._mu_c]
 
 
 def fitted_law(law: LuGre, given: Mapping[str, float]) -> LuGre:
@@ -317,7 +324,7 @@ class VectorMap:
         self.base = np.array(base, dtype=float)
         self.load = normal_force
         self._stiffness = 1.0 if reference is None else reference / normal_force
-        self._ratio = float(base[SECOND_MOMENT] / base[RADIUS] ** 2)
+        self._ratio = base[SECOND_MOMENT] / base[RADIUS] ** 2
         self._finger = (
             patch.pressure if any(name in SOFT_FINGER for name in names) else None
         )
@@ -377,7 +384,7 @@ def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, Any])
         if grown < largest:
             slopes["c"] = power * value / c
             slopes["n"] = power * value * np.log(normal_force)
-        results.append((float(value), slopes))
+        results.append((value, slopes))
     return results
 
 
@@ -386,4 +393,4 @@ def _log_beta_slope(a: float, k: float) -> float:
     from scipy.special import digamma
 
     both = digamma((a + 1) / k + 1)
-    return float(-(a * (digamma(a / k) - both) + (digamma(1 + 1 / k) - both)) / k**2)
+    return -(a * (digamma(a / k) - both) + (digamma(1 + 1 / k) - both)) / k**2

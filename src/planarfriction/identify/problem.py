@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from planarfriction.derivatives import PARAMETERS, parameters_of
-from planarfriction.identify import parameters as known
 from planarfriction.identify.decimation import redrawn
 from planarfriction.identify.logs import Arrays, Linear, Log, mean_load
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import (
     RADIUS,
     SECOND_MOMENT,
+    SOFT_FINGER,
     Coordinates,
     VectorMap,
     check_loads,
@@ -156,7 +156,7 @@ class LogProblem(Problem):
         self.model = model
         self.progress = progress
         self.kind = SIMULATORS[model]
-        self.fingers = [name for name in names if name in known.SOFT_FINGER]
+        self.fingers = [name for name in names if name in SOFT_FINGER]
         loads = [mean_load(log) for log in logs]
         check_loads(logs, loads, patch, self.fingers)
         self.reference_load = float(np.median(loads))
@@ -308,7 +308,7 @@ class LogProblem(Problem):
     def linearised(self, values: np.ndarray, sigma: Arrays) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, and derivatives `[M, F + K]`, at `values` or nearby (`NEARBY`)."""
         if self._slopes is None or not self._near(values, self._slopes[0]):
-            self._derive(values)
+            self._slopes = self._derive(values)
         both = zip(self._slopes[1], self.logs, self.used, sigma, strict=True)
         rows = [
             (slope * (log.channels / each)[..., None])[used].reshape(
@@ -349,8 +349,8 @@ class LogProblem(Problem):
             ).all()
         )
 
-    def _derive(self, values: np.ndarray) -> None:
-        """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`, and remember them."""
+    def _derive(self, values: np.ndarray) -> tuple[np.ndarray, Arrays]:
+        """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`, and remember the wrenches."""
         contact, rig = self.split(values)
         wrenches = []
         slopes = []
@@ -367,7 +367,7 @@ class LogProblem(Problem):
             wrenches.append(shown)
             slopes.append(np.concatenate([slope, of_rig], axis=-1))
         self._shown = values.copy(), wrenches
-        self._slopes = values.copy(), slopes
+        return values.copy(), slopes
 
     def residual(self, values: np.ndarray, sigma: Arrays) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, as the loss counts them."""

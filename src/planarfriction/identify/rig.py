@@ -52,7 +52,7 @@ ORDER = 3
 """Order of the differences that give the noise: motions at a tenth of the sampling rate
 leave 2 % of themselves."""
 
-SIZE = float(np.sqrt(20.0))
+SIZE = np.sqrt(20.0)
 """Standard deviation of these differences of unit noise: 1 + 9 + 9 + 1 under the
 root."""
 
@@ -173,7 +173,7 @@ class Rig:
 
     def delay(self, values: np.ndarray) -> float:
         """Return the delay [s] among the values `[K]`."""
-        return float(values[0]) if "delay" in self.groups else 0.0
+        return values[0] if "delay" in self.groups else 0.0
 
     def added(
         self, i: int, values: np.ndarray, wrench: np.ndarray, later: np.ndarray
@@ -192,8 +192,7 @@ class Rig:
     def with_drift(self, values: np.ndarray) -> np.ndarray:
         """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift, half its largest range."""
         drift = max(
-            0.5 * float(np.ptp(self._effects(i)[0] @ values))
-            for i in range(len(self.logs))
+            0.5 * (np.ptp(self._effects(i)[0] @ values)) for i in range(len(self.logs))
         )
         scales = np.array(
             [each.name == "load_scale" for each in self.columns], dtype=bool

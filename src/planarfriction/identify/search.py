@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -152,7 +153,7 @@ class Descent:
 
     def _residual(self, x: np.ndarray) -> np.ndarray:
         self._last = condensed(*self.residuals(x))
-        cost = 0.5 * float(self._last[0] @ self._last[0])
+        cost = 0.5 * (self._last[0] @ self._last[0])
         settled = abs(cost - self.cost) < self.share * cost
         if cost < self.cost:
             self.x = x.copy()
@@ -289,8 +290,8 @@ def _friction(problem: LogProblem, speeds: Arrays) -> tuple[float, float]:
     coefficient = coefficient[usable]
     speed = np.concatenate(speeds)[usable]
     fast = coefficient[speed >= np.quantile(speed, 0.7)]
-    mu_c = float(np.clip(np.median(fast), 0.01, 10.0))
-    return mu_c, float(np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c))
+    mu_c = np.clip(np.median(fast), 0.01, 10.0)
+    return mu_c, np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c)
 
 
 def _speeds(speeds: np.ndarray) -> np.ndarray:
@@ -317,7 +318,7 @@ def _stiffnesses(problem: LogProblem, speeds: Arrays, mu_c: float) -> np.ndarray
 
 def misfit(problem: LogProblem, values: np.ndarray, noise: np.ndarray) -> float:
     """Compute the sum of the squared residuals of values `[F]` or `[F + K]` over the noise `[3]`."""
-    return float((problem.residual(values, problem.even_sigma(noise)) ** 2).sum())
+    return (problem.residual(values, problem.even_sigma(noise)) ** 2).sum()
 
 
 def _scattered(
@@ -373,7 +374,7 @@ def _stretch(fit: Fit, i: int, way: np.ndarray, sign: float) -> float:
     residuals = problem.residuals(coordinates, fit.sigma)
     share = way[i] / fit.values[i]
     own = ALL[problem.names[i]]
-    factor: float = 1.0
+    factor: Any = 1.0
     wanted = 0.5 * REACH**2
     for _ in range(TRIES):
         by = sign * factor * share

@@ -93,7 +93,7 @@ class DistributedSimulator(PublishedSimulator):
     own_radius = False
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
-        self._radius = float(patch.contact_radius())
+        self._radius = patch.contact_radius()
         self._centre = patch.centre_of_pressure()
         if self.model_class is DistributedModel and patch.cells > CELLS:
             patch = patch.discs(DISCS)

@@ -123,7 +123,7 @@ def slide_poses(
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    length = float(time[-1] - time[0])
+    length = time[-1] - time[0]
     scene = free_slide(
         model,
         mass=body.mass,
@@ -131,8 +131,8 @@ def slide_poses(
         normal_force=body.mass * body.gravity,
         t_end=length,
         position=tuple(start[:2]),
-        angle=float(start[2]),
-        twist=start[3:],
+        angle=start[2],
+        twist=start[3:].tolist(),
     )
     every = max(length / max(len(time) - 1, 1), 1e-3)
     data = simulate(scene, save_every=every, **TOLERANCES).histories
@@ -261,7 +261,7 @@ def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, s
     """
     seen = [speeds(slide, body) for slide in slides]
     brakes = [brake for time, speed, _ in seen if (brake := _brake(time, speed)) > 0.0]
-    usual = float(np.median(brakes)) if brakes else 0.0
+    usual = np.median(brakes) if brakes else 0.0
     found = {}
     for i, (time, speed, noise) in enumerate(seen):
         grown = speed - np.minimum.accumulate(speed)
@@ -285,7 +285,7 @@ def _brake(time: np.ndarray, speed: np.ndarray) -> float:
     """Compute the mean deceleration until the speed is a tenth of the first [m/s^2]."""
     slow = np.flatnonzero(speed < 0.1 * speed[0])
     last = slow[0] if len(slow) else len(speed) - 1
-    return float((speed[0] - speed[last]) / (time[last] - time[0])) if last > 0 else 0.0
+    return (speed[0] - speed[last]) / (time[last] - time[0]) if last > 0 else 0.0
 
 
 def _free(time: np.ndarray, speed: np.ndarray, least: float) -> float:
@@ -334,6 +334,6 @@ def verdicts_on_influence(
     share = np.abs(moved) / np.where(known, errors, np.inf)
     if len(slides) <= 2 or share.max() <= STRONG:
         return []
-    i, j = np.unravel_index(share.argmax(), share.shape)
+    i, j = np.argwhere(share == share.max())[0]
     change = f"{names[j]} would change by {moved[i, j]:+.2g} ({share[i, j]:.1f} standard errors)"
     return [caution(f"without {slides[i].name}, {change}")]

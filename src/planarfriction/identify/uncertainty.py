@@ -391,6 +391,6 @@ def pulls_of_held(fit: Fit, u: Uncertainty) -> list[Pull]:
         # at the minimum, what was fitted has no slope left; its remainder is the pull's
         score = slopes[:, i] @ residual / size[-1]
         step = -score * curvature[:, -1] / size
-        error = float(np.sqrt(curvature[-1, -1] * max(u.reduced_chi2, 1.0)) / size[-1])
-        result.append(Pull(name, value, float(step[-1]), error, step[:count]))
+        error = np.sqrt(curvature[-1, -1] * max(u.reduced_chi2, 1.0)) / size[-1]
+        result.append(Pull(name, value, step[-1], error, step[:count]))
     return result

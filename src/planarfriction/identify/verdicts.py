@@ -121,7 +121,7 @@ def interval(name: str, value: float, error: float) -> tuple[float, float]:
     """Compute the 95 % interval [SI]: symmetric as factors for parameters that are > 0, else as differences."""
     if ALL[name].logarithmic and value > 0.0:
         with np.errstate(over="ignore"):
-            factor = float(np.exp(TWO_SIDED * error / value))
+            factor = np.exp(TWO_SIDED * error / value)
         return float(value / factor), float(value * factor)
     half = TWO_SIDED * error
     return max(float(value - half), ALL[name].low), float(value + half)
@@ -162,19 +162,19 @@ class Candidate(NamedTuple):
         problem = self.fit.problem
         u = self.uncertainty
         return ModelScore(
-            model=problem.model,
-            bristles=bristles_of(problem.law, problem.names),
-            held_out=u.score,
-            reduced_chi2=u.reduced_chi2,
-            rejected=u.rejected,
-            estimates=problem.by_name(self.fit.values),
+            problem.model,
+            bristles_of(problem.law, problem.names),
+            u.score,
+            u.reduced_chi2,
+            u.rejected,
+            problem.by_name(self.fit.values),
         )
 
     def cost(self, sigma: Arrays) -> float:
         """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""
         fit = self.fit
         pull = fit.coordinates.prior(fit.x)[0]
-        return 0.5 * float(
+        return 0.5 * (
             (fit.problem.residual(fit.values, sigma) ** 2).sum() + (pull**2).sum()
         )
 
@@ -236,7 +236,7 @@ class Evidence:
         """Return the estimate of a parameter, or `otherwise` if it was not estimated."""
         if name not in self.names:
             return otherwise
-        return float(self.values[self.names.index(name)])
+        return self.values[self.names.index(name)]
 
     @property
     def gap(self) -> str:
@@ -361,8 +361,8 @@ def _on_data(evidence: Evidence, u: Uncertainty) -> list[str]:
 def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     """Return the verdict on parameter i, or None if there is nothing to say."""
     name = evidence.names[i]
-    value = float(evidence.values[i])
-    error = float(evidence.errors[i])
+    value = evidence.values[i]
+    error = evidence.errors[i]
     kind = ALL[name]
     if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
         text = f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
@@ -454,7 +454,7 @@ def _partner(evidence: Evidence, i: int) -> tuple[str, float] | None:
     row = evidence.correlations[i].copy()
     row[i] = 0.0
     j = int(np.argmax(np.abs(row)))
-    return (evidence.names[j], float(row[j])) if abs(row[j]) > TOGETHER else None
+    return (evidence.names[j], row[j]) if abs(row[j]) > TOGETHER else None
 
 
 def speed_gap(speeds: np.ndarray, around: float) -> str:
@@ -467,8 +467,8 @@ def speed_gap(speeds: np.ndarray, around: float) -> str:
         return f"no sample below {1e3 * slow:.2g} and above {1e3 * fast:.2g} mm/s"
     below = moving[moving <= around]
     above = moving[moving > around]
-    low = float(below.max()) if len(below) else 0.0
-    high = float(above.min()) if len(above) else np.inf
+    low = below.max() if len(below) else 0.0
+    high = above.min() if len(above) else np.inf
     if high < GAP * low:
         return ""
     if not np.isfinite(high):

@@ -11,7 +11,6 @@ import numpy as np
 
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, size_of, with_findings
 from planarfriction.identify.columns import TWIST
 from planarfriction.identify.decimation import decimated, samples_of
@@ -24,7 +23,17 @@ from planarfriction.identify.logs import (
     one_coordinate,
 )
 from planarfriction.identify.options import FitOptions
-from planarfriction.identify.parameters import fitted_law, scaled_patch
+from planarfriction.identify.parameters import (
+    LAW,
+    RADIUS,
+    SHAPE,
+    SOFT_FINGER,
+    USUAL,
+    check_names,
+    check_patch,
+    fitted_law,
+    scaled_patch,
+)
 from planarfriction.identify.problem import SPOILED, LogProblem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, wrench_noise
@@ -47,7 +56,6 @@ from planarfriction.identify.verdicts import (
 )
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 START_MU_S = 1.2
 """Static coefficient that a search starts with by default: above `mu_c`, free to move."""
@@ -83,7 +91,7 @@ def identify_lugre(
     log: Log | Sequence[Log],
     patch: ContactPatch,
     *,
-    parameters: Sequence[str] = known.USUAL,
+    parameters: Sequence[str] = USUAL,
     model: str = "auto",
     start: LuGre | Mapping[str, float] | None = None,
     options: FitOptions = FitOptions(),  # noqa: B008 (frozen)
@@ -125,11 +133,10 @@ def identify_lugre(
         Ctrl-C, with the best values so far.
     """
     logs = as_tuple("log", log, Log)
-    names = known.check_names(parameters)
-    if names == known.USUAL and one_coordinate(logs):
+    names = check_names(parameters)
+    if names == USUAL and one_coordinate(logs):
         names = tuple(name for name in names if name != "contact_radius")
-    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
-    refuse_anisotropy(patch, "identify_lugre")
+    check_patch(patch, "identify_lugre")
     models = _models_to_fit(
         validation.choice("model", model, ("auto", *SIMULATORS)), patch, names
     )
@@ -217,7 +224,7 @@ def _models_to_fit(
 ) -> tuple[str, ...]:
     """Return the names of the models to fit; only some take a patch that changes with its load."""
     able = tuple(SIMULATORS)
-    if patch.depends_on_load or any(name in known.SOFT_FINGER for name in names):
+    if patch.depends_on_load or any(name in SOFT_FINGER for name in names):
         able = (LEAD,)
     if model not in ("auto", *able):
         rule = f"be {LEAD!r} if the patch changes with the load"
@@ -244,7 +251,7 @@ def _start_laws(
         raise InvalidValueError("start", rule, start)
     given = dict(start or {})
     for name, value in given.items():
-        validation.choice("start", name, known.LAW)
+        validation.choice("start", name, LAW)
         given[name] = validation.number(f"start[{name!r}]", value)
     kinds = [USUAL_BRISTLES, None] if bristles == "auto" else [bristles]
     fields = dict(given)
@@ -315,7 +322,7 @@ def _evidence(
     still = fit.values.copy()
     still[:count][np.isin(problem.names, ("mu_c", "mu_s"))] *= NO_SLIP
     slips, sticks = (
-        0.5 * float((problem.residual(each, fit.sigma) ** 2).sum())
+        0.5 * (problem.residual(each, fit.sigma) ** 2).sum()
         for each in (fit.values, still)
     )
     speeds, spins = np.concatenate(problem.sliding(values), axis=1)
@@ -331,7 +338,7 @@ def _evidence(
         jacobian=u.jacobian[:, :count],
         speeds=speeds,
         spins=spins,
-        held_mu_c=float(problem.law.numbers.mu_c),
+        held_mu_c=problem.law.numbers.mu_c,
         loads=np.array([mean_load(log) for log in problem.logs]),
         load_ratio=load_ratio(problem.logs),
         measured=np.any([log.channels for log in problem.logs], axis=0),
@@ -339,7 +346,7 @@ def _evidence(
         robust=problem.options.loss != "linear",
         without_slip=sticks - slips,
         largest_coefficient=max(
-            float(np.nanquantile(each["coefficient"], 0.99)) for each in histories
+            np.nanquantile(each["coefficient"], 0.99) for each in histories
         ),
     )
 
@@ -398,16 +405,16 @@ def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
     """Make the fitted model, with the patch scaled about its centre of pressure or fitted soft-finger constants."""
     given = problem.by_name(values)
     patch = problem.fixed_patch
-    surface = problem.options.surface
+    surface: Any = problem.options.surface
     if problem.fingers:
         finger = {name: given[name] for name in problem.fingers}
         pressure = dataclasses.replace(problem.patch.pressure, **finger)
         patch = dataclasses.replace(problem.patch, pressure=pressure)
         load = problem.reference_load
         surface = functools.partial(surface, normal_force=load)
-    elif any(name in known.SHAPE for name in given):
+    elif any(name in SHAPE for name in given):
         x, y = patch.centre_of_pressure()
-        radius = problem.maps[0].base[known.RADIUS]
+        radius = problem.maps[0].base[RADIUS]
         centre = np.array([given.get("centre_x", x), given.get("centre_y", y)])
         scale = given.get("contact_radius", radius) / radius
         patch = scaled_patch(patch, float(scale), centre)
