@@ -50,12 +50,10 @@ class Gap(NamedTuple):
 
     def until(self, time: float, twist: np.ndarray) -> Gap:
         """Return the gap without its last `time` [s], which have this `twist` `[3]`."""
-        (*_, moved) = self.twist
-        (*_, lasts) = self.dt
-        mean = (moved * lasts - twist * time) / (lasts - time)
+        left = self.dt[-1] - time
+        mean = (self.twist[-1] * self.dt[-1] - twist * time) / left
         return self._replace(
-            twist=np.vstack([self.twist[:-1], mean]),
-            dt=np.append(self.dt[:-1], lasts - time),
+            twist=np.vstack([self.twist[:-1], mean]), dt=np.append(self.dt[:-1], left)
         )
 
 
@@ -111,12 +109,10 @@ def redrawn(log: Log, noise: np.ndarray, random: np.random.Generator) -> Log:
 
 def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> DecimatedLog:
     """Return `count` of the windows of a log between rows `edges`."""
-    speed = np.zeros(len(log.time))
-    still = []
-    for values, scale in zip(log.twist.T, (1.0, 1.0, size), strict=True):
-        still.append(NOISE * jitter(values[:, None])[0])
-        speed += scale * np.where(np.abs(values) > still[-1], np.abs(values), 0.0)
-    path = np.concatenate([[0.0], np.cumsum(speed[1:] * np.diff(log.time))])
+    still = NOISE * jitter(log.twist)
+    moving = np.where(np.abs(log.twist) > still, np.abs(log.twist), 0.0)
+    speed = moving @ [1.0, 1.0, size]
+    path = np.append(0.0, np.cumsum(speed[1:] * np.diff(log.time)))
     chosen = farthest(features(log, edges, still), count)
     around = min(int(np.ceil(LONGEST / log.interval)), WINDOW // 2)
     fitted, near = np.zeros((2, len(log.time)), dtype=bool)
@@ -142,7 +138,7 @@ def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> Decimate
     )
 
 
-def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:
+def features(log: Log, edges: np.ndarray, still: np.ndarray) -> np.ndarray:
     """Compute what tells windows between rows `edges` apart, `[B, 15]` with values of about one.
 
     These are the largest twist in either direction on a scale that is logarithmic above the speeds `still` `[3]`, the
@@ -189,20 +185,20 @@ def _gap(log: Log, path: np.ndarray, first: int, last: int) -> Gap:
     Distances are those along the `path` `[T]` [m], and rows; a hold before a window or after one is apart.
     """
     shares = GROWTH ** -np.arange(LEVELS)
-    own = path[first : last + 1]
+    time, twist, load, own = (
+        values[first : last + 1]
+        for values in (log.time, log.twist, log.normal_force, path)
+    )
     marks = np.append(own[-1] - (own[-1] - own[0]) * shares, own[0])
     by_path = np.searchsorted(own, marks, "right") - 1
     hold = np.searchsorted(own, own[-1])
-    by_row = len(own) - 1 - np.round((last - first) * shares).astype(int)
-    rows = first + np.concatenate([by_path, by_row, [hold, last - first]])
-    rows = np.unique(np.clip(rows, first, last))
-    time, twist, load = (
-        values[first : last + 1] for values in (log.time, log.twist, log.normal_force)
-    )
+    by_row = last - first - np.round((last - first) * shares).astype(int)
+    rows = np.concatenate([by_path, by_row, [hold, last - first]])
+    rows = np.unique(np.maximum(rows, 0))
+    at = rows[:-1]
     steps = np.diff(time)
-    at = rows[:-1] - first
     since = twist[1:] if log.held else 0.5 * (twist[1:] + twist[:-1])
-    dt = np.diff(log.time[rows])
+    dt = np.diff(time[rows])
     mean = np.add.reduceat(since * steps[:, None], at, axis=0) / dt[:, None]
     loads = np.add.reduceat(0.5 * (load[1:] + load[:-1]) * steps, at) / dt
     loads = np.where(np.minimum.reduceat(load[1:], at) > 0.0, loads, 0.0)

@@ -232,18 +232,15 @@ class Log(ByValue):
         found = find_columns(
             path, table.names, contact=contact, with_load=normal_force is None
         )
-        motion = TWIST if "vx" in found or "omega" in found else MOTION
+        motion = MOTION if found.keys().isdisjoint(TWIST) else TWIST
         spare = [found["theta"]] if motion is TWIST and "theta" in found else []
         values = table.numbers(list(found.values()), spare)
         columns = dict(zip(found, values.T, strict=True))
-        moved = values[:, 1:4]
-        wrench = values[:, 4:7]  # no copies
-        if not {*WRENCH} <= found.keys():
-            moved, wrench = np.zeros((2, len(values), 3))
-            place = next(k for k, each in enumerate(WRENCH) if each in found)
-            motion = TWIST if TWIST[place] in found else MOTION
-            moved[:, place] = columns[motion[place]]
-            wrench[:, place] = columns[WRENCH[place]]
+        zeros = np.zeros(len(values))
+        moved, wrench = (
+            np.stack([columns.get(name, zeros) for name in names], -1)
+            for names in (motion, WRENCH)
+        )
         loads: Any = columns.get("normal_force", normal_force)
         try:
             time = columns["t"]

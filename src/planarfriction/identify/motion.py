@@ -164,7 +164,7 @@ def identify_motion(
     problem.progress = progress
     noise = FIRST_NOISE / np.array([1.0, 1.0, patch.contact_radius()])
     with interruptible([problem]):
-        fit = refine(multistart(problem, [problem.start_values()], noise=noise))
+        fit = refine(multistart(problem, [problem.start_values()], noise))
         return _identification(fit, problem, found)
 
 

@@ -25,7 +25,6 @@ from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
 from planarfriction.identify.simulators import (
     CENTRE,
     SIMULATORS,
-    PartsPrediction,
     Prediction,
     PublishedSimulator,
 )
@@ -75,12 +74,14 @@ class Problem:
 
     numbers: Any
     """Number of measured numbers."""
-    sizes: Callable[..., list[int]]
+    sizes: Any
     """Return the number of residuals of each log or slide."""
-    linearised: Callable[..., Linear]
-    even_sigma: Callable[..., Arrays]
-    """Return the same noise for all samples, `[T, 3]` of each log or slide."""
-    estimate_noise: Callable[..., tuple[np.ndarray, Arrays]]
+    linearised: Any
+    """Return `Linear` residuals for values `[F + K]` and `sigma`."""
+    even_sigma: Any
+    """Return the same noise for all samples, `[T, 3]` of each log or slide, from that of the channels."""
+    estimate_noise: Any
+    """Return the noise of the channels and sigma of each log or slide for values and the noise of before."""
 
     names: tuple[str, ...]
     """Names of the parameters of the contact, `[F]`."""
@@ -212,12 +213,11 @@ class LogProblem(Problem):
         logs: Sequence[Log] | None = None,
     ) -> list[Prediction]:
         twists = twists or [each.values for each in self.twists]
-        result = []
-        for log, twist in zip(logs or self.logs, twists, strict=True):
-            kind: Any = PartsPrediction if len(log.parts) > 1 else Prediction
-            begins = self.options.begins
-            result.append(kind(self.simulator, log, twist, begins=begins, refine=steps))
-        return result
+        begins = self.options.begins
+        return [
+            Prediction(self.simulator, log, twist, begins=begins, refine=steps)
+            for log, twist in zip(logs or self.logs, twists, strict=True)
+        ]
 
     def report(self, text: str) -> None:
         super().report(f"{self.model}: {text}")
@@ -432,9 +432,9 @@ class LogProblem(Problem):
         ):
             square = np.broadcast_to(noise**2, log.wrench.shape).copy()
             vector = each.vector(contact)
-            channels = np.diag(twist.noisy)
-            base = prediction.wrenches(vector) if channels.any() else None
-            for one in channels[channels.any(axis=1)]:
+            channels = np.eye(3)[twist.noisy]
+            base = prediction.wrenches(vector) if len(channels) else None
+            for one in channels:
                 square += (
                     prediction.moved(vector, one * twist.left, one * twist.noise) - base
                 ) ** 2

@@ -21,6 +21,9 @@ GROUPS = ("delay", "bias", "load", "twist")
 
 CHANNELS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
 
+FACTOR = 3
+"""Place of the factor on all channels, behind them."""
+
 DELAY = 0.01
 """Standard deviation of the delay a priori [s]."""
 
@@ -110,8 +113,8 @@ class _Column(NamedTuple):
     """Standard deviation a priori [unit]."""
     degree: int = 0
     """Degree of the Legendre polynomial over the log."""
-    channel: int | None = None
-    """Channel to which it adds; None for the factor of all."""
+    channel: int = FACTOR
+    """Channel to which it adds, or `FACTOR` for the factor on all."""
 
 
 class Rig:
@@ -127,25 +130,15 @@ class Rig:
             largest[:2] = np.maximum(largest[:2], LEAST_FORCE * largest[:2].max())
             for k, (channel, unit) in enumerate(CHANNELS):
                 if "bias" in groups and log.channels[k]:
-                    columns.append(
-                        _Column(f"bias_{channel}", unit, i, BIAS * largest[k], 0, k)
-                    )
-                    columns.append(
-                        _Column(
-                            f"zero_drift_{channel}",
-                            unit,
-                            i,
-                            ZERO_DRIFT * largest[k],
-                            1,
-                            k,
-                        )
-                    )
+                    bias = BIAS * largest[k]
+                    drift = ZERO_DRIFT * largest[k]
+                    columns += [
+                        _Column(f"bias_{channel}", unit, i, bias, 0, k),
+                        _Column(f"zero_drift_{channel}", unit, i, drift, 1, k),
+                    ]
             for k, width in enumerate(DRIFT if "load" in groups else (), start=1):
-                columns.append(
-                    _Column(
-                        "load_drift" if k == 1 else f"load_drift_{k}", "-", i, width, k
-                    )
-                )
+                name = "load_drift" if k == 1 else f"load_drift_{k}"
+                columns.append(_Column(name, "-", i, width, k))
         self.columns = tuple(columns)
         self.widths = np.array([each.width for each in columns])
         self.limits = np.array(
@@ -153,23 +146,16 @@ class Rig:
         )
         """Largest sizes of the values, over their widths, `[K]`."""
 
-    def _effects(self, i: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives `[T, K]` of the factor on the wrench of log i, and those `[T, 3, K]` of its zeros."""
+    def _effects(self, i: int) -> np.ndarray:
+        """Return the derivatives `[T, 4, K]` of the zeros of log i and of the factor on its wrench."""
         time = self.logs[i].time
-        shapes = np.polynomial.legendre.legvander(
-            2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0, len(DRIFT)
-        )
-        factor = np.zeros((len(time), len(self.columns)))
-        zeros = np.zeros((len(time), 3, len(self.columns)))
+        u = 2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0
+        shapes = np.polynomial.legendre.legvander(u, len(DRIFT))
+        effects = np.zeros((len(time), 4, len(self.columns)))
         for j, column in enumerate(self.columns):
             if column.log in (None, i) and column.name != "delay":
-                changed = (
-                    factor[:, j]
-                    if column.channel is None
-                    else zeros[:, column.channel, j]
-                )
-                changed[:] = shapes[:, column.degree]
-        return factor, zeros
+                effects[:, column.channel, j] = shapes[:, column.degree]
+        return effects
 
     def delay(self, values: np.ndarray) -> float:
         """Return the delay [s] among the values `[K]`."""
@@ -177,27 +163,27 @@ class Rig:
 
     def added(
         self, i: int, values: np.ndarray, wrench: np.ndarray, later: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, ...]:
         """Compute the wrench `[T, 3]` that sensors of log i show, the factor `[T]` on it, and derivatives `[T, 3, K]`.
 
         `later` is the derivative of the wrench with respect to the delay.
         """
-        by_factor, by_zeros = self._effects(i)
-        factor = 1.0 + by_factor @ values
-        slopes = by_factor[:, None] * wrench[:, :, None] + by_zeros
+        effects = self._effects(i)
+        changes = effects @ values
+        factor = 1.0 + changes[:, FACTOR]
+        slopes = effects[:, FACTOR, None] * wrench[:, :, None] + effects[:, :FACTOR]
         if "delay" in self.groups:
             slopes[:, :, 0] = factor[:, None] * later
-        return factor[:, None] * wrench + by_zeros @ values, factor, slopes
+        return factor[:, None] * wrench + changes[:, :FACTOR], factor, slopes
 
     def with_drift(self, values: np.ndarray) -> np.ndarray:
         """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift, half its largest range."""
-        drift = max(
-            0.5 * (np.ptp(self._effects(i)[0] @ values)) for i in range(len(self.logs))
-        )
-        scales = np.array(
-            [each.name == "load_scale" for each in self.columns], dtype=bool
-        )
-        return np.where(scales, np.hypot(SCALE, drift / EDGE), self.widths)
+        ranges = [
+            np.ptp(self._effects(i)[:, FACTOR] @ values) for i in range(len(self.logs))
+        ]
+        scales = [each.name == "load_scale" for each in self.columns]
+        wide = np.hypot(SCALE, 0.5 * max(ranges) / EDGE)
+        return np.where(np.array(scales, dtype=bool), wide, self.widths)
 
     def strains(self, values: np.ndarray) -> list[tuple[float, str]]:
         """Return the size of each value `[K]` over its width and in words, the largest first."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ SCATTER = 0.7
 """Standard deviation of the logarithms of starts around a given one."""
 
 
-def multistart(problem: Problem, starts: Arrays, *, noise: np.ndarray) -> Fit:
+def multistart(problem: Problem, starts: Arrays, noise: np.ndarray) -> Fit:
     """Find the best rough fit from starts `[F]` or `[F + K]`, with the same noise for all samples of a channel."""
     coordinates = problem.coordinates(starts[0])
     sigma = problem.even_sigma(noise)
@@ -87,14 +88,14 @@ def refine(fit: Fit) -> Fit:
 
 
 def warm_start(
-    problem: LogProblem, lead: Fit, guesses: Arrays, *, noise: np.ndarray
+    problem: LogProblem, lead: Fit, guesses: Arrays, noise: np.ndarray
 ) -> Fit:
     """Find the best rough fit of another model than that of `lead`, from where this ended and from the best guess.
 
     A lead that does not fit ends far away, and one that fits may stay where the corner of the bristles is not seen.
     """
     guess = min(guesses, key=lambda values: misfit(problem, values, noise))
-    return multistart(problem, [lead.values, guess], noise=noise)
+    return multistart(problem, [lead.values, guess], noise)
 
 
 @contextlib.contextmanager
@@ -115,6 +116,7 @@ class _SettledError(Exception):
     """The cost changes no more."""
 
 
+@dataclass(eq=False)
 class Descent:
     """Search from one start, and the best point that it has found.
 
@@ -122,17 +124,11 @@ class Descent:
     its steps vanish, if derivatives that are kept from nearby promise a gain that is not there.
     """
 
-    def __init__(
-        self,
-        residuals: Callable[[np.ndarray], Linear],
-        x: np.ndarray,
-        share: float,
-    ):
-        self.residuals = residuals
-        self.x = x
-        self.share = share
-        self.cost = np.inf
-        self._last = (np.empty(0), np.empty(0))
+    residuals: Callable[[np.ndarray], Linear]
+    x: np.ndarray
+    share: float
+    cost: Any = np.inf
+    _last: Any = None
 
     def run(self, bounds: tuple[np.ndarray, np.ndarray]) -> None:
         """Minimise the sum of squares."""
@@ -200,7 +196,7 @@ def _best(
         np.abs(best.x - each) <= TOUCHING * np.maximum(1.0, np.abs(best.x))
         for each in bounds
     )
-    x = np.where(low, bounds[0], np.where(high, bounds[1], best.x))
+    x = np.select([low, high], bounds, best.x)
     return Fit(
         problem,
         coordinates,

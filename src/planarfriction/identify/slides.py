@@ -235,7 +235,7 @@ def speeds(slide: Slide, body: MassProperties) -> tuple[np.ndarray, np.ndarray, 
     return times, np.linalg.norm(twists * scale, axis=1), sigma
 
 
-def window_twists(slide: Slide) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def window_twists(slide: Slide) -> tuple[np.ndarray, ...]:
     """Compute middle times `[W]` of windows, twists `[W, 3]` in them (world axes), and residuals of all poses `[T, 3]`.
 
     The twist of a window is the slope of a parabola through its poses.

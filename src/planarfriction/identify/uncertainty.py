@@ -158,7 +158,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
     )
 
 
-def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, ...]:
     """Compute the covariance `[F, F]` of a fit of slides from the spread over them.
 
     Each slide votes as one observation: `H^-1 (sum g g') H^-1 n/(n - 1)` with its vote `g = J' r`. Also returns the
@@ -251,7 +251,7 @@ def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarra
     slopes = rows[: len(jacobian)]
     whole = rows.T @ rows + RIDGE * np.eye(len(size))
     result = []
-    unseen = np.empty_like(residual)
+    unseen = np.zeros_like(residual)
     for k in range(FOLDS):
         out = fold == k
         kept = whole - slopes[out].T @ slopes[out]

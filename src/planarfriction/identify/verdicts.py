@@ -5,6 +5,7 @@ Each rule names the parameter and what is missing in the data.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -364,45 +365,46 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     value = evidence.values[i]
     error = evidence.errors[i]
     kind = ALL[name]
+    doubt = functools.partial(Verdict, name, False)
     if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
-        text = f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
-        return Verdict(name, False, text)
+        return doubt(
+            f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
+        )
     if name == "mu_s" and "mu_c" in evidence.names:
         c = evidence.names.index("mu_c")
-        if (
-            not evidence.errors[c] < VAGUE * evidence.values[c]
-            and not evidence.at_bound[c]
-        ):
-            text = "mu_c is unknown, as no sample is much faster than v_s, so that this may be mu_c"
-            return Verdict(name, False, text)
+        known = evidence.errors[c] < VAGUE * evidence.values[c]
+        if not known and not evidence.at_bound[c]:
+            return doubt(
+                "mu_c is unknown, as no sample is much faster than v_s, so that this may be mu_c"
+            )
     rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
     if evidence.at_bound[i] and not rests_on_zero:
-        return _on_bound(evidence, i)
-    size = abs(value)
-    seen = np.abs(evidence.jacobian[:, i]).max() * size
+        return doubt(_on_bound(evidence, i))
     if name in ("v_s", "gamma") and (reason := _no_stribeck(evidence)):
-        return Verdict(name, False, reason)
+        return doubt(reason)
+    size = abs(value)
     if not (error < VAGUE * size if kind.logarithmic else np.isfinite(error)):
-        return Verdict(name, False, _why(evidence, i, seen))
-    if name == "sigma_1" and value <= TWO_SIDED * error:
-        text = "cannot be distinguished from 0, so the corner frequency of the bristles may be above all samples"
-        return Verdict(name, False, text)
-    if kind.low == 0.0 and value < TWO_SIDED * error:
-        most = f"{value + TWO_SIDED * error:.3g} {kind.unit}"
-        return Verdict(name, True, f"cannot be distinguished from 0, at most {most}")
-    if (partner := _partner(evidence, i)) is not None:
-        other, correlation = partner
-        if not evidence.measured[2] and not {name, other}.isdisjoint(OF_TORQUE):
-            text = f"cannot be separated from {other} (correlation {correlation:.2f}) without the torque"
-            return Verdict(name, False, f"{text}, and tau is 0 throughout")
-        if error > WELL * size:
-            return Verdict(
-                name, True, f"strongly correlated with {other} ({correlation:.2f})"
-            )
-    return None
+        return doubt(_why(evidence, i))
+    half = TWO_SIDED * error
+    if name == "sigma_1" and value <= half:
+        return doubt(
+            "cannot be distinguished from 0, so the corner frequency of the bristles may be above all samples"
+        )
+    if kind.low == 0.0 and value < half:
+        text = f"cannot be distinguished from 0, at most {value + half:.3g} {kind.unit}"
+        return Verdict(name, True, text)
+    other, correlation = _partner(evidence, i)
+    if not other:
+        return None
+    if not evidence.measured[2] and not {name, other}.isdisjoint(OF_TORQUE):
+        text = f"cannot be separated from {other} (correlation {correlation:.2f}) without the torque"
+        return doubt(f"{text}, and tau is 0 throughout")
+    if error <= WELL * size:
+        return None
+    return Verdict(name, True, f"strongly correlated with {other} ({correlation:.2f})")
 
 
-def _why(evidence: Evidence, i: int, seen: float) -> str:
+def _why(evidence: Evidence, i: int) -> str:
     """Return the reason why a parameter is vague: a gap in the data, else another parameter, else the noise."""
     name = evidence.names[i]
     if name in ("v_s", "gamma", "mu_s") and (gap := evidence.gap):
@@ -414,11 +416,14 @@ def _why(evidence: Evidence, i: int, seen: float) -> str:
         return "one load only"
     if name in OF_TORQUE and not evidence.measured[2]:
         return "only the torque depends on it, and tau is 0 throughout"
+    size = abs(evidence.values[i])
+    seen = np.abs(evidence.jacobian[:, i]).max() * size
     if seen < UNSEEN:
         return f"changes no sample by more than {seen:.2g} times the noise"
-    if (partner := _partner(evidence, i)) is not None:
-        return f"cannot be separated from {partner[0]} (correlation {partner[1]:.2f})"
-    return f"standard error {100 * evidence.errors[i] / abs(evidence.values[i]):.0f} % of the estimate"
+    other, correlation = _partner(evidence, i)
+    if other:
+        return f"cannot be separated from {other} (correlation {correlation:.2f})"
+    return f"standard error {100 * evidence.errors[i] / size:.0f} % of the estimate"
 
 
 def _no_stribeck(evidence: Evidence) -> str:
@@ -439,22 +444,21 @@ def _no_stribeck(evidence: Evidence) -> str:
     return ""
 
 
-def _on_bound(evidence: Evidence, i: int) -> Verdict:
+def _on_bound(evidence: Evidence, i: int) -> str:
     name = evidence.names[i]
-    if name == "mu_s" and evidence.values[i] <= SAME * evidence.value(
-        "mu_c", evidence.held_mu_c
-    ):
-        reason = evidence.gap or "no friction above mu_c was seen"
-        return Verdict(name, False, f"{reason}: equal to mu_c")
-    text = f"the fit ran into the bound {evidence.values[i]:.3g} {ALL[name].unit}"
-    return Verdict(name, False, text)
+    value = evidence.values[i]
+    mu_c = evidence.value("mu_c", evidence.held_mu_c)
+    if name == "mu_s" and value <= SAME * mu_c:
+        return f"{evidence.gap or 'no friction above mu_c was seen'}: equal to mu_c"
+    return f"the fit ran into the bound {value:.3g} {ALL[name].unit}"
 
 
-def _partner(evidence: Evidence, i: int) -> tuple[str, float] | None:
+def _partner(evidence: Evidence, i: int) -> tuple[str, float]:
+    """Return the parameter from which another one cannot be separated, and their correlation; or nothing, and zero."""
     row = evidence.correlations[i].copy()
     row[i] = 0.0
     j = int(np.argmax(np.abs(row)))
-    return (evidence.names[j], row[j]) if abs(row[j]) > TOGETHER else None
+    return (evidence.names[j], row[j]) if abs(row[j]) > TOGETHER else ("", 0.0)
 
 
 def speed_gap(speeds: np.ndarray, around: float) -> str:

@@ -196,12 +196,12 @@ def identify_lugre(
                         seed=options.seed,
                         noise=noise,
                     )
-                    fit = multistart(problem, guesses, noise=noise)
+                    fit = multistart(problem, guesses, noise)
                     values = problem.by_name(fit.values).items()
                     first = ", ".join(f"{key} {value:.3g}" for key, value in values)
                     problem.report(f"a first answer: {first}")
                 else:
-                    fit = warm_start(problem, lead or leads[0], guesses, noise=noise)
+                    fit = warm_start(problem, lead or leads[0], guesses, noise)
                 if name == LEAD:
                     leads.append(fit)
                 if name in models and (name != LEAD or law.reference_load is None):
