@@ -424,4 +424,5 @@ def unwrapped(
             i = int(np.argmax(where))
             found = f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s"
             raise InvalidValueError(f"{name} [rad]", rule, found)
-    return angle - TURN * np.append(0.0, np.cumsum(turns)), np.count_nonzero(turns)
+    count = int(np.count_nonzero(turns))
+    return angle - TURN * np.append(0.0, np.cumsum(turns)), count

@@ -192,7 +192,7 @@ class LogProblem(Problem):
                 self.fixed_patch, self._per_load, self.options.surface
             )
         )
-        self.base = dict(zip(PARAMETERS, base.tolist(), strict=True))
+        self.base: dict[str, float] = dict(zip(PARAMETERS, base.tolist(), strict=True))
         own = self.kind.own_radius
         reference = self.law.reference_load if own else None
         maps = [VectorMap(self.names, base, patch, load, reference) for load in loads]
