@@ -8,7 +8,7 @@ import pytest
 from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.identify import Log
 from planarfriction.identify.decimation import WINDOW, decimated, farthest, samples_of
-from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
+from planarfriction.identify.simulators import SIMULATORS, Prediction
 from planarfriction.models import ReducedModelPublished
 from tests.support.identification_logs import (
     LAW,
@@ -114,7 +114,7 @@ def test_each_of_many_logs_keeps_its_share(log):
 def test_the_whole_motion_is_stepped_through(log):
     """Displacements and durations of windows and gaps add up to those of the log, to rounding."""
     (cut,) = decimated([log], SIZE, 6000)
-    steps = PartsPrediction(SIMULATORS["reduced-published"](PATCH, LAW), cut, cut.twist)
+    steps = Prediction(SIMULATORS["reduced-published"](PATCH, LAW), cut, cut.twist)
     twists, _, dt = steps._inputs
     assert len(cut.gaps) > 5
     assert dt[1:].sum() == pytest.approx(cut.time[-1] - log.time[0], rel=1e-12)
@@ -132,7 +132,7 @@ def test_wrenches_are_those_of_the_whole_log(log, name):
     simulator = SIMULATORS[name](PATCH, LAW)
     (cut,) = decimated([log], SIZE, 6000)
     whole = Prediction(simulator, log, log.twist).wrenches(vector)
-    found = PartsPrediction(simulator, cut, cut.twist).wrenches(vector)
+    found = Prediction(simulator, cut, cut.twist).wrenches(vector)
     off = found[cut.inner] - whole[np.searchsorted(log.time, cut.time[cut.inner])]
     assert (np.abs(off).max(axis=0) < 2e-3 * np.abs(whole).max(axis=0)).all()
 

@@ -52,7 +52,7 @@ def slides(count, noise=1e-4, spin=3.0, seed=0):
             ]
         )
         time = np.arange(45) / 150.0
-        pose = slide_poses(model, BODY, time, np.array([0.1, 0.2, heading]), twist)
+        pose = slide_poses(model, BODY, time, np.array([0.1, 0.2, heading, *twist]))
         off = noise * random.standard_normal(pose.shape) / [1.0, 1.0, 0.03]
         rough = twist + [0.03, -0.03, 0.3] * random.standard_normal(3)
         result.append(Slide(time, pose + off, rough, f"slide {number}"))
@@ -63,7 +63,7 @@ def test_simulated_slide_in_closed_form():
     """v t - mu g t^2/2 until v/(mu g); the spin alone stops after omega I/(mu m g r)."""
     time = np.linspace(0.0, 0.3, 31)
     poses = slide_poses(
-        ellipsoid(PATCH, LAW), BODY, time, np.zeros(3), np.array([0.5, 0.0, 0.0])
+        ellipsoid(PATCH, LAW), BODY, time, np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0])
     )
     moving = np.minimum(time, 0.5 / (MU * 9.81))
     # Relaxed bristles let the first 2 mm/s ... of mu g sigma_1/sigma_0 go: 0.1 mm over the way.
@@ -71,7 +71,7 @@ def test_simulated_slide_in_closed_form():
         0.5 * moving - 0.5 * MU * 9.81 * moving**2, abs=1e-4
     )
     spun = slide_poses(
-        ellipsoid(PATCH, LAW), BODY, time, np.zeros(3), np.array([0.0, 0.0, 4.0])
+        ellipsoid(PATCH, LAW), BODY, time, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 4.0])
     )
     braking = MU * BODY.mass * 9.81 * PATCH.contact_radius() / BODY.inertia
     assert spun[-1, 2] == pytest.approx(4.0**2 / (2.0 * braking), rel=5e-3)

@@ -363,7 +363,7 @@ def test_intervals_hold_the_truth(name, monkeypatch):
 def test_a_model_begins_where_the_lead_ended_and_at_the_best_guess(monkeypatch):
     tried = []
     monkeypatch.setattr(
-        search, "multistart", lambda problem, starts, *, noise: tried.extend(starts)
+        search, "multistart", lambda problem, starts, noise: tried.extend(starts)
     )
     monkeypatch.setattr(search, "misfit", lambda problem, values, noise: values[0])
     search.warm_start(

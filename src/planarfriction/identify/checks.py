@@ -150,11 +150,8 @@ def check_slides(
 
     Raises InvalidValueError, one line, for what no fit can make sense of.
     """
-    return _accepted(
-        each
-        for each in (check_slide_units(slides, patch, body), *map(check_frozen, slides))
-        if each
-    )
+    found = (check_slide_units(slides, patch, body), *map(check_frozen, slides))
+    return _accepted(filter(None, found))
 
 
 def _accepted(findings: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -169,33 +166,21 @@ def with_findings(
     result: Identification, logs: Sequence[Log], findings: Sequence[Finding]
 ) -> Identification:
     """Return the result with verdicts on the findings, and on the sampling rate that its estimates ask for."""
-    found: list[Finding | None] = [*findings]
-    unseen: list[Verdict] = []
+    odd = [*findings]
+    verdicts = []
     estimates = result.estimates
-    least = {name: low for name, (low, _) in result.intervals().items()}
     # where sigma_1 may be 0, or nobody knows it, its corner may lie anywhere
-    if "sigma_0" in estimates and least.get("sigma_1", 0.0) > 0.0:
+    low, _ = result.intervals().get("sigma_1", (0.0, 0.0))
+    if "sigma_0" in estimates and low > 0.0:
         rates = [
             check_sampling(log, estimates["sigma_0"], estimates["sigma_1"])
             for log in logs
         ]
-        found += rates
+        odd += filter(None, rates)
         if None not in rates:
-            unseen.append(
-                Verdict(
-                    "sigma_1",
-                    False,
-                    "no log is sampled at twice the corner frequency of the bristles",
-                )
-            )
-    verdicts = [
-        *unseen,
-        *(
-            Verdict("fit", False, str(finding))
-            for finding in found
-            if finding is not None
-        ),
-    ]
+            text = "no log is sampled at twice the corner frequency of the bristles"
+            verdicts.append(Verdict("sigma_1", False, text))
+    verdicts += (Verdict("fit", False, str(finding)) for finding in odd)
     return dataclasses.replace(result, verdicts=(*result.verdicts, *verdicts))
 
 
@@ -203,14 +188,13 @@ def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
     """Check one log: sign of the work, axes and units, displacement between samples, friction against load."""
     size = size_of(log, patch)
     sliding = Sliding.of(log, patch)
-    work = check_work(log, sliding)
-    found = [work] if work else [check_directions(log, sliding, size)]
-    found += [
+    found = (
+        check_work(log, sliding) or check_directions(log, sliding, size),
         check_times(log, size),
         check_friction(log, size),
         check_unloaded(log, size),
-    ]
-    return [finding for finding in found if finding is not None]
+    )
+    return [*filter(None, found)]
 
 
 # ---------------------------------------------------------------------- work and direction
@@ -236,30 +220,23 @@ class Sliding(NamedTuple):
     def of(cls, log: Log, patch: ContactPatch) -> Sliding:
         """Select the fast samples under load, at most `MOST` of them."""
         few = patch.discs(FEW_DISCS) if patch.cells > MOST_CELLS else patch
-        weights = few.weights(_load(log)) if few.depends_on_load else few.weights()
-        size = size_of(log, patch)
-        speed, force = (
-            np.linalg.norm(each, axis=1)
-            for each in (log.twist * [1, 1, size], log.wrench / [1, 1, size])
-        )
-        enough = [
-            each >= share * np.quantile(each, 0.95)
-            for each, share in ((speed, FAST), (force, STRONG))
-        ]
-        rows = np.flatnonzero(
-            np.all([*enough, speed > 0.0, force > 0.0, log.normal_force > 0.0], axis=0)
-        )
+        size = [1.0, 1.0, size_of(log, patch)]
+        speed = np.linalg.norm(log.twist * size, axis=1)
+        force = np.linalg.norm(log.wrench / size, axis=1)
+        fast = speed >= FAST * np.quantile(speed, 0.95)
+        strong = force >= STRONG * np.quantile(force, 0.95)
+        loaded = (speed > 0.0) & (force > 0.0) & (log.normal_force > 0.0)
+        rows = np.flatnonzero(fast & strong & loaded)
         rows = rows[:: max(1, -(-len(rows) // MOST))]
-        since = log.twist[1:, 2] if log.held else log.twist[:-1, 2]
-        turned = np.append(
-            0.0, np.cumsum(0.5 * (log.twist[1:, 2] + since) * np.diff(log.time))
-        )
+        spin = log.twist[:, 2]
+        since = spin[1:] if log.held else spin[:-1]
+        turns = 0.5 * (spin[1:] + since) * np.diff(log.time)
         return cls(
             log.twist[rows],
             log.wrench[rows],
-            turned[rows],
+            np.append(0.0, np.cumsum(turns))[rows],
             few.levers(),
-            weights,
+            few.weights(_load(log)),
             log.channels,
         )
 
@@ -273,16 +250,14 @@ class Sliding(NamedTuple):
 
     def angle(self, twist: np.ndarray, wrench: np.ndarray, scale: float) -> float:
         """Compute the median angle [deg] between wrenches and those of dry friction."""
-        size = float(
-            np.sqrt(np.einsum("n,ni->", self.weights, self.levers[:, :, 2] ** 2))
-        )
+        size = np.sqrt((self.weights @ self.levers[:, :, 2] ** 2).sum())
         a, b = (
             (each / [1.0, 1.0, size])[:, self.channels]
             for each in (self.friction(twist, scale), wrench)
         )
         lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
-        cosines = np.einsum("si,si->s", a, b) / np.where(lengths > 0.0, lengths, 1.0)
-        return float(np.degrees(np.median(np.arccos(np.clip(cosines, -1.0, 1.0)))))
+        cosines = (a * b).sum(axis=1) / np.where(lengths > 0.0, lengths, 1.0)
+        return np.degrees(np.median(np.arccos(np.clip(cosines, -1.0, 1.0))))
 
     def best(
         self, twist: np.ndarray, wrench: np.ndarray, scales: np.ndarray = NEAR
@@ -293,13 +268,12 @@ class Sliding(NamedTuple):
 
 def check_work(log: Log, sliding: Sliding) -> Finding | None:
     """Check that friction takes work from the moving body; a wrench that gives work has the wrong sign."""
-    power = np.einsum("si,si->s", sliding.twist, sliding.wrench)
-    if len(power) < LEAST or power[power > 0.0].sum() <= AGAINST * np.abs(power).sum():
+    power = (sliding.twist * sliding.wrench).sum(axis=1)
+    driving = power > 0.0
+    if len(power) < LEAST or power[driving].sum() <= AGAINST * np.abs(power).sum():
         return None
     rule = f"act on the moving body, against its motion (it does {_best_reading(sliding)[1]})"
-    found = (
-        f"power > 0 in {100.0 * np.mean(power > 0.0):.4g} % of the samples that slide"
-    )
+    found = f"power > 0 in {100.0 * driving.mean():.4g} % of the samples that slide"
     return Finding(f"wrench of {log.name}", rule, found, refuses=True)
 
 
@@ -310,25 +284,19 @@ def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
     as_read = sliding.best(sliding.twist, sliding.wrench)[0]
     if as_read < MISREAD:
         return None
-    found = _best_reading(sliding)
-    angle, scale = sliding.best(sliding.twist, sliding.wrench, FAR)
-    if angle < found[0]:
+    angle, words = _best_reading(sliding)
+    on_another, scale = sliding.best(sliding.twist, sliding.wrench, FAR)
+    if on_another < angle:
+        angle = on_another
         factor = min(LEVERS, key=lambda each: abs(np.log(scale / each)))
-        hint = (
-            f" ({LEVERS[factor]}?)"
-            if 1.0 / SAME_LEVER < scale / factor < SAME_LEVER
-            else ""
-        )
-        found = (
-            angle,
-            f"with a contact radius of {1e3 * scale * size:.3g} mm in place of {1e3 * size:.3g} mm{hint}",
-        )
-    if found[0] > BETTER * as_read:
+        words = f"with a contact radius of {1e3 * scale * size:.3g} mm in place of {1e3 * size:.3g} mm"
+        if 1.0 / SAME_LEVER < scale / factor < SAME_LEVER:
+            words += f" ({LEVERS[factor]}?)"
+    if angle > BETTER * as_read:
         return None
-    text = f"a median deviation of {as_read:.0f} deg, and {found[0]:.0f} deg {found[1]}"
-    return Finding(
-        f"wrench of {log.name}", "point in the direction of friction on the patch", text
-    )
+    rule = "point in the direction of friction on the patch"
+    text = f"a median deviation of {as_read:.0f} deg, and {angle:.0f} deg {words}"
+    return Finding(f"wrench of {log.name}", rule, text)
 
 
 def _best_reading(sliding: Sliding) -> tuple[float, str]:
@@ -358,17 +326,11 @@ def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
         yield "if the twist is in world axes", rotate(twist, -turned), wrench
         yield "if the wrench is in world axes", twist, rotate(wrench, -turned)
     for scale in NEAR[::4]:
-        expected, measured = (
-            each[:, 0] + 1j * each[:, 1]
-            for each in (sliding.friction(twist, scale), wrench)
-        )
-        angle = float(np.angle((expected * measured.conj()).sum()))
+        expected = sliding.friction(twist, scale)[:, :2] @ [1.0, 1.0j]
+        angle = np.angle((wrench[:, :2] @ [1.0, 1.0j]).conj() @ expected)
         if abs(angle) > LEAST_MOUNTED:
-            yield (
-                f"with fx and fy turned by {np.degrees(angle):.0f} deg",
-                twist,
-                rotate(wrench, angle),
-            )
+            words = f"with fx and fy turned by {np.degrees(angle):.0f} deg"
+            yield words, twist, rotate(wrench, angle)
 
 
 # ---------------------------------------------------------------------- times, speeds, loads
@@ -376,17 +338,15 @@ def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
 
 def check_times(log: Log, size: float) -> Finding | None:
     """Check that the contact moves a small part of its size between two samples; more points to mm/s, or to ms."""
-    speed = float(np.quantile(np.linalg.norm(log.twist * [1, 1, size], axis=1), 0.9))
+    speed = np.quantile(np.linalg.norm(log.twist * [1, 1, size], axis=1), 0.9)
     moved = speed * log.interval
     seen = f"{1e3 * moved:.3g} mm between samples {log.interval:.3g} s apart, contact radius {1e3 * size:.3g} mm"
     if log.interval >= SLOW and moved > TRAVEL * size:
         return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
-    text = f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
-    return (
-        Finding(f"twist of {log.name}", "be in m/s and rad/s", text)
-        if speed > SPEEDY or moved > size
-        else None
-    )
+    if speed > SPEEDY or moved > size:
+        text = f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
+        return Finding(f"twist of {log.name}", "be in m/s and rad/s", text)
+    return None
 
 
 def check_friction(log: Log, size: float) -> Finding | None:
@@ -394,36 +354,29 @@ def check_friction(log: Log, size: float) -> Finding | None:
     loaded = log.normal_force > 0.0
     if not loaded.any():
         return None
-    each = (
-        np.linalg.norm(log.wrench[loaded, :2], axis=1),
-        np.abs(log.wrench[loaded, 2]) / size,
-    )
-    force, torque = (
-        float(np.quantile(part / log.normal_force[loaded], 0.9)) for part in each
-    )
+    shares = log.wrench[loaded] / log.normal_force[loaded, None]
+    force = np.quantile(np.linalg.norm(shares[:, :2], axis=1), 0.9)
+    torque = np.quantile(np.abs(shares[:, 2]) / size, 0.9)
     if force > HIGH:
         text = f"friction of {force:.3g} times the load: is normal_force in kg or kN?"
         return Finding(f"normal_force of {log.name}", "be in N", text)
     if torque > HIGH:
+        rule = "be in N m about the origin of the contact frame"
         text = f"a torque of {torque:.3g} times the load and the contact radius: is it in N mm, or about another point?"
-        return Finding(
-            f"tau of {log.name}",
-            "be in N m about the origin of the contact frame",
-            text,
-        )
+        return Finding(f"tau of {log.name}", rule, text)
     return None
 
 
 def check_unloaded(log: Log, size: float) -> Finding | None:
     """Check that there is no friction without load, as there is with a load cell that has an offset."""
     force = np.linalg.norm(log.wrench / [1.0, 1.0, size], axis=1)
-    bare = log.normal_force == 0.0
-    if bare.sum() < LEAST or not np.median(force[bare]) > STRONG * np.quantile(
-        force, 0.95
-    ):
+    bare = force[log.normal_force == 0.0]
+    if len(bare) < LEAST or np.median(bare) <= STRONG * np.quantile(force, 0.95):
         return None
-    rule = f"be > 0 where there is friction (it is 0 in {bare.sum()} samples)"
-    text = f"friction of {np.median(force[bare]):.3g} N there: does the load cell have an offset?"
+    rule = f"be > 0 where there is friction (it is 0 in {len(bare)} samples)"
+    text = (
+        f"friction of {np.median(bare):.3g} N there: does the load cell have an offset?"
+    )
     return Finding(f"normal_force of {log.name}", rule, text)
 
 
@@ -449,19 +402,18 @@ def check_slide_units(
     """Check that decelerations are those of friction, and alike in all windows of all slides, for times in s, places in
     m and angles in rad: of 281 measured slides, one at a time, 245 are doubted if they are in deg, and none in rad."""
     size = _size_at(body.mass * body.gravity, patch)
-    as_read, in_degrees = (
-        _friction_of_slides(slides, body, size, unit) for unit in (1.0, np.pi / 180.0)
-    )
+    as_read = _friction_of_slides(slides, body, size, 1.0)
     if len(as_read) == 0:
         return None
-    friction = float(np.median(as_read))
+    in_degrees = _friction_of_slides(slides, body, size, np.pi / 180.0)
+    friction = np.median(as_read)
+    less = np.median(in_degrees)
+    spread = np.std(np.log(as_read))
+    steadier = np.std(np.log(in_degrees))
     text = f"friction of {friction:.3g} times the load"
     if friction < LOW:
-        return Finding(
-            "time of the slides", "be in s", f"{text}: is it in ms?", refuses=True
-        )
-    less = float(np.median(in_degrees))
-    (spread, steadier) = (np.std(np.log(each)) for each in (as_read, in_degrees))
+        text = f"{text}: is it in ms?"
+        return Finding("time of the slides", "be in s", text, refuses=True)
     if (spread > VARIES and steadier < STEADIER * spread) or (
         friction > USUAL and less < HALF * friction
     ):
@@ -470,9 +422,8 @@ def check_slide_units(
         sure = (len(as_read) >= FEW and spread > SURE) or friction > HIGH
         return Finding("theta of the slides", "be in rad", text, refuses=bool(sure))
     if friction > HIGH:
-        return Finding(
-            "x and y of the slides", "be in m", f"{text}: are they in mm?", refuses=True
-        )
+        text = f"{text}: are they in mm?"
+        return Finding("x and y of the slides", "be in m", text, refuses=True)
     return None
 
 
@@ -484,11 +435,8 @@ def _friction_of_slides(
     for slide in slides:
         times, twists, _ = window_twists(slide)
         speed = np.hypot(twists[:, 0], twists[:, 1])
-        rates = (
-            np.diff(twists, axis=0)
-            / np.diff(times)[:, None]
-            * [1.0, 1.0, unit * body.inertia / (body.mass * size)]
-        )
+        scale = [1.0, 1.0, unit * body.inertia / (body.mass * size)]
+        rates = np.diff(twists * scale, axis=0) / np.diff(times)[:, None]
         moving = np.minimum(speed[:-1], speed[1:]) > FAST * speed.max()
         found.append(np.linalg.norm(rates[moving], axis=1) / body.gravity)
     friction = np.concatenate(found)
@@ -500,25 +448,20 @@ def check_frozen(slide: Slide) -> Finding | None:
     steps = np.hypot(*np.diff(slide.pose[:, :2], axis=0).T)
     speed = steps / np.diff(slide.time)
     for k in range(STILL, len(speed) - 3):
-        after = float(np.median(speed[k + 1 : k + 4]))
+        after = np.median(speed[k + 1 : k + 4])
         if speed[k - STILL : k].max() < SLOWED * after and speed[k] > JUMP * after:
-            still = k - int(
-                np.argmax(np.append(speed[:k][::-1] >= SLOWED * after, True))
-            )
-            rest = f"no motion for {1e3 * (slide.time[k] - slide.time[still]):.3g} ms until t = {slide.time[k]:.4g} s"
-            text = f"{rest}, then a jump of {1e3 * steps[k]:.3g} mm"
-            return Finding(
-                f"pose of {slide.name}",
-                "follow the body (leave out frozen samples)",
-                text,
-                refuses=True,
-            )
+            moving = np.flatnonzero(speed[:k] >= SLOWED * after) + 1
+            rest = slide.time[k] - slide.time[moving.max(initial=0)]
+            rule = "follow the body (leave out frozen samples)"
+            text = f"no motion for {1e3 * rest:.3g} ms until t = {slide.time[k]:.4g} s"
+            text += f", then a jump of {1e3 * steps[k]:.3g} mm"
+            return Finding(f"pose of {slide.name}", rule, text, refuses=True)
     return None
 
 
 def _load(log: Log) -> float:
     loaded = log.normal_force[log.normal_force > 0.0]
-    return float(np.median(loaded)) if len(loaded) else 1.0
+    return np.median(loaded) if len(loaded) else 1.0
 
 
 def size_of(log: Log, patch: ContactPatch) -> float:
@@ -528,12 +471,9 @@ def size_of(log: Log, patch: ContactPatch) -> float:
 
 def _size_at(load: float, patch: ContactPatch) -> float:
     """Return the contact radius at a load [m]. Raises InvalidValueError for a single point."""
-    size = float(
-        patch.contact_radius(load) if patch.depends_on_load else patch.contact_radius()
-    )
+    size = patch.contact_radius(load)
     if not size > 0.0:
         rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"
-        raise InvalidValueError(
-            "patch", rule, f"{patch.cells} cell with a contact radius of {size:g} m"
-        )
+        found = f"{patch.cells} cell with a contact radius of {size:g} m"
+        raise InvalidValueError("patch", rule, found)
     return size

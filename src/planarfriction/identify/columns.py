@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from planarfriction._support import validation
@@ -15,37 +15,46 @@ WRENCH = ("fx", "fy", "tau")
 LOAD = ("normal_force",)
 
 ALIASES = {
-    **{"time": "t", "time_s": "t", "t_s": "t", "wz": "omega"},
-    **{"fn": "normal_force", "fz": "normal_force", "mz": "tau", "tz": "tau"},
-    **{
-        "force": "fx",
-        "velocity": "vx",
-        "position": "x",
-        "torque": "tau",
-        "angle": "theta",
-    },
+    "time": "t",
+    "time_s": "t",
+    "t_s": "t",
+    "wz": "omega",
+    "fn": "normal_force",
+    "fz": "normal_force",
+    "mz": "tau",
+    "tz": "tau",
+    "force": "fx",
+    "velocity": "vx",
+    "position": "x",
+    "torque": "tau",
+    "angle": "theta",
 }
 """Other names of columns, in small letters."""
 
 MESSAGES = {
-    **{"force.x": "fx", "force.y": "fy", "force.z": "normal_force", "torque.z": "tau"},
-    **{
-        "linear.x": "vx",
-        "linear.y": "vy",
-        "angular.z": "omega",
-        "position.x": "x",
-        "position.y": "y",
-    },
+    "force.x": "fx",
+    "force.y": "fy",
+    "force.z": "normal_force",
+    "torque.z": "tau",
+    "linear.x": "vx",
+    "linear.y": "vy",
+    "angular.z": "omega",
+    "position.x": "x",
+    "position.y": "y",
 }
 """Columns by the names of ROS messages; what stands before them, as in wrench.force.x, does not count."""
 
 UNITS = {
     "t": ("s",),
-    **dict.fromkeys(("vx", "vy"), ("m/s",)),
+    "vx": ("m/s",),
+    "vy": ("m/s",),
     "omega": ("rad/s", "1/s"),
-    **dict.fromkeys(("x", "y"), ("m",)),
+    "x": ("m",),
+    "y": ("m",),
     "theta": ("rad",),
-    **dict.fromkeys(("fx", "fy", "normal_force"), ("n",)),
+    "fx": ("n",),
+    "fy": ("n",),
+    "normal_force": ("n",),
     "tau": ("nm", "n*m", "n.m", "n·m"),
 }
 """Units that may stand in brackets behind a name, or below it, in small letters and without spaces."""
@@ -68,49 +77,39 @@ def find_columns(
     """
     named = _named(path, headings)
     contacts = sorted({name.rpartition(".")[0] for name in named} - {""})
-    if contact is not None and not contacts:
-        raise FileError(
-            f"{path}: contact must be left out: no column is named as pad.vx, got {shown(repr(contact))}"
-        )
-    if contact is not None:
-        try:
-            contact = validation.choice("contact", contact, contacts)
-        except InvalidValueError as error:
-            raise FileError(f"{path}: {error}") from None
-    elif _missing(named, "", with_load):
-        lacks = {each: len(_missing(named, f"{each}.", with_load)) for each in contacts}
-        whole = [each for each in contacts if lacks[each] == 0]
-        if len(whole) > 1:
+    lacks = {each: _missing(named, each, with_load) for each in ("", *contacts)}
+    if contact is None:
+        whole = [each for each in contacts if not lacks[each]]
+        if lacks[""] and len(whole) > 1:
             raise FileError(
                 f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them"
             )
-        # The message names what it lacks.
-        nearest = min(contacts, key=lacks.__getitem__, default="")
-        contact = (
-            nearest
-            if nearest and lacks[nearest] < len(_missing(named, "", with_load))
-            else None
-        )
-    prefix = "" if contact is None else f"{contact}."
-    if missing := _missing(named, prefix, with_load):
+        # If all lack something, the message is about the nearest.
+        contact = min(lacks, key=lambda each: len(lacks[each]))
+    elif not contacts:
         raise FileError(
-            f"{path}: has no column {', '.join(missing)}; found {shown(', '.join(headings))}; needed t, "
+            f"{path}: contact must be left out: no column is named as pad.vx, got {shown(repr(contact))}"
+        )
+    else:
+        try:
+            validation.choice("contact", contact, contacts)
+        except InvalidValueError as error:
+            raise FileError(f"{path}: {error}") from None
+    if lacks[contact]:
+        raise FileError(
+            f"{path}: has no column {', '.join(lacks[contact])}; found {shown(', '.join(headings))}; needed t, "
             f"{', '.join(TWIST)} (or {', '.join(MOTION)}), {', '.join((*WRENCH, *LOAD))}"
         )
-    wanted = [
-        name for name in (*_measured(named, prefix), *LOAD) if prefix + name in named
-    ]
-    found = {
-        "t": named.get(f"{prefix}t") or named["t"],
-        **{name: named[prefix + name] for name in wanted},
-    }
+    own = _of_contact(named, contact)
+    wanted = [name for name in ("t", *_measured(own), *LOAD) if name in own]
+    found = {name: own[name] for name in wanted}
     for name, heading in found.items():
         unit = _parts(heading)[1]
         if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
             raise FileError(
                 f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}"
             )
-    angle = named.get(f"{prefix}theta") or named.get("theta")
+    angle = own.get("theta") or named.get("theta")
     if angle is not None and (_parts(angle)[1] or "rad").strip().lower() == "rad":
         found.setdefault("theta", angle)
     return found
@@ -149,19 +148,28 @@ def _parts(heading: str) -> tuple[str, str | None]:
     return (heading, None) if match is None else (match["name"].strip(), match["unit"])
 
 
-def _measured(named: dict[str, str], prefix: str) -> Sequence[str]:
+def _of_contact(named: dict[str, str], contact: str) -> dict[str, str]:
+    """Return the headings of one contact by the names of their columns, and that of the times, which all share."""
+    prefix = f"{contact}." if contact else ""
+    own = {
+        name.removeprefix(prefix): named[name]
+        for name in named
+        if name.startswith(prefix)
+    }
+    return {"t": named["t"], **own} if "t" in named else own
+
+
+def _measured(named: Collection[str]) -> Sequence[str]:
     """Return the names of the columns of motion and wrench that a file should have: of one axis, if it has no other."""
-    there = {name for name in (*TWIST, *MOTION, *WRENCH) if prefix + name in named}
+    there = {*TWIST, *MOTION, *WRENCH}.intersection(named)
     for speed, place, wrench in zip(TWIST, MOTION, WRENCH, strict=True):
         if wrench in there and there <= {speed, place, wrench} and len(there) > 1:
             return (speed if speed in there else place), wrench
-    return (
-        *(MOTION if {*MOTION} <= there and not {*TWIST} <= there else TWIST),
-        *WRENCH,
-    )
+    placed = {*MOTION} <= there and not {*TWIST} <= there
+    return *(MOTION if placed else TWIST), *WRENCH
 
 
-def _missing(named: dict[str, str], prefix: str, with_load: bool) -> list[str]:
-    wanted = (*_measured(named, prefix), *(LOAD if with_load else ()))
-    lacking = [name for name in wanted if prefix + name not in named]
-    return [*([] if "t" in named or f"{prefix}t" in named else ["t"]), *lacking]
+def _missing(named: dict[str, str], contact: str, with_load: bool) -> list[str]:
+    own = _of_contact(named, contact)
+    wanted = ("t", *_measured(own), *(LOAD if with_load else ()))
+    return [name for name in wanted if name not in own]

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.identify.logs import Log
-from planarfriction.identify.rig import LONGEST, jitter
+from planarfriction.identify.rig import LONGEST, TINY, jitter
 
 WINDOW = 200
 """Least number of samples of a window."""
@@ -35,8 +35,6 @@ LEAST_SPEED = 1e-3
 NOISE = 3.0
 """Standard deviations of the noise of a speed below which nothing moves."""
 
-TINY = np.finfo(float).tiny
-
 
 class Gap(NamedTuple):
     """Motion between two windows in G steps."""
@@ -52,12 +50,10 @@ class Gap(NamedTuple):
 
     def until(self, time: float, twist: np.ndarray) -> Gap:
         """Return the gap without its last `time` [s], which have this `twist` `[3]`."""
-        (*_, moved) = self.twist
-        (*_, lasts) = self.dt
-        mean = (moved * lasts - twist * time) / (lasts - time)
+        left = self.dt[-1] - time
+        mean = (self.twist[-1] * self.dt[-1] - twist * time) / left
         return self._replace(
-            twist=np.vstack([self.twist[:-1], mean]),
-            dt=np.append(self.dt[:-1], lasts - time),
+            twist=np.vstack([self.twist[:-1], mean]), dt=np.append(self.dt[:-1], left)
         )
 
 
@@ -87,51 +83,36 @@ def decimated(logs: Sequence[Log], size: float, most: int) -> tuple[Log, ...]:
     for log in logs:
         count = max(most * len(log.time) // total // WINDOW, 1)
         blocks = len(log.time) // WINDOW
-        result.append(
-            log
-            if blocks <= count
-            else _decimated(
-                log, size, np.arange(blocks + 1) * len(log.time) // blocks, count
-            )
-        )
+        if blocks > count:
+            edges = np.arange(blocks + 1) * len(log.time) // blocks
+            log = _decimated(log, size, edges, count)
+        result.append(log)
     return tuple(result)
 
 
 def samples_of(logs: Sequence[Log]) -> tuple[int, int]:
     """Return the number of samples that are fitted, and the number of all."""
-    cut = [
-        (len(log.inner), log.total)
-        if isinstance(log, DecimatedLog)
-        else (len(log.time),) * 2
-        for log in logs
-    ]
-    used, total = np.sum(cut, axis=0).tolist()
-    return used, total
+    used = sum(len(log.inner) for log in logs)
+    return used, sum(getattr(log, "total", len(log.time)) for log in logs)
 
 
 def redrawn(log: Log, noise: np.ndarray, random: np.random.Generator) -> Log:
     """Return the log with `noise` `[3]` of a sample's twist drawn again between its windows, if it has any."""
     if not isinstance(log, DecimatedLog):
         return log
-    draw = (
-        gap.error[:, None] * noise * random.standard_normal(gap.twist.shape)
-        for gap in log.gaps
-    )
-    gaps = tuple(
-        gap._replace(twist=gap.twist + error)
-        for gap, error in zip(log.gaps, draw, strict=True)
-    )
-    return dataclasses.replace(log, gaps=gaps)
+    gaps = []
+    for gap in log.gaps:
+        error = gap.error[:, None] * noise * random.standard_normal(gap.twist.shape)
+        gaps.append(gap._replace(twist=gap.twist + error))
+    return dataclasses.replace(log, gaps=tuple(gaps))
 
 
 def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> DecimatedLog:
     """Return `count` of the windows of a log between rows `edges`."""
-    speed = np.zeros(len(log.time))
-    still = []
-    for values, scale in zip(log.twist.T, (1.0, 1.0, size), strict=True):
-        still.append(float(NOISE * jitter(values[:, None])[0]))
-        speed += scale * np.where(np.abs(values) > still[-1], np.abs(values), 0.0)
-    path = np.concatenate([[0.0], np.cumsum(speed[1:] * np.diff(log.time))])
+    still = NOISE * jitter(log.twist)
+    moving = np.where(np.abs(log.twist) > still, np.abs(log.twist), 0.0)
+    speed = moving @ [1.0, 1.0, size]
+    path = np.append(0.0, np.cumsum(speed[1:] * np.diff(log.time)))
     chosen = farthest(features(log, edges, still), count)
     around = min(int(np.ceil(LONGEST / log.interval)), WINDOW // 2)
     fitted, near = np.zeros((2, len(log.time)), dtype=bool)
@@ -139,29 +120,25 @@ def _decimated(log: Log, size: float, edges: np.ndarray, count: int) -> Decimate
         fitted[first:last] = near[max(first - around, 0) : last + around] = True
     stepped = np.flatnonzero(near)
     spans = np.split(stepped, np.flatnonzero(np.diff(stepped) > 1) + 1)
-    parts = [
-        Log(
-            log.time[s],
-            log.twist[s],
-            log.wrench[s],
-            log.normal_force[s],
-            log.name,
-            held=log.held,
-        )
-        for s in (slice(span[0], span[-1] + 1) for span in spans)
-    ]
+
+    def cut(rows: np.ndarray, kind: type[Any] = Log, **more: Any) -> Any:
+        names = ("time", "twist", "wrench", "normal_force")
+        columns = {name: getattr(log, name)[rows] for name in names}
+        return kind(**columns, name=log.name, held=log.held, **more)
+
     gaps = [_gap(log, path, a[-1], b[0]) for a, b in itertools.pairwise(spans)]
-    time, twist, wrench, load = (
-        values[stepped]
-        for values in (log.time, log.twist, log.wrench, log.normal_force)
+    return cut(
+        stepped,
+        DecimatedLog,
+        turns=log.turns,
+        parts=tuple(map(cut, spans)),
+        gaps=tuple(gaps),
+        inner=np.flatnonzero(fitted[stepped]),
+        total=len(log.time),
     )
-    inner = np.flatnonzero(fitted[stepped])
-    return DecimatedLog(
-        time, twist, wrench, load, log.name, log.turns, log.held, tuple(parts), tuple(gaps), inner, len(log.time)
-    )  # fmt: skip
 
 
-def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:
+def features(log: Log, edges: np.ndarray, still: np.ndarray) -> np.ndarray:
     """Compute what tells windows between rows `edges` apart, `[B, 15]` with values of about one.
 
     These are the largest twist in either direction on a scale that is logarithmic above the speeds `still` `[3]`, the
@@ -169,23 +146,17 @@ def features(log: Log, edges: np.ndarray, still: Sequence[float]) -> np.ndarray:
     """
     starts = edges[:-1]
     lengths = np.diff(edges)
-    columns = [edges[:-1] / edges[-1]]
+    columns = [starts / edges[-1]]
     for values, noise in zip(log.twist.T, still, strict=True):
-        largest = max(float(np.abs(values).max()), TINY)
+        largest = max(np.abs(values).max(), TINY)
         least = max(noise, LEAST_SPEED * largest)
-        ends = (
-            np.minimum.reduceat(values, starts),
-            np.maximum.reduceat(values, starts),
-        )
-        columns += [
-            np.arcsinh(each / least) / np.arcsinh(largest / least) for each in ends
-        ]
-    for of in (np.minimum, np.maximum):
-        columns.append(
-            of.reduceat(log.normal_force, starts) / max(log.normal_force.max(), TINY)
-        )
+        for end in (np.minimum, np.maximum):
+            scaled = np.arcsinh(end.reduceat(values, starts) / least)
+            columns.append(scaled / np.arcsinh(largest / least))
+    load = log.normal_force / max(log.normal_force.max(), TINY)
+    columns += [end.reduceat(load, starts) for end in (np.minimum, np.maximum)]
     for values in log.wrench.T:
-        largest = max(float(np.abs(values).max()), TINY)
+        largest = max(np.abs(values).max(), TINY)
         mean, square = (
             np.add.reduceat((values / largest) ** power, starts) / lengths
             for power in (1, 2)
@@ -202,9 +173,8 @@ def farthest(points: np.ndarray, count: int) -> np.ndarray:
     chosen = [0]
     distance = np.full(len(points), np.inf)
     while len(chosen) < count:
-        distance = np.minimum(
-            distance, ((points - points[chosen[-1]]) ** 2).sum(axis=1)
-        )
+        new = ((points - points[chosen[-1]]) ** 2).sum(axis=1)
+        distance = np.minimum(distance, new)
         chosen.append(int(np.argmax(distance)))
     return np.unique(chosen)
 
@@ -215,27 +185,20 @@ def _gap(log: Log, path: np.ndarray, first: int, last: int) -> Gap:
     Distances are those along the `path` `[T]` [m], and rows; a hold before a window or after one is apart.
     """
     shares = GROWTH ** -np.arange(LEVELS)
-    own = path[first : last + 1]
-    by_path = (
-        first
-        + np.searchsorted(own, own[-1] - (own[-1] - own[0]) * shares, side="right")
-        - 1
+    time, twist, load, own = (
+        values[first : last + 1]
+        for values in (log.time, log.twist, log.normal_force, path)
     )
-    ends = (
-        first + np.searchsorted(own, own[-1]),
-        first + np.searchsorted(own, own[0], side="right") - 1,
-    )
-    by_row = last - np.round((last - first) * shares).astype(int)
-    rows = np.unique(
-        np.clip(np.concatenate([by_path, by_row, ends, [last]]), first, last)
-    )
-    time, twist, load = (
-        values[first : last + 1] for values in (log.time, log.twist, log.normal_force)
-    )
+    marks = np.append(own[-1] - (own[-1] - own[0]) * shares, own[0])
+    by_path = np.searchsorted(own, marks, "right") - 1
+    hold = np.searchsorted(own, own[-1])
+    by_row = last - first - np.round((last - first) * shares).astype(int)
+    rows = np.concatenate([by_path, by_row, [hold, last - first]])
+    rows = np.unique(np.maximum(rows, 0))
+    at = rows[:-1]
     steps = np.diff(time)
-    at = rows[:-1] - first
     since = twist[1:] if log.held else 0.5 * (twist[1:] + twist[:-1])
-    dt = np.diff(log.time[rows])
+    dt = np.diff(time[rows])
     mean = np.add.reduceat(since * steps[:, None], at, axis=0) / dt[:, None]
     loads = np.add.reduceat(0.5 * (load[1:] + load[:-1]) * steps, at) / dt
     loads = np.where(np.minimum.reduceat(load[1:], at) > 0.0, loads, 0.0)

@@ -23,22 +23,27 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log, as_tuple
 from planarfriction.identify.options import FitOptions, check_noise
 from planarfriction.identify.parameters import (
     ALL,
+    LAW,
     PRIOR,
+    SHAPE,
     SHAPE_PRIOR,
+    SOFT_FINGER,
+    USUAL,
     Coordinates,
+    check_names,
+    check_patch,
     fitted_law,
 )
 from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.result import WIDTH, Identification
 from planarfriction.identify.rig import GROUPS, check_groups, wrench_noise
+from planarfriction.identify.uncertainty import finite
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 NOISE = 0.01
 """Noise over the largest sliding friction, unless it is given."""
@@ -100,21 +105,21 @@ class MotionPlan(ByValue):
     def table(self) -> str:
         """Return a text in 80 columns: the gain of each motion, and the errors before and after the best one."""
         lines = [f"{'motion':<38}{'gain [bit]':>10}   {'least certain afterwards'}"]
+        sizes = np.where(self.values != 0.0, np.abs(self.values), 1.0)
         for motion, gain, errors in zip(
             self.motions, self.gains, self.errors, strict=True
         ):
-            at = int(np.argmax(errors / self._sizes))
-            lines.append(
-                f"{motion.name[:37]:<38}{gain:>10.1f}   {self.names[at]}, {self._share(errors, at)}"
-            )
+            at = int(np.argmax(errors / sizes))
+            least = f"{self.names[at]}, {self._share(errors, at)}"
+            lines.append(f"{motion.name[:37]:<38}{gain:>10.1f}   {least}")
         after = [
             f"{'parameter':<18}{'value':>11}   {'error so far':>14}   {'after the best':>14}"
         ]
-        for i, (name, value) in enumerate(zip(self.names, self.values, strict=True)):
+        for i, name in enumerate(self.names):
             before = self._share(self.errors_so_far, i)
             then = self._share(self.errors[0], i)
             after.append(
-                f"{name:<18}{value:>11.4g}   {before:>14}   {then:>14}   {ALL[name].unit}"
+                f"{name:<18}{self.values[i]:>11.4g}   {before:>14}   {then:>14}   {ALL[name].unit}"
             )
         first = textwrap.fill(f"Next motion to measure: {self.best.name}.", WIDTH)
         return "\n\n".join([first, "\n".join(lines), "\n".join(after)])
@@ -122,14 +127,10 @@ class MotionPlan(ByValue):
     def __repr__(self) -> str:
         return self.table()
 
-    @property
-    def _sizes(self) -> np.ndarray:
-        return np.where(self.values != 0.0, np.abs(self.values), 1.0)
-
     def _share(self, errors: np.ndarray, i: int) -> str:
-        share = errors[i] / self._sizes[i]
         if self.values[i] == 0.0:
             return f"{errors[i]:.2g}"
+        share = errors[i] / abs(self.values[i])
         return f"{100.0 * share:.2g} %" if share < KNOWN else "unknown"
 
 
@@ -139,7 +140,7 @@ def design_experiment(
     *,
     logs: Log | Sequence[Log] = (),
     motions: Log | Sequence[Log] | None = None,
-    parameters: Sequence[str] = known.USUAL,
+    parameters: Sequence[str] = USUAL,
     wanted: Sequence[str] | None = None,
     noise: Sequence[float] | None = None,
     nuisance: Sequence[str] = GROUPS,
@@ -172,10 +173,9 @@ def design_experiment(
     InvalidValueError
         A parameter breaks its rule, or a motion does not move.
     """
-    names = known.check_names(parameters)
+    names = check_names(parameters)
     groups = check_groups("nuisance", nuisance)
-    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
-    refuse_anisotropy(patch, "design_experiment")
+    check_patch(patch, "design_experiment")
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
         raise InvalidValueError(
@@ -183,48 +183,45 @@ def design_experiment(
             "contain breakaway_ratio only for elasto-plastic bristles",
             names,
         )
-    before = (
-        ()
-        if isinstance(logs, (list, tuple)) and not logs
-        else as_tuple("logs", logs, Log)
-    )
-    chosen = names if wanted is None else known.check_names(wanted, names)
+    before = ()
+    if not isinstance(logs, (list, tuple)) or logs:
+        before = as_tuple("logs", logs, Log)
+    chosen = names if wanted is None else check_names(wanted, names)
     if motions is None:
-        loads = sorted(
-            {float(f"{np.median(log.normal_force):.3g}") for log in before}
-        ) or [1.0]
-        motions = candidate_motions(patch, law, normal_force=loads)
+        loads = {float(f"{np.median(log.normal_force):.3g}") for log in before}
+        motions = candidate_motions(patch, law, normal_force=sorted(loads) or [1.0])
     candidates = as_tuple("motions", motions, Log)
     for each in candidates:
         if not each.twist.any():
-            raise InvalidValueError(
-                f"twist of {each.name}", "move the contact", "0 throughout"
-            )
+            rule = "move the contact"
+            raise InvalidValueError(f"twist of {each.name}", rule, "0 throughout")
     sigma = _noise(noise, before, candidates, patch, law)
-    information = _Information(
-        patch, law, names, tuple(group for group in groups if group != "twist"), sigma
-    )
-    so_far = information.prior() + (
-        information.of_logs(before, groups) if before else 0.0
-    )
+    later = tuple(group for group in groups if group != "twist")
+    information = _Information(patch, law, names, later, sigma)
+    so_far = information.prior()
+    if before:
+        so_far = so_far + information.of_logs(before, groups)
     start = information.covariance(so_far)
-    expected = [information.expected(each) for each in candidates]
-    added = [
-        information.of_logs((information.measured(each),), information.groups)
-        for each in expected
-    ]
-    after = [information.covariance(so_far + each) for each in added]
     pick = [names.index(name) for name in chosen]
-    gains = np.array([_entropy(start, pick) - _entropy(each, pick) for each in after])
-    errors = np.array([information.errors(each) for each in after])
-    order = np.argsort(-gains, kind="stable")
-    ranked = (
+    expected = []
+    gains = []
+    errors = []
+    for each in candidates:
+        motion = information.expected(each)
+        added = information.of_logs((information.measured(motion),), later)
+        after = information.covariance(so_far + added)
+        expected.append(motion)
+        gains.append(_entropy(start, pick) - _entropy(after, pick))
+        errors.append(information.errors(after))
+    order = np.argsort(-np.array(gains), kind="stable")
+    return MotionPlan(
+        names,
+        information.values,
         tuple(expected[i] for i in order),
-        gains[order],
+        np.array(gains)[order],
         information.errors(start),
-        errors[order],
+        np.array(errors)[order],
     )
-    return MotionPlan(information.names, information.values, *ranked)
 
 
 def current_estimate(
@@ -238,22 +235,20 @@ def current_estimate(
     """
     validation.instance("found", found, Identification, "an Identification")
     validation.instance("law", law, LuGre, "a LuGre law")
-    good = [
-        name
+    given = {
+        name: value
         for name, value in found.estimates.items()
         if found.errors[name] < KNOWN * abs(value)
-    ]
-    given = {name: found.estimates[name] for name in good}
+    }
+    good = {*given, "centre_x", "centre_y"}
     for name, (low, high) in found.intervals().items():
-        if (
-            name in known.LAW
-            and name not in (*good, "breakaway_ratio")
-            and not low <= getattr(law, name) <= high
-        ):
+        held = name in LAW and name not in (*given, "breakaway_ratio")
+        if held and not low <= getattr(law, name) <= high:
             given[name] = 0.5 * (low + high)
-    shape = {*known.SHAPE, *known.SOFT_FINGER} & set(found.names)
-    moved = bool(shape) and shape <= {*good, "centre_x", "centre_y"}
-    return (found.model.patch if moved else patch), fitted_law(law, given)
+    shape = {*SHAPE, *SOFT_FINGER} & set(found.names)
+    if shape and shape <= good:
+        patch = found.model.patch
+    return patch, fitted_law(law, given)
 
 
 class _Information:
@@ -272,10 +267,9 @@ class _Information:
         self.names = names
         self.groups = groups
         self.noise = noise
-        time = np.linspace(0.0, 1.0, 10)
-        self._probe = self.problem(
-            [Log(time, np.ones((10, 3)), np.ones((10, 3)), np.ones(10))], groups
-        )
+        ones = np.ones((10, 3))
+        probe = Log(np.linspace(0.0, 1.0, 10), ones, ones, 1.0)
+        self._probe = self.problem([probe], groups)
         self.values = self._probe.start_values()
         coordinates = Coordinates(names, self.values, law.mu_c)
         self._scale = coordinates.scale
@@ -293,7 +287,7 @@ class _Information:
 
     def prior(self) -> np.ndarray:
         """Return the information `[F + S, F + S]` a priori: a factor of 20 either way, and the rig's widths."""
-        centre = float(self._probe.fixed_patch.contact_radius()) / self._scale
+        centre = self._probe.fixed_patch.contact_radius() / self._scale
         width = np.where(np.isin(self.names, ("centre_x", "centre_y")), centre, PRIOR)
         width[np.isin(self.names, ("gamma", "mu_s"))] = SHAPE_PRIOR
         shared = sum(column.log is None for column in self._probe.rig.columns)
@@ -301,29 +295,24 @@ class _Information:
 
     def expected(self, motion: Log) -> Log:
         """Return the motion with its expected wrenches."""
-        problem = self.problem(
-            [dataclasses.replace(motion, wrench=np.ones_like(motion.twist))], ()
-        )
+        unmeasured = dataclasses.replace(motion, wrench=np.ones_like(motion.twist))
+        problem = self.problem([unmeasured], ())
         return dataclasses.replace(motion, wrench=problem.shown(self.values)[0])
 
     def measured(self, log: Log) -> Log:
         """Return the log with its noise added to the wrenches: a torque of 0 throughout would count as not measured."""
-        return dataclasses.replace(
-            log, wrench=log.wrench + np.where(np.isfinite(self.noise), self.noise, 0.0)
-        )
+        return dataclasses.replace(log, wrench=log.wrench + finite(self.noise))
 
     def of_logs(self, logs: Sequence[Log], groups: Sequence[str]) -> np.ndarray:
         """Compute the information `[F + S, F + S]` of logs, with the disturbances of each log estimated along."""
         problem = self.problem(logs, groups)
-        count = len(self.names)
         coordinates = problem.coordinates(self.values)
         values = coordinates.values(coordinates.of(self.values))
         jacobian = problem.linearised(values, problem.sigma(values, self.noise))[1]
         jacobian = jacobian @ coordinates.slopes(coordinates.of(values))
         whole = jacobian.T @ jacobian
-        own = np.array(
-            [False] * count + [column.log is not None for column in problem.rig.columns]
-        )
+        of_log = [column.log is not None for column in problem.rig.columns]
+        own = np.append(np.full(len(self.names), False), of_log).astype(bool)
         inner = whole[np.ix_(own, own)] + np.eye(int(own.sum()))
         both = whole[np.ix_(~own, own)]
         return whole[np.ix_(~own, ~own)] - both @ np.linalg.solve(inner, both.T)
@@ -332,9 +321,8 @@ class _Information:
         """Compute the covariance `[F, F]` of the coordinates of the contact."""
         size = 1.0 / np.sqrt(np.diag(information))
         strengths, axes = np.linalg.eigh(information * np.outer(size, size))
-        strengths = np.maximum(strengths, FAINT * strengths[-1])
-        inverse = (axes / strengths) @ axes.T * np.outer(size, size)
-        return inverse[: len(self.names), : len(self.names)]
+        axes = size[: len(self.names), None] * axes[: len(self.names)]
+        return axes / np.maximum(strengths, FAINT * strengths[-1]) @ axes.T
 
     def errors(self, covariance: np.ndarray) -> np.ndarray:
         """Return the standard errors `[F]` of the values."""
@@ -343,9 +331,7 @@ class _Information:
 
 def _entropy(covariance: np.ndarray, pick: Sequence[int]) -> float:
     """Compute the entropy of the picked coordinates [bit], up to a constant."""
-    return float(
-        0.5 * np.linalg.slogdet(covariance[np.ix_(pick, pick)])[1] / np.log(2.0)
-    )
+    return 0.5 * np.linalg.slogdet(covariance[np.ix_(pick, pick)])[1] / np.log(2.0)
 
 
 def _noise(
@@ -360,10 +346,10 @@ def _noise(
         return check_noise("noise", given)
     if logs:
         return wrench_noise(logs)
-    load = max(float(motion.normal_force.max()) for motion in motions)
+    load = max(motion.normal_force.max() for motion in motions)
     validation.positive("normal_force of the motions", load)
     force = NOISE * law.mu_c * load
-    return np.array([force, force, force * float(patch.contact_radius(load))])
+    return np.array([force, force, force * patch.contact_radius(load)])
 
 
 # ---------------------------------------------------------------------- motions to choose from
@@ -411,10 +397,9 @@ def candidate_motions(
             f"shape {given.shape}",
         )
     loads = [validation.positive("normal_force", each) for each in given.reshape(-1)]
-    speed, duration, rate = (
-        validation.positive(name, value)
-        for name, value in (("speed", speed), ("duration", duration), ("rate", rate))
-    )
+    speed = validation.positive("speed", speed)
+    duration = validation.positive("duration", duration)
+    rate = validation.positive("rate", rate)
     samples = duration * rate
     if not SAMPLES[0] <= samples <= SAMPLES[1]:
         raise InvalidValueError(
@@ -425,18 +410,12 @@ def candidate_motions(
     time = np.arange(round(samples)) / rate
     result = []
     for load in loads:
-        turn = (
-            speed / float(patch.contact_radius(load))
-            if spin is None
-            else validation.positive("spin", spin)
-        )
-        for name, twist in _twists(
-            time, speed, turn, law.mu_s / law.sigma_0, rate
-        ).items():
+        radius = patch.contact_radius(load)
+        turn = speed / radius if spin is None else validation.positive("spin", spin)
+        twists = _twists(time, speed, turn, law.mu_s / law.sigma_0, rate)
+        for name, twist in twists.items():
             called = f"{name}, {load:g} N" if len(loads) > 1 else name
-            result.append(
-                Log(time, twist, np.zeros_like(twist), np.full_like(time, load), called)
-            )
+            result.append(Log(time, twist, np.zeros_like(twist), load, called))
     return tuple(result)
 
 

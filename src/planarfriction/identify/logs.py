@@ -18,6 +18,12 @@ from planarfriction.geometry import rotate
 from planarfriction.identify.columns import LOAD, MOTION, TWIST, WRENCH, find_columns
 from planarfriction.scenes import Solution
 
+Arrays = Sequence[np.ndarray]
+"""Several arrays, such as one of each log or slide."""
+
+Linear = tuple[np.ndarray, np.ndarray]
+"""Values and their derivatives."""
+
 LEAST_SAMPLES = 10
 """Least number of samples of a log."""
 
@@ -84,17 +90,14 @@ class Log(ByValue):
         validation.instance("held", self.held, bool, "True or False")
         validation.count("turns", self.turns, at_least=0)
         time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
-        twist, wrench = (
-            validation.array(name, getattr(self, name), (len(time), 3))
-            for name in ("twist", "wrench")
-        )
+        twist = validation.array("twist", self.twist, (len(time), 3))
+        wrench = validation.array("wrench", self.wrench, (len(time), 3))
         load = validation.numbers("normal_force", self.normal_force)
         load = np.broadcast_to(load, len(time)) if load.ndim == 0 else load
         if (load <= 0.0).all() and (load < 0.0).any():
             rule = "be >= 0; negate it if the sensor counts pressure as negative"
-            raise InvalidValueError(
-                "normal_force", rule, f"{load.min():.3g} to {load.max():.3g} N"
-            )
+            found = f"{load.min():.3g} to {load.max():.3g} N"
+            raise InvalidValueError("normal_force", rule, found)
         load = validation.non_negative_array("normal_force", load, (len(time),))
         self._set(time=time, twist=twist, wrench=wrench, normal_force=load)
         for value in (time, twist, wrench, load):
@@ -114,14 +117,8 @@ class Log(ByValue):
     @property
     def even(self) -> bool:
         """True if the samples are evenly spaced in time."""
-        steps = (
-            np.arange(len(self.time))
-            * (self.time[-1] - self.time[0])
-            / (len(self.time) - 1)
-        )
-        return bool(
-            np.abs(self.time - self.time[0] - steps).max() <= EVEN * self.interval
-        )
+        grid = np.linspace(self.time[0], self.time[-1], len(self.time))
+        return bool(np.abs(self.time - grid).max() <= EVEN * self.interval)
 
     @property
     def parts(self) -> tuple[Log, ...]:
@@ -163,14 +160,8 @@ class Log(ByValue):
         time = increasing(time)
         motion = validation.array("motion", motion, (len(time), 3))
         motion[:, 2], turns = unwrapped(time, motion[:, 2], f"theta of {name}")
-        return cls(
-            time,
-            differentiated(time, motion, window=window),
-            wrench,
-            normal_force,
-            name,
-            turns,
-        )
+        twist = differentiated(time, motion, window=window)
+        return cls(time, twist, wrench, normal_force, name, turns)
 
     @classmethod
     def from_axis(
@@ -241,30 +232,26 @@ class Log(ByValue):
         found = find_columns(
             path, table.names, contact=contact, with_load=normal_force is None
         )
-        motion = TWIST if "vx" in found or "omega" in found else MOTION
+        motion = MOTION if found.keys().isdisjoint(TWIST) else TWIST
         spare = [found["theta"]] if motion is TWIST and "theta" in found else []
         values = table.numbers(list(found.values()), spare)
         columns = dict(zip(found, values.T, strict=True))
-        moved = values[:, 1:4]
-        wrench = values[:, 4:7]  # no copies
-        if not {*WRENCH} <= found.keys():
-            moved, wrench = np.zeros((2, len(values), 3))
-            place = next(k for k, each in enumerate(WRENCH) if each in found)
-            motion = TWIST if TWIST[place] in found else MOTION
-            moved[:, place] = columns[motion[place]]
-            wrench[:, place] = columns[WRENCH[place]]
+        zeros = np.zeros(len(values))
+        moved, wrench = (
+            np.stack([columns.get(name, zeros) for name in names], -1)
+            for names in (motion, WRENCH)
+        )
         loads: Any = columns.get("normal_force", normal_force)
         try:
-            if motion is TWIST:
-                held = (
-                    "theta" in found
-                    and "omega" in found
-                    and is_mean(columns["t"], moved[:, 2], columns["theta"])
+            time = columns["t"]
+            if motion is MOTION:
+                return cls.from_motion(
+                    time, moved, wrench, loads, window=window, name=path.stem
                 )
-                return cls(columns["t"], moved, wrench, loads, path.stem, held=held)
-            return cls.from_motion(
-                columns["t"], moved, wrench, loads, window=window, name=path.stem
+            held = {"theta", "omega"} <= found.keys() and is_mean(
+                time, columns["omega"], columns["theta"]
             )
+            return cls(time, moved, wrench, loads, path.stem, held=held)
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
 
@@ -282,26 +269,19 @@ class Log(ByValue):
             )
         twist = solution.contact_twist(contact)
         index = solution.contact_index(contact)
-        time, *wrench, load = (
-            np.asarray(solution.histories[name].values)
-            for name in ("time", *WRENCH, *LOAD)
-        )
+        names = ("time", *WRENCH, *LOAD)
+        time, *contacts = (solution.histories[name].values for name in names)
+        *wrench, load = (each[:, index] for each in contacts)
         name = f"{solution.scene.name}, {solution.scene.contacts[index].name}"
         held = is_mean(time, twist[:, 2], solution.data["theta"].values)
-        return cls(
-            time, twist, np.stack(wrench, -1)[:, index], load[:, index], name, held=held
-        )
+        return cls(time, twist, np.stack(wrench, -1), load, name, held=held)
 
 
 def as_tuple(name: str, value: Any, kind: type) -> tuple[Any, ...]:
     """Return one record of a kind or several as a tuple, or raise InvalidValueError."""
-    result = (
-        (value,)
-        if isinstance(value, kind)
-        else tuple(value)
-        if isinstance(value, Sequence)
-        else ()
-    )
+    result = (value,)
+    if not isinstance(value, kind):
+        result = tuple(value) if isinstance(value, Sequence) else ()
     if not result or not all(isinstance(each, kind) for each in result):
         raise InvalidValueError(name, f"be a {kind.__name__} or a list of them", value)
     return result
@@ -317,21 +297,20 @@ def one_coordinate(logs: Sequence[Log]) -> bool:
 def load_ratio(logs: Sequence[Log]) -> float:
     """Return the largest load over the least, of which no log has 5 % of its samples beyond."""
     spans = np.array([np.quantile(loads(log), (0.05, 0.95)) for log in logs])
-    return float(spans[:, 1].max() / spans[:, 0].min())
+    return spans[:, 1].max() / spans[:, 0].min()
 
 
 def mean_load(log: Log) -> float:
     """Return the mean of the loads > 0 of a log [N], or raise InvalidValueError."""
-    return float(loads(log).mean())
+    return loads(log).mean()
 
 
 def loads(log: Log) -> np.ndarray:
     """Return the loads > 0 of a log [N], or raise InvalidValueError if there is none."""
     found = log.normal_force[log.normal_force > 0.0]
     if not len(found):
-        raise InvalidValueError(
-            f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere"
-        )
+        name = f"normal_force of {log.name}"
+        raise InvalidValueError(name, "be > 0 somewhere", "0 everywhere")
     return found
 
 
@@ -359,20 +338,16 @@ def slopes(time: np.ndarray, values: np.ndarray, window: int = 7) -> np.ndarray:
     """Compute the slopes of parabolas through `window` samples of `values` `[T, C]` at each of the times `[T]`."""
     found = np.empty_like(values)
     for begin in range(0, len(time), AT_ONCE):
-        rows = np.arange(begin, min(begin + AT_ONCE, len(time)))
-        around = np.clip(rows - window // 2, 0, len(time) - window)[
-            :, None
-        ] + np.arange(window)
-        since = time[around] - time[rows, None]
+        rows = np.arange(begin, min(begin + AT_ONCE, len(time)))[:, None]
+        first = np.clip(rows - window // 2, 0, len(time) - window)
+        around = first + np.arange(window)
+        since = time[around] - time[rows]
         scale = np.abs(since).max(axis=1, keepdims=True)
-        powers = np.stack([(since / scale) ** n for n in range(3)], -1)
+        powers = (since / scale)[..., None] ** np.arange(3)
         across = powers.swapaxes(1, 2)
-        parabolas = (
-            np.linalg.pinv(across @ powers, hermitian=True)
-            @ across
-            @ (values[around] - values[rows, None])
-        )
-        found[rows] = parabolas[:, 1] / scale
+        inverse = np.linalg.pinv(across @ powers, hermitian=True) @ across
+        parabolas = inverse @ (values[around] - values[rows])
+        found[rows[:, 0]] = parabolas[:, 1] / scale
     return found
 
 
@@ -411,14 +386,8 @@ def is_mean(time: np.ndarray, omega: np.ndarray, angle: np.ndarray) -> bool:
 
 def columns_of(log: Log) -> Mapping[str, np.ndarray]:
     """Return the columns of a log by the names that `Log.from_csv` reads."""
-    names = ("t", *TWIST, *WRENCH, "normal_force")
-    return dict(
-        zip(
-            names,
-            [log.time, *log.twist.T, *log.wrench.T, log.normal_force],
-            strict=True,
-        )
-    )
+    columns = (log.time, *log.twist.T, *log.wrench.T, log.normal_force)
+    return dict(zip(("t", *TWIST, *WRENCH, *LOAD), columns, strict=True))
 
 
 # ---------------------------------------------------------------------- angles
@@ -438,29 +407,22 @@ def unwrapped(
         return angle, 0
     measured = np.diff(angle)
     turns = np.round(measured / TURN)
-    wrapped = bool(turns.any()) and np.ptp(angle) <= (1.0 + ROUNDED) * TURN
-    turns = turns if wrapped else np.zeros_like(turns)
+    wrapped = turns.any() and np.ptp(angle) <= (1.0 + ROUNDED) * TURN
+    turns = turns * wrapped
     steps = measured - TURN * turns
-    padded = np.pad(
-        steps, NEIGHBOURS, mode="reflect" if len(steps) > NEIGHBOURS else "edge"
-    )
-    usual = np.median(
-        np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1), axis=1
-    )
-    jump = np.abs(steps - usual) > QUARTER
+    mode = "reflect" if len(steps) > NEIGHBOURS else "edge"
+    padded = np.pad(steps, NEIGHBOURS, mode=mode)
+    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1)
+    jump = np.abs(steps - np.median(around, axis=1)) > QUARTER
     fast = wrapped & (np.abs(steps) > QUARTER)
+    slower = "turn by less than a quarter turn between samples, or be unwrapped"
     for where, shown_steps, rule in (
         (jump, measured, "only jump by whole turns"),
-        (
-            fast,
-            steps,
-            "turn by less than a quarter turn between samples, or be unwrapped",
-        ),
+        (fast, steps, slower),
     ):
         if where.any():
             i = int(np.argmax(where))
             found = f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s"
             raise InvalidValueError(f"{name} [rad]", rule, found)
-    return angle - TURN * np.concatenate([[0.0], np.cumsum(turns)]), int(
-        np.count_nonzero(turns)
-    )
+    count = int(np.count_nonzero(turns))
+    return angle - TURN * np.append(0.0, np.cumsum(turns)), count

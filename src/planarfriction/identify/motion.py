@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -10,8 +11,13 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.checks import check_slides
-from planarfriction.identify.logs import as_tuple
-from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
+from planarfriction.identify.logs import Arrays, Linear, as_tuple
+from planarfriction.identify.parameters import (
+    check_names,
+    check_patch,
+    fitted_law,
+    scaled_patch,
+)
 from planarfriction.identify.problem import Problem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.search import interruptible, multistart, refine
@@ -35,13 +41,13 @@ from planarfriction.identify.uncertainty import (
 from planarfriction.identify.verdicts import (
     Evidence,
     Verdict,
+    caution,
     judge_parameter,
     verdicts_on_turns,
 )
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 MOTION_PARAMETERS = ("mu_c", "mu_s", "v_s", "gamma", "sigma_2", "contact_radius")
 """Parameters that slides can determine; `mu_s` equals `mu_c` if only the latter is estimated."""
@@ -143,63 +149,48 @@ def identify_motion(
     # A subclass may compute something else from the parameters that are fitted.
     if type(start) is not LuGre:
         raise InvalidValueError("start", "be a LuGre law", start)
-    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
-    refuse_anisotropy(patch, "identify_motion")
+    check_patch(patch, "identify_motion")
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)
     robust = validation.choice("loss", loss, ("robust", "squares")) == "robust"
     findings = check_slides(slides, patch, body)
-    doubts = [Verdict("fit", False, str(finding)) for finding in findings]
-    doubts += [Verdict(name, False, "a unit is doubtful") for name in names if findings]
+    found = [Verdict("fit", False, str(finding)) for finding in findings]
+    found += [Verdict(name, False, "a unit is doubtful") for name in names if findings]
     strange = contradictions(slides, body) if robust else {}
-    left_out = [
-        Verdict("fit", True, f"{slides[i].name} is left out: {why}")
-        for i, why in strange.items()
-    ]
+    for i, why in strange.items():
+        found.append(caution(f"{slides[i].name} is left out: {why}"))
     slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)
     problem = SlideProblem(slides, patch, body, names, start, model, samples, robust)
     problem.progress = progress
-    noise = np.array(
-        [FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / float(patch.contact_radius())]
-    )
+    noise = FIRST_NOISE / np.array([1.0, 1.0, patch.contact_radius()])
     with interruptible([problem]):
-        fit = refine(multistart(problem, [problem.start_values()], noise=noise))
-        return _identification(fit, problem, [*doubts, *left_out])
+        fit = refine(multistart(problem, [problem.start_values()], noise))
+        return _identification(fit, problem, found)
 
 
+@dataclass(eq=False)
 class SlideProblem(Problem):
     """Slides and a model that predicts their poses; the start of each slide follows the values.
 
     Noise is that of the channels of each slide, `[S, 3]`: slides with large residuals count as noisier.
     """
 
-    least_change = (
-        1e-4  # far below the standard errors, and above the errors of the solver
-    )
+    slides: Sequence[Slide]
+    patch: ContactPatch
+    body: MassProperties
+    names: tuple[str, ...]
+    law: LuGre
+    build: Build
+    samples: int | None
+    robust: bool
 
-    def __init__(
-        self,
-        slides: Sequence[Slide],
-        patch: ContactPatch,
-        body: MassProperties,
-        names: tuple[str, ...],
-        law: LuGre,
-        build: Build,
-        samples: int | None,
-        robust: bool,
-    ) -> None:
-        self.slides = slides
-        self.patch = patch
-        self.body = body
-        self.names = names
-        self.law = law
-        self.build = build
-        self.samples = samples
-        self.robust = robust
-        self.starts: list[np.ndarray] = [start_of(slide) for slide in slides]
-        self._turns = (
-            3  # of the first evaluation; later ones begin where the last one ended
-        )
+    least_change = 1e-4
+    """Cost change far below the standard errors, and above the errors of the solver."""
+
+    def __post_init__(self) -> None:
+        self.starts = [start_of(slide) for slide in self.slides]
+        # Of the first evaluation; later ones begin where the last one ended.
+        self._turns = 3
 
     @property
     def numbers(self) -> int:
@@ -210,13 +201,8 @@ class SlideProblem(Problem):
 
     def start_values(self) -> np.ndarray:
         """Return the values `[F]` of the names in the start."""
-        radius = float(self.patch.contact_radius())
-        return np.array(
-            [
-                radius if name == "contact_radius" else getattr(self.law, name)
-                for name in self.names
-            ]
-        )
+        start = vars(self.law) | {"contact_radius": self.patch.contact_radius()}
+        return np.array([start[name] for name in self.names], dtype=float)
 
     def fitted_law(self, values: np.ndarray) -> LuGre:
         """Return the law with values `[F]`; `mu_s` equals `mu_c` if only the latter is estimated."""
@@ -228,67 +214,56 @@ class SlideProblem(Problem):
     def fitted_model(self, values: np.ndarray) -> Any:
         """Make the friction model with values `[F]`."""
         patch = self.patch
-        if "contact_radius" in self.names:
-            patch = scaled_patch(
-                patch,
-                values[self.names.index("contact_radius")] / patch.contact_radius(),
-            )
+        radius = self.by_name(values).get("contact_radius")
+        if radius is not None:
+            patch = scaled_patch(patch, radius / float(patch.contact_radius()))
         return self.build(patch, self.fitted_law(values))
 
-    def poses(self, values: np.ndarray) -> list[np.ndarray]:
+    def poses(self, values: np.ndarray) -> Arrays:
         """Simulate the poses `[T, 3]` of each slide from its best start so far."""
         model = self.fitted_model(values)
         both = zip(self.slides, self.starts, strict=True)
         return [
-            slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both
+            slide_poses(model, self.body, slide.time, start) for slide, start in both
         ]
 
-    def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
+    def even_sigma(self, noise: np.ndarray) -> Arrays:
         rows = np.broadcast_to(noise, (len(self.slides), 3))
-        return [
-            np.broadcast_to(row, slide.pose.shape)
-            for row, slide in zip(rows, self.slides, strict=True)
-        ]
+        both = zip(rows, self.slides, strict=True)
+        return [np.broadcast_to(row, slide.pose.shape) for row, slide in both]
 
     def estimate_noise(
         self, values: np.ndarray, noise: np.ndarray
-    ) -> tuple[np.ndarray, list[np.ndarray]]:
+    ) -> tuple[np.ndarray, Arrays]:
         """Estimate the noise `[S, 3]`, equal for x and y, from the residuals at `values`, and sigma of each sample."""
-        residuals = [
-            slide.pose - poses
-            for slide, poses in zip(self.slides, self.poses(values), strict=True)
-        ]
+        both = zip(self.slides, self.poses(values), strict=True)
+        residuals = [slide.pose - poses for slide, poses in both]
         weighed = np.ones(len(self.slides))
         if self.robust:
             before = np.atleast_2d(noise).min(axis=0)
-            weighed = weights(
-                np.array([np.sqrt(np.mean((each / before) ** 2)) for each in residuals])
-            )
-        counts = weighed @ [len(slide.time) for slide in self.slides]
+            sizes = [np.sqrt(np.mean((each / before) ** 2)) for each in residuals]
+            weighed = weights(np.array(sizes))
+        numbers = 3.0 * weighed @ [len(slide.time) for slide in self.slides]
         unknown = len(self.names) + 6.0 * weighed.sum()
-        squares = weighed @ [np.sum(each**2, axis=0) for each in residuals] / counts
-        squares = squares * 3.0 * counts / max(3.0 * counts - unknown, 1.0)
-        across = np.sqrt(0.5 * (squares[0] + squares[1]))
-        channels = np.maximum([across, across, np.sqrt(squares[2])], LEAST_NOISE)
+        squares = weighed @ [np.sum(each**2, axis=0) for each in residuals]
+        squares = 3.0 * squares / max(numbers - unknown, 1.0)
+        across = 0.5 * (squares[0] + squares[1])
+        channels = np.sqrt([across, across, squares[2]])
         with np.errstate(divide="ignore"):
-            noise = channels / np.sqrt(weighed)[:, None]
+            noise = np.maximum(channels, LEAST_NOISE) / np.sqrt(weighed)[:, None]
         return noise, self.even_sigma(noise)
 
-    def linearised(
-        self, values: np.ndarray, sigma: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(self, values: np.ndarray, sigma: Arrays) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, at the best starts, and derivatives `[M, F]` with the starts free.
 
         The start answers every change: `q' = -B^+ (r, J)` with B of the poses from which it is estimated.
         """
         noise = np.min([each[0] for each in sigma], axis=0)
         model = self.fitted_model(values)
-        changes = CHANGE * np.maximum(
-            np.abs(values), np.abs(self.start_values()) + 1e-2 * (values == 0.0)
-        )
+        least = np.abs(self.start_values()) + 1e-2 * (values == 0.0)
+        changes = CHANGE * np.maximum(np.abs(values), least)
         changed = [self.fitted_model(values + row) for row in np.diag(changes)]
-        residuals = []
-        jacobian = []
+        rows = []
         for i, slide in enumerate(self.slides):
             if i % 20 == 0:
                 self.report(
@@ -303,70 +278,53 @@ class SlideProblem(Problem):
             start = self.starts[i]
             poses, of_start = start_slopes(model, self.body, slide, start)
             of_values = [
-                (slide_poses(each, self.body, slide.time, start[:3], start[3:]) - poses)
-                / change
-                for each, change in zip(changed, changes, strict=True)
+                slide_poses(each, self.body, slide.time, start) for each in changed
             ]
-            residual = ((poses - slide.pose) / noise).ravel()
-            slope = (np.stack(of_values, -1) / noise[:, None]).reshape(
-                len(residual), -1
-            )
-            basis = (of_start / noise[:, None]).reshape(len(residual), 6)
+            slopes = (np.stack(of_values, -1) - poses[..., None]) / changes
+            both = np.dstack([poses - slide.pose, slopes]) / noise[:, None]
+            both = both.reshape(-1, both.shape[-1])
+            basis = (of_start / noise[:, None]).reshape(-1, 6)
             known = None if self.samples is None else 3 * self.samples
-            answer = np.linalg.lstsq(
-                basis[:known], np.column_stack([residual, slope])[:known], rcond=None
-            )[0]
+            answer = np.linalg.lstsq(basis[:known], both[:known], rcond=None)[0]
             self.starts[i] = start - answer[:, 0]
-            weight = (noise / sigma[i]).reshape(-1)
-            residuals.append(weight * (residual - basis @ answer[:, 0]))
-            jacobian.append(weight[:, None] * (slope - basis @ answer[:, 1:]))
+            weight = (noise / sigma[i]).reshape(-1, 1)
+            rows.append(weight * (both - basis @ answer))
         self._turns = 0
-        return np.concatenate(residuals), np.concatenate(jacobian)
+        whole = np.concatenate(rows)
+        return whole[:, 0], whole[:, 1:]
 
 
 def _identification(
     fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
 ) -> Identification:
     """Make the result of a fit of slides."""
+    names = problem.names
+    slides = problem.slides
     noise = fit.noise.min(axis=0)
     covariance, moved, jacobian = uncertainty_over_slides(fit)
     errors = np.sqrt(np.diag(covariance))
     together = correlations(covariance)
     poses = problem.poses(fit.values)
-    starts = np.stack(problem.starts)
-    left = [
-        np.sqrt(np.mean(((s.pose - p) / noise) ** 2))
-        for s, p in zip(problem.slides, poses, strict=True)
-    ]
+    twists = np.abs(problem.starts)[:, 3:]
     evidence = Evidence(
-        names=problem.names,
+        names=names,
         values=fit.values,
         errors=errors,
         correlations=together,
         at_bound=fit.at_bound,
         jacobian=jacobian,
-        speeds=np.outer(np.hypot(starts[:, 3], starts[:, 4]), FADING).ravel(),
-        spins=np.outer(
-            float(problem.patch.contact_radius()) * np.abs(starts[:, 5]), FADING
-        ).ravel(),
+        speeds=np.outer(np.hypot(twists[:, 0], twists[:, 1]), FADING).ravel(),
+        spins=np.outer(problem.patch.contact_radius() * twists[:, 2], FADING).ravel(),
         loads=np.array([problem.body.mass * problem.body.gravity]),
     )
     weighed = np.min((noise / fit.noise) ** 2, axis=1)
-    found = [judge_parameter(evidence, i) for i in range(len(problem.names))]
+    found = [judge_parameter(evidence, i) for i in range(len(names))]
     # Its spread over few slides may be small by chance.
-    if "contact_radius" in problem.names and not evidence.spinning:
-        found[problem.names.index("contact_radius")] = Verdict(
-            "contact_radius", False, "no spin"
-        )
+    if "contact_radius" in names and not evidence.spinning:
+        at = names.index("contact_radius")
+        found[at] = Verdict("contact_radius", False, "no spin")
     if (count := int((weighed > 0.0).sum())) < FEW:
         found.append(Verdict("fit", False, f"the errors come from only {count} slides"))
-    verdicts = (
-        *filter(None, found),
-        *verdicts_on_turns(problem.slides),
-        *left_out,
-        *verdicts_on_weights(problem.slides, weighed, left / np.median(left)),
-        *verdicts_on_influence(problem.slides, moved, problem.names, errors),
-    )
     histories = [
         {
             "name": slide.name,
@@ -375,21 +333,30 @@ def _identification(
             "predicted": predicted,
             "start": start,
         }
-        for slide, start, predicted in zip(
-            problem.slides, problem.starts, poses, strict=True
-        )
+        for slide, start, predicted in zip(slides, problem.starts, poses, strict=True)
     ]
+    left = [
+        np.sqrt(np.mean(((each["measured"] - each["predicted"]) / noise) ** 2))
+        for each in histories
+    ]
+    samples = sum(len(slide.time) for slide in slides)
     return Identification(
-        names=problem.names,
+        names=names,
         values=fit.values,
         standard_errors=errors,
         correlations=together,
-        verdicts=verdicts,
+        verdicts=(
+            *filter(None, found),
+            *verdicts_on_turns(slides),
+            *left_out,
+            *verdicts_on_weights(slides, weighed, left / np.median(left)),
+            *verdicts_on_influence(slides, moved, names, errors),
+        ),
         noise=noise,
         channels=CHANNELS,
         histories=tuple(histories),
         law=problem.fitted_law(fit.values),
         model=problem.fitted_model(fit.values),
         starts=fit.starts,
-        samples=(samples := sum(len(each["time"]) for each in histories), samples),
+        samples=(samples, samples),
     )

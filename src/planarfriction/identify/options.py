@@ -35,11 +35,9 @@ def _surface(name: str, value: Any) -> type[LimitSurface]:
 
 
 def _bristles(_: str, value: Any) -> ElastoPlastic | float | str | None:
-    return (
-        value
-        if isinstance(value, str) and value == "auto"
-        else LuGre(elasto_plastic=value).elasto_plastic
-    )  # pyright: ignore
+    if isinstance(value, str) and value == "auto":
+        return value
+    return LuGre(elasto_plastic=value).elasto_plastic  # pyright: ignore[reportArgumentType]
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,10 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.logs import Log
+from planarfriction.identify.logs import Linear, Log
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.patch import ContactPatch, SoftFinger
+from planarfriction.patch.metric import refuse_anisotropy
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,12 @@ def check_names(
     return names
 
 
+def check_patch(patch: Any, by: str) -> None:
+    """Raise InvalidValueError unless `by` can take a patch: a ContactPatch without a friction metric."""
+    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
+    refuse_anisotropy(patch, by)
+
+
 def check_loads(
     logs: Sequence[Log],
     loads: Sequence[float],
@@ -173,9 +180,7 @@ class Coordinates:
         self.names = tuple(names)
         count = len(names)
         self.rig = np.arange(count + len(widths)) >= count
-        self.start = np.concatenate(
-            [np.asarray(start, dtype=float)[:count], np.zeros(len(widths))]
-        )
+        self.start = np.append(start[:count], np.zeros(len(widths)))
         self._held_mu_c = held_mu_c
         self._limits = np.asarray(limits, dtype=float)
         self._mu_s = self.names.index("mu_s") if "mu_s" in self.names else None
@@ -185,20 +190,16 @@ class Coordinates:
             ALL[name].logarithmic and name != "mu_s" for name in self.names
         ]
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
-        self.scale[:count][[name == "mu_s" for name in self.names]] = 1.0
+        if self._mu_s is not None:
+            self.scale[self._mu_s] = 1.0
         self.scale[self.rig] = widths
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the lower and the upper bounds of the coordinates, `[F + K]` each."""
-        low = -np.inf * np.ones(len(self.start))
-        high = np.inf * np.ones(len(self.start))
-        low[self.rig] = -self._limits
-        high[self.rig] = self._limits
-        for bound, edges in (
-            (low, [ALL[name].low for name in self.names]),
-            (high, [ALL[n].high for n in self.names]),
-        ):
-            bound[~self.rig] = edges / self.scale[~self.rig]
+        low = np.append([ALL[name].low for name in self.names], -self._limits)
+        high = np.append([ALL[name].high for name in self.names], self._limits)
+        for bound in (low, high):
+            bound[~self.rig] /= self.scale[~self.rig]
             bound[self.logarithmic] = np.log(bound[self.logarithmic])
         if self._mu_s is not None:
             low[self._mu_s] = 0.0
@@ -214,7 +215,7 @@ class Coordinates:
             result[self._mu_s] = values[self._mu_s] / self._mu(values) - 1.0
         return np.clip(result, *self.bounds())
 
-    def prior(self, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def prior(self, coordinates: np.ndarray) -> Linear:
         """Compute a weak pull to the start, `[F + K]`, and its derivatives `[F + K, F + K]`.
 
         It keeps parameters that the data cannot determine at their start. In units of the noise of one residual it is
@@ -251,17 +252,16 @@ class Coordinates:
         return result
 
     def _mu(self, values: np.ndarray) -> float:
-        return self._held_mu_c if self._mu_c is None else float(values[self._mu_c])
+        return self._held_mu_c if self._mu_c is None else values[self._mu_c]
 
 
 def fitted_law(law: LuGre, given: Mapping[str, float]) -> LuGre:
     """Return the law with estimates by name; a `mu_s` that was held grows with a `mu_c` that passes it."""
-    fields: dict[str, Any] = {
-        name: given[name] for name in LAW if name in given and name != "breakaway_ratio"
-    }
+    fields: dict[str, Any] = {name: given[name] for name in LAW if name in given}
+    ratio = fields.pop("breakaway_ratio", None)
     fields["mu_s"] = max(fields.get("mu_s", law.mu_s), fields.get("mu_c", law.mu_c))
-    if "breakaway_ratio" in given:
-        fields["elasto_plastic"] = ElastoPlastic(given["breakaway_ratio"])
+    if ratio is not None:
+        fields["elasto_plastic"] = ElastoPlastic(ratio)
     return dataclasses.replace(law, **fields)
 
 
@@ -269,17 +269,12 @@ def bristles_of(law: LuGre, names: Sequence[str]) -> str:
     """Return the kind of bristles of a law in words, of which `names` are estimated."""
     kind = "plain bristles"
     if isinstance(law.elasto_plastic, ElastoPlastic):
-        given = (
-            ""
-            if "breakaway_ratio" in names
-            else f" ({law.elasto_plastic.breakaway_ratio:g})"
-        )
-        kind = f"elasto-plastic bristles{given}"
-    return (
-        kind
-        if law.reference_load is None
-        else f"{kind} of a stiffness that does not grow with the load"
-    )
+        kind = "elasto-plastic bristles"
+        if "breakaway_ratio" not in names:
+            kind += f" ({law.elasto_plastic.breakaway_ratio:g})"
+    if law.reference_load is not None:
+        kind += " of a stiffness that does not grow with the load"
+    return kind
 
 
 def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> ContactPatch:
@@ -289,27 +284,26 @@ def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> Conta
     """
     old = patch.centre_of_pressure()
     new = old if centre is None else centre
-    grid = patch.grid
-    if grid is not None:
-        x, y = new + scale * (np.array([grid.x_min, grid.y_min]) - old)
-        size = {
-            "cell_width": scale * grid.cell_width,
-            "cell_height": scale * grid.cell_height,
-        }
-        grid = dataclasses.replace(grid, x_min=float(x), y_min=float(y), **size)
-    positions = new + scale * (patch.positions - old)
-    pressure = patch.weights() / patch.areas if patch.point_shares is None else None
-    sizes = {
-        "cell_size": None
-        if patch.cell_size is None
-        else tuple(scale * each for each in patch.cell_size)
-    }
-    sizes |= {
+    changes: dict[str, Any] = {
+        "positions": new + scale * (patch.positions - old),
+        "pressure": None,
         "areas": scale**2 * patch.areas,
         "radii": scale * patch.radii,
-        "grid": grid,
     }
-    return dataclasses.replace(patch, positions=positions, pressure=pressure, **sizes)
+    if patch.point_shares is None:
+        changes["pressure"] = patch.weights() / patch.areas
+    if patch.cell_size is not None:
+        changes["cell_size"] = tuple(scale * each for each in patch.cell_size)
+    if (grid := patch.grid) is not None:
+        x, y = new + scale * (np.array([grid.x_min, grid.y_min]) - old)
+        changes["grid"] = dataclasses.replace(
+            grid,
+            x_min=float(x),
+            y_min=float(y),
+            cell_width=scale * grid.cell_width,
+            cell_height=scale * grid.cell_height,
+        )
+    return dataclasses.replace(patch, **changes)
 
 
 class VectorMap:
@@ -330,7 +324,7 @@ class VectorMap:
         self.base = np.array(base, dtype=float)
         self.load = normal_force
         self._stiffness = 1.0 if reference is None else reference / normal_force
-        self._ratio = float(base[SECOND_MOMENT] / base[RADIUS] ** 2)
+        self._ratio = base[SECOND_MOMENT] / base[RADIUS] ** 2
         self._finger = (
             patch.pressure if any(name in SOFT_FINGER for name in names) else None
         )
@@ -339,18 +333,18 @@ class VectorMap:
         """Return the vector `[P]` of the model for values `[F]`."""
         return self.linearised(values)[0]
 
-    def linearised(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(self, values: np.ndarray) -> Linear:
         """Compute the vector and its derivatives with respect to the values, `[P, F]`."""
         vector = self.base.copy()
         slopes = np.zeros((len(PARAMETERS), len(self.names)))
-        for i, name in enumerate(self.names):
+        for i, (name, value) in enumerate(zip(self.names, values, strict=True)):
             if name in PARAMETERS:
                 row = PARAMETERS.index(name)
-                vector[row] = values[i]
+                vector[row] = value
                 slopes[row, i] = 1.0
             if name == "contact_radius":
-                vector[SECOND_MOMENT] = self._ratio * values[i] ** 2
-                slopes[SECOND_MOMENT, i] = 2.0 * self._ratio * values[i]
+                vector[SECOND_MOMENT] = self._ratio * value**2
+                slopes[SECOND_MOMENT, i] = 2.0 * self._ratio * value
         if self._finger is not None:
             moments = soft_finger_moments(
                 self._finger, self.load, dict(zip(self.names, values, strict=True))
@@ -374,31 +368,24 @@ def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, Any])
 
     c: Any = given.get("c", finger.c)
     n: Any = given.get("n", finger.n)
-    per_newton = finger.k is None
-    k: Any = (
-        given.get("k_per_newton", finger.k_per_newton) * normal_force
-        if per_newton
-        else given.get("k", finger.k)
-    )
+    exponent = "k" if finger.k is not None else "k_per_newton"
+    per_exponent = 1.0 if finger.k is not None else normal_force
+    k: Any = given.get(exponent, getattr(finger, exponent)) * per_exponent
+    largest = np.inf if finger.radius_max is None else finger.radius_max
     grown: Any = c * normal_force**n
-    free = finger.radius_max is None or grown < finger.radius_max
-    size: Any = grown if free else finger.radius_max
+    size = min(grown, largest)
     results = []
     for power in (1, 2):
         value = size**power * np.exp(
             betaln((power + 2) / k, 1 + 1 / k) - betaln(2 / k, 1 + 1 / k)
         )
         of_k = value * (_log_beta_slope(power + 2, k) - _log_beta_slope(2, k))
-        slopes = (
-            {"c": power * value / c, "n": power * value * np.log(normal_force)}
-            if free
-            else {}
-        )
-        slopes["k_per_newton" if per_newton else "k"] = of_k * (
-            normal_force if per_newton else 1.0
-        )
-        results.append((float(value), slopes))
-    return results[0], results[1]
+        slopes = {exponent: of_k * per_exponent}
+        if grown < largest:
+            slopes["c"] = power * value / c
+            slopes["n"] = power * value * np.log(normal_force)
+        results.append((value, slopes))
+    return results
 
 
 def _log_beta_slope(a: float, k: float) -> float:
@@ -406,4 +393,4 @@ def _log_beta_slope(a: float, k: float) -> float:
     from scipy.special import digamma
 
     both = digamma((a + 1) / k + 1)
-    return float(-(a * (digamma(a / k) - both) + (digamma(1 + 1 / k) - both)) / k**2)
+    return -(a * (digamma(a / k) - both) + (digamma(1 + 1 / k) - both)) / k**2

@@ -10,19 +10,25 @@ from typing import Any
 import numpy as np
 
 from planarfriction.derivatives import PARAMETERS, parameters_of
-from planarfriction.identify import parameters as known
 from planarfriction.identify.decimation import redrawn
-from planarfriction.identify.logs import Log, mean_load
+from planarfriction.identify.logs import Arrays, Linear, Log, mean_load
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import (
     RADIUS,
+    SECOND_MOMENT,
+    SOFT_FINGER,
     Coordinates,
     VectorMap,
     check_loads,
 )
 from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
-from planarfriction.identify.simulators import SIMULATORS, PartsPrediction, Prediction
-from planarfriction.identify.uncertainty import covariance
+from planarfriction.identify.simulators import (
+    CENTRE,
+    SIMULATORS,
+    Prediction,
+    PublishedSimulator,
+)
+from planarfriction.identify.uncertainty import covariance, finite
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface.base import scaling
 from planarfriction.patch import ContactPatch
@@ -50,7 +56,7 @@ FEW = 0.1
 """Share of spoiled residuals up to which a robust fit ends without them."""
 
 
-def softened(residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def softened(residual: np.ndarray) -> Linear:
     """Return residuals whose squares are the loss "soft_l1" at a scale of `SOFT`, `[M]`, and their derivatives."""
     root = np.sqrt(1.0 + (residual / SOFT) ** 2)
     # No difference of like numbers at small residuals.
@@ -68,12 +74,14 @@ class Problem:
 
     numbers: Any
     """Number of measured numbers."""
-    sizes: Callable[..., list[int]]
+    sizes: Any
     """Return the number of residuals of each log or slide."""
-    linearised: Callable[..., tuple[np.ndarray, np.ndarray]]
-    even_sigma: Callable[..., list[np.ndarray]]
-    """Return the same noise for all samples, `[T, 3]` of each log or slide."""
-    estimate_noise: Callable[..., tuple[np.ndarray, list[np.ndarray]]]
+    linearised: Any
+    """Return `Linear` residuals for values `[F + K]` and `sigma`."""
+    even_sigma: Any
+    """Return the same noise for all samples, `[T, 3]` of each log or slide, from that of the channels."""
+    estimate_noise: Any
+    """Return the noise of the channels and sigma of each log or slide for values and the noise of before."""
 
     names: tuple[str, ...]
     """Names of the parameters of the contact, `[F]`."""
@@ -97,7 +105,7 @@ class Problem:
         """Return the optimiser's coordinates for a search from values `[F]`."""
         return Coordinates(self.names, start, self.law.mu_c)
 
-    def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
+    def refine_steps(self, values: np.ndarray, sigma: Arrays) -> bool:
         """Take more steps between two samples if the estimates ask for it; returns True if they do."""
         return False
 
@@ -105,11 +113,11 @@ class Problem:
         """Forget derivatives that were kept, from other steps or other values."""
 
     def residuals(
-        self, coordinates: Coordinates, sigma: Sequence[np.ndarray]
-    ) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        self, coordinates: Coordinates, sigma: Arrays
+    ) -> Callable[[np.ndarray], Linear]:
         """Return the function of the coordinates that least squares minimises, with its derivatives."""
 
-        def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def evaluate(x: np.ndarray) -> Linear:
             residual, jacobian = self.linearised(coordinates.values(x), sigma)
             pull, per_pull = coordinates.prior(x)
             return np.concatenate([residual, pull]), np.concatenate(
@@ -124,10 +132,8 @@ class Problem:
 
     def by_log(self, rows: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the rows `[T, 3, C]` of each log or slide among flat ones `[M, C]`."""
-        at = 0
-        for size in self.sizes():
-            yield rows[at : at + size].reshape(-1, 3, rows.shape[1])
-            at += size
+        for each in np.split(rows, np.cumsum(self.sizes())[:-1]):
+            yield each.reshape(-1, 3, rows.shape[1])
 
 
 class LogProblem(Problem):
@@ -150,10 +156,10 @@ class LogProblem(Problem):
         self.options = options
         self.model = model
         self.progress = progress
+        self.kind = SIMULATORS[model]
+        self.fingers = [name for name in names if name in SOFT_FINGER]
         loads = [mean_load(log) for log in logs]
-        check_loads(
-            logs, loads, patch, [name for name in names if name in known.SOFT_FINGER]
-        )
+        check_loads(logs, loads, patch, self.fingers)
         self.reference_load = float(np.median(loads))
         self.fixed_patch = patch
         if patch.depends_on_load:
@@ -161,22 +167,17 @@ class LogProblem(Problem):
             self.fixed_patch = dataclasses.replace(patch, pressure=density)
         self.maps = self._maps(loads)
         self.rig = Rig(logs, options.nuisance)
-        self.twists = [
-            smoothed(log) if "twist" in options.nuisance else as_measured(log)
-            for log in logs
-        ]
+        known_twist = "twist" not in options.nuisance
+        self.twists = [(as_measured if known_twist else smoothed)(log) for log in logs]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
-        self.used = [log.inner[1 if options.begins == "rest" else 0 :] for log in logs]
-        kind = SIMULATORS[model]
-        self.simulator = kind(
-            self.fixed_patch,
-            self._per_load if kind.own_radius else self.law,
-            options.surface,
-        )
+        first = int(options.begins == "rest")
+        self.used = [log.inner[first:] for log in logs]
+        own = self._per_load if self.kind.own_radius else law
+        self.simulator = self.kind(self.fixed_patch, own, options.surface)
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)
-        self._shown: tuple[np.ndarray, list[np.ndarray]] | None = None
-        self._slopes: tuple[np.ndarray, list[np.ndarray]] | None = None
+        self._shown: Any = None
+        self._slopes: Any = None
 
     @property
     def _per_load(self) -> LuGre:
@@ -186,51 +187,37 @@ class LogProblem(Problem):
     def _maps(self, loads: Sequence[float]) -> list[VectorMap]:
         """Make the map from values to the vector of the model at the load of each log."""
         patch = self.patch
-        surface = self.options.surface
         base = parameters_of(
-            SIMULATORS["reduced-published"].model(
-                self.fixed_patch, self._per_load, surface
+            PublishedSimulator.model(
+                self.fixed_patch, self._per_load, self.options.surface
             )
         )
-        self.base = dict(zip(PARAMETERS, base.tolist(), strict=True))
-        reference = (
-            self.law.reference_load if SIMULATORS[self.model].own_radius else None
-        )
+        self.base: dict[str, float] = dict(zip(PARAMETERS, base.tolist(), strict=True))
+        own = self.kind.own_radius
+        reference = self.law.reference_load if own else None
         maps = [VectorMap(self.names, base, patch, load, reference) for load in loads]
-        for each, load in zip(maps, loads, strict=True):
-            if patch.depends_on_load and not any(
-                name in known.SOFT_FINGER for name in self.names
-            ):
-                x, y = patch.centre_of_pressure(load)
-                shape = {
-                    "contact_radius": patch.contact_radius(load),
-                    "second_moment": patch.second_moment(load),
-                }
-                for name, value in {**shape, "centre_x": x, "centre_y": y}.items():
-                    each.base[PARAMETERS.index(name)] = float(value)
-            if not SIMULATORS[
-                self.model
-            ].own_radius:  # the radius of the cells, where that of a surface is its own
-                each.base[RADIUS] = float(self.fixed_patch.contact_radius())
+        for each in maps:
+            if patch.depends_on_load and not self.fingers:
+                each.base[RADIUS] = patch.contact_radius(each.load)
+                each.base[SECOND_MOMENT] = patch.second_moment(each.load)
+                each.base[CENTRE] = patch.centre_of_pressure(each.load)
+            # The radius of the cells, where that of a surface is its own.
+            if not own:
+                each.base[RADIUS] = self.fixed_patch.contact_radius()
         return maps
 
     def _predictions(
         self,
         steps: int,
-        twists: Sequence[np.ndarray] | None = None,
+        twists: Arrays | None = None,
         logs: Sequence[Log] | None = None,
     ) -> list[Prediction]:
-        twists = [each.values for each in self.twists] if twists is None else twists
-        logs = logs or self.logs
-        result = []
-        for log, twist in zip(logs, twists, strict=True):
-            kind: Any = PartsPrediction if len(log.parts) > 1 else Prediction
-            result.append(
-                kind(
-                    self.simulator, log, twist, begins=self.options.begins, refine=steps
-                )
-            )
-        return result
+        twists = twists or [each.values for each in self.twists]
+        begins = self.options.begins
+        return [
+            Prediction(self.simulator, log, twist, begins=begins, refine=steps)
+            for log, twist in zip(logs or self.logs, twists, strict=True)
+        ]
 
     def report(self, text: str) -> None:
         super().report(f"{self.model}: {text}")
@@ -254,12 +241,9 @@ class LogProblem(Problem):
         )
 
     def sizes(self) -> list[int]:
-        return [
-            3 * len(log.time[used])
-            for log, used in zip(self.logs, self.used, strict=True)
-        ]
+        return [3 * len(used) for used in self.used]
 
-    def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
+    def refine_steps(self, values: np.ndarray, sigma: Arrays) -> bool:
         """Take as many steps as keep the estimates within `COARSE` standard errors; returns True if these are more.
 
         Their number follows from the change of the residuals with twice as many steps, as errors fall with its square.
@@ -268,9 +252,8 @@ class LogProblem(Problem):
             return False
         jacobian = self.linearised(values, sigma)[1]
         residual = self.distances(values, sigma)
-        twice = self._scaled(
-            self.shown(values, self._predictions(2 * self.steps)), sigma
-        )
+        finer = self._predictions(2 * self.steps)
+        twice = self._scaled(self._wrenches(values, finer), sigma)
         count = len(self.names)
         pull = np.eye(len(values))[count:] / self.rig.widths[:, None]
         inverse = covariance(
@@ -278,11 +261,8 @@ class LogProblem(Problem):
         )
         errors = np.sqrt(np.diag(inverse))[:count]
         sure = errors < KNOWN * np.abs(values[:count])
-        moved = (
-            np.where(np.isfinite(inverse), inverse, 0.0)
-            @ (jacobian.T @ (twice - residual))
-        )[:count]
-        most = float((np.abs(moved)[sure] / (COARSE * errors[sure])).max(initial=0.0))
+        moved = (finite(inverse) @ (jacobian.T @ (twice - residual)))[:count]
+        most = (np.abs(moved)[sure] / (COARSE * errors[sure])).max(initial=0.0)
         if most <= 1.0:
             return False
         self.steps *= min(int(2 ** np.ceil(0.5 * np.log2(most))), FINEST // self.steps)
@@ -295,73 +275,57 @@ class LogProblem(Problem):
 
     def start_values(self) -> np.ndarray:
         """Return the values `[F]` of the names in the law, the patch and its pressure."""
-        values = {
-            **self.base,
-            **{
-                name: getattr(self.law, name)
-                for name in known.LAW
-                if name != "breakaway_ratio"
-            },
-        }
-        if any(name in known.SOFT_FINGER for name in self.names):
-            values |= {
-                name: getattr(self.patch.pressure, name) for name in known.SOFT_FINGER
-            }
-        return np.array([float(values[name]) for name in self.names])
+        finger = self.patch.pressure
+        values = [
+            getattr(finger, name) if name in self.fingers else self.base[name]
+            for name in self.names
+        ]
+        return np.array(values, dtype=float)
 
     def split(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Split values into those of the contact `[F]` and of the rig `[K]` (zeros if there are none)."""
         count = len(self.names)
-        rig = values[count:] if len(values) > count else np.zeros(len(self.rig.columns))
-        return values[:count], rig
+        rig = values[count:]
+        return values[:count], rig if len(rig) else np.zeros(len(self.rig.columns))
 
-    def shown(
-        self, values: np.ndarray, predictions: Sequence[Prediction] | None = None
-    ) -> list[np.ndarray]:
+    def shown(self, values: np.ndarray) -> Arrays:
         """Compute the wrenches `[T, 3]` that the sensors of each log should show, for values `[F]` or `[F + K]`."""
-        if (
-            predictions is None
-            and self._shown is not None
-            and np.array_equal(self._shown[0], values)
-        ):
-            return self._shown[1]
+        if self._shown is None or not np.array_equal(self._shown[0], values):
+            self._shown = values.copy(), self._wrenches(values, self.predictions)
+        return self._shown[1]
+
+    def _wrenches(
+        self, values: np.ndarray, predictions: Sequence[Prediction]
+    ) -> Arrays:
         contact, rig = self.split(values)
         result = []
-        for i, (prediction, each) in enumerate(
-            zip(predictions or self.predictions, self.maps, strict=True)
-        ):
+        both = zip(predictions, self.maps, strict=True)
+        for i, (prediction, each) in enumerate(both):
             wrench = prediction.wrenches(each.vector(contact), self.rig.delay(rig))
             result.append(self.rig.added(i, rig, wrench, np.zeros_like(wrench))[0])
-        if predictions is None:
-            self._shown = values.copy(), result
         return result
 
-    def linearised(
-        self, values: np.ndarray, sigma: Sequence[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def linearised(self, values: np.ndarray, sigma: Arrays) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, and derivatives `[M, F + K]`, at `values` or nearby (`NEARBY`)."""
         if self._slopes is None or not self._near(values, self._slopes[0]):
-            self._derive(values)
-        assert self._slopes is not None
+            self._slopes = self._derive(values)
         both = zip(self._slopes[1], self.logs, self.used, sigma, strict=True)
         rows = [
-            (slope * (log.channels / each)[..., None])[used]
+            (slope * (log.channels / each)[..., None])[used].reshape(
+                -1, slope.shape[-1]
+            )
             for slope, log, used, each in both
         ]
-        jacobian = np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
-        residual = self.distances(values, sigma)
-        if self.options.loss == "linear":
-            return residual, jacobian
-        residual, slopes = softened(residual)
-        return residual, slopes[:, None] * jacobian
+        residual, factor = self._counted(values, sigma)
+        return residual, factor[:, None] * np.concatenate(rows)
 
     def slopes_of(
         self,
         names: Sequence[str],
         held: np.ndarray,
         values: np.ndarray,
-        sigma: Sequence[np.ndarray],
-    ) -> tuple[np.ndarray, np.ndarray]:
+        sigma: Arrays,
+    ) -> Linear:
         """Compute the residuals `[M]` at `values`, and derivatives `[M, H]` by `names` of the law, `held` at these."""
         wide = copy.copy(self)
         wide.names = (*self.names, *names)
@@ -376,22 +340,22 @@ class LogProblem(Problem):
 
     def _near(self, values: np.ndarray, others: np.ndarray) -> bool:
         """Return True if no value differs by more than `NEARBY` from another one, as a share of its size."""
-        centre = [
-            self.base["contact_radius"] if name in ("centre_x", "centre_y") else 0.0
-            for name in self.names
-        ]
-        sizes = np.concatenate(
-            [np.maximum(np.abs(values[: len(centre)]), centre), self.rig.widths]
+        contact, _ = self.split(np.abs(values))
+        centre = np.isin(self.names, ("centre_x", "centre_y"))
+        sizes = np.maximum(contact, self.base["contact_radius"] * centre)
+        return bool(
+            (
+                np.abs(values - others) <= NEARBY * np.append(sizes, self.rig.widths)
+            ).all()
         )
-        return bool((np.abs(values - others) <= NEARBY * sizes).all())
 
-    def _derive(self, values: np.ndarray) -> None:
-        """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`, and remember them."""
+    def _derive(self, values: np.ndarray) -> tuple[np.ndarray, Arrays]:
+        """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`, and remember the wrenches."""
         contact, rig = self.split(values)
-        found = []
-        for i, (prediction, each) in enumerate(
-            zip(self.predictions, self.maps, strict=True)
-        ):
+        wrenches = []
+        slopes = []
+        both = zip(self.predictions, self.maps, strict=True)
+        for i, (prediction, each) in enumerate(both):
             vector, per_value = each.linearised(contact)
             rows = np.flatnonzero(per_value.any(axis=1))
             names = [PARAMETERS[row] for row in rows]
@@ -400,33 +364,37 @@ class LogProblem(Problem):
             )
             shown, factor, of_rig = self.rig.added(i, rig, wrench, later)
             slope = factor[:, None, None] * (slope @ per_value[rows])
-            found.append((shown, np.concatenate([slope, of_rig], axis=-1)))
-        shown, slopes = zip(*found, strict=True)
-        self._shown = (values.copy(), [*shown])
-        self._slopes = (values.copy(), [*slopes])
+            wrenches.append(shown)
+            slopes.append(np.concatenate([slope, of_rig], axis=-1))
+        self._shown = values.copy(), wrenches
+        return values.copy(), slopes
 
-    def residual(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
+    def residual(self, values: np.ndarray, sigma: Arrays) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, as the loss counts them."""
-        residual = self.distances(values, sigma)
-        return residual if self.options.loss == "linear" else softened(residual)[0]
+        return self._counted(values, sigma)[0]
 
-    def distances(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
+    def _counted(self, values: np.ndarray, sigma: Arrays) -> Linear:
+        """Compute the residuals `[M]` as the loss counts them, and their derivatives by those over `sigma`."""
+        residual = self.distances(values, sigma)
+        if self.options.loss == "linear":
+            return residual, np.ones_like(residual)
+        return softened(residual)
+
+    def distances(self, values: np.ndarray, sigma: Arrays) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, whatever the loss."""
         return self._scaled(self.shown(values), sigma)
 
-    def _scaled(
-        self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]
-    ) -> np.ndarray:
+    def _scaled(self, wrenches: Arrays, sigma: Arrays) -> np.ndarray:
         """Subtract the measured wrenches and divide by `sigma`; returns all used samples flat."""
         rows = zip(self._apart(wrenches, sigma), self.used, strict=True)
         return np.concatenate([each[used].ravel() for each, used in rows])
 
-    def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
+    def even_sigma(self, noise: np.ndarray) -> Arrays:
         return [np.broadcast_to(noise, log.wrench.shape) for log in self.logs]
 
     def estimate_noise(
         self, values: np.ndarray, noise: np.ndarray
-    ) -> tuple[np.ndarray, list[np.ndarray]]:
+    ) -> tuple[np.ndarray, Arrays]:
         """Estimate the noise of each channel `[3]`, unless it is given, and sigma `[T, 3]` of each log's residuals."""
         if self.options.noise is None:
             both = zip(self.shown(values), self.logs, strict=True)
@@ -444,16 +412,14 @@ class LogProblem(Problem):
                 ]
         return noise, sigma
 
-    def _apart(
-        self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]
-    ) -> list[np.ndarray]:
+    def _apart(self, wrenches: Arrays, sigma: Arrays) -> Arrays:
         """Subtract the measured wrenches and divide by `sigma`, `[T, 3]` of each log."""
         both = zip(wrenches, self.logs, sigma, strict=True)
         return [
             (wrench - log.wrench) * (log.channels / each) for wrench, log, each in both
         ]
 
-    def sigma(self, values: np.ndarray, noise: np.ndarray) -> list[np.ndarray]:
+    def sigma(self, values: np.ndarray, noise: np.ndarray) -> Arrays:
         """Compute the standard deviation `[T, 3]` of each log's residuals from the noise `[3]` and that of the twist.
 
         The latter adds, to first order, the change of each sample if the twists before it were all off by the error
@@ -466,9 +432,9 @@ class LogProblem(Problem):
         ):
             square = np.broadcast_to(noise**2, log.wrench.shape).copy()
             vector = each.vector(contact)
-            channels = np.diag(twist.noisy & ("twist" in self.rig.groups))
-            base = prediction.wrenches(vector) if channels.any() else None
-            for one in channels[channels.any(axis=1)]:
+            channels = np.eye(3)[twist.noisy]
+            base = prediction.wrenches(vector) if len(channels) else None
+            for one in channels:
                 square += (
                     prediction.moved(vector, one * twist.left, one * twist.noise) - base
                 ) ** 2
@@ -476,13 +442,13 @@ class LogProblem(Problem):
         return sigma
 
     def twist_residuals(
-        self, values: np.ndarray, sigma: Sequence[np.ndarray], draws: int
+        self, values: np.ndarray, sigma: Arrays, draws: int
     ) -> np.ndarray | None:
         """Compute the changes `[draws, M]` of the residuals over `sigma` for drawn errors of the twists.
 
         The draws are always the same ones. Returns None if no twist has noise.
         """
-        noisy = [twist.noisy & ("twist" in self.rig.groups) for twist in self.twists]
+        noisy = [twist.noisy for twist in self.twists]
         if not np.any(noisy):
             return None
         random = np.random.default_rng(0)
@@ -495,7 +461,7 @@ class LogProblem(Problem):
                 for twist, on, _ in both
             ]
             logs = [redrawn(log, twist.noise * on, random) for twist, on, log in both]
-            shown = self.shown(values, self._predictions(self.steps, drawn, logs))
+            shown = self._wrenches(values, self._predictions(self.steps, drawn, logs))
             change = [
                 new - old + log.wrench
                 for new, old, log in zip(shown, base, self.logs, strict=True)
@@ -503,27 +469,23 @@ class LogProblem(Problem):
             result.append(self._scaled(change, sigma))
         return np.array(result)
 
-    def coefficients(self, values: np.ndarray) -> list[np.ndarray]:
+    def coefficients(self, values: np.ndarray) -> Arrays:
         """Compute friction over load [-], `[T]` of each log; NaN without load."""
         contact, _ = self.split(values)
-        radii = [each.vector(contact)[RADIUS] for each in self.maps]
-        sizes = [
-            np.linalg.norm(log.wrench / [1.0, 1.0, r], axis=1)
-            for log, r in zip(self.logs, radii, strict=True)
-        ]
-        loads = [
-            np.where(log.normal_force > 0.0, log.normal_force, np.nan)
-            for log in self.logs
-        ]
-        return [size / load for size, load in zip(sizes, loads, strict=True)]
+        result = []
+        for log, each in zip(self.logs, self.maps, strict=True):
+            radius = each.vector(contact)[RADIUS]
+            size = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
+            load = np.where(log.normal_force > 0.0, log.normal_force, np.nan)
+            result.append(size / load)
+        return result
 
     def sliding(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Compute the sliding speed `|V_S|` and its part from spin [m/s], `[T]` each, of each log."""
         contact, _ = self.split(values)
         result = []
         for twist, each in zip(self.twists, self.maps, strict=True):
-            vector = dict(zip(PARAMETERS, each.vector(contact), strict=True))
-            centre = np.array([vector["centre_x"], vector["centre_y"]])
-            scaled = twist.values @ scaling(centre, vector["contact_radius"]).T
+            vector = each.vector(contact)
+            scaled = twist.values @ scaling(vector[CENTRE], vector[RADIUS]).T
             result.append((np.linalg.norm(scaled, axis=1), np.abs(scaled[:, 2])))
         return result

@@ -14,7 +14,7 @@ from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
 from planarfriction._support.pictures import picture
 from planarfriction.formulas import PARAMETERS
-from planarfriction.identify.parameters import ALL, LAW
+from planarfriction.identify.parameters import ALL, LAW, SHAPE
 from planarfriction.identify.rig import Nuisance
 from planarfriction.identify.uncertainty import draws
 from planarfriction.identify.verdicts import ModelScore, Verdict, interval
@@ -104,41 +104,23 @@ class Identification(ByValue):
         Raises InvalidValueError unless `count` is a count.
         """
         generator = np.random.default_rng(validation.count("seed", seed, 0))
-        normal = generator.standard_normal(
-            (
-                validation.count("count", count, at_most=validation.MOST_DRAWS),
-                len(self.names),
-            )
-        )
-        drawn = draws(
-            self.names, self.values, self.standard_errors, self.correlations, normal
-        )
+        count = validation.count("count", count, at_most=validation.MOST_DRAWS)
+        normal = generator.standard_normal((count, len(self.names)))
+        errors = self.standard_errors
+        drawn = draws(self.names, self.values, errors, self.correlations, normal)
         found = dict(zip(self.names, drawn.T.copy(), strict=True))
         result = {name: values for name, values in found.items() if name in NUMBERS}
         if "mu_c" in found or "mu_s" in found:
-            result["mu_s"] = np.maximum(
-                found.get("mu_s", self.law.mu_s), found.get("mu_c", self.law.mu_c)
-            )
-        if (
-            not {"contact_radius", "centre_x", "centre_y"}.isdisjoint(found)
-            and not self.model.depends_on_load
-        ):
-            result |= self._places(found, count)
+            mu_s = found.get("mu_s", self.law.mu_s)
+            result["mu_s"] = np.maximum(mu_s, found.get("mu_c", self.law.mu_c))
+        if not self.model.depends_on_load and not SHAPE.keys().isdisjoint(found):
+            radius = self.estimates.get("contact_radius", 1.0)
+            scale = found.get("contact_radius", np.full(count, radius)) / radius
+            x, y = self.model.patch.centre_of_pressure()
+            result["scale"] = scale
+            result["centre_x"] = found.get("centre_x", x) - scale * x
+            result["centre_y"] = found.get("centre_y", y) - scale * y
         return result
-
-    def _places(
-        self, found: Mapping[str, np.ndarray], count: int
-    ) -> dict[str, np.ndarray]:
-        """Return size and displacement of the fitted patch for draws of its radius and its centre of pressure."""
-        scale = found.get("contact_radius", np.ones(count)) / self.estimates.get(
-            "contact_radius", 1.0
-        )
-        middle = zip(
-            ("centre_x", "centre_y"), self.model.patch.centre_of_pressure(), strict=True
-        )
-        return {"scale": scale} | {
-            name: found.get(name, own) - scale * own for name, own in middle
-        }
 
     def identifiable(self, name: str) -> bool:
         """Return True if the data determine this parameter."""
@@ -165,80 +147,62 @@ class Identification(ByValue):
     def summary(self) -> str:
         """Return the verdict in plain words: the parameters that the data determine, and the trust in the fit."""
         known = [name for name in self.names if self.identifiable(name)]
-        lines = [
-            f"Identified: {', '.join(known)}."
-            if known
-            else "None of the parameters is identifiable."
-        ]
-        if 0 < len(known) < len(self.names):
-            lines[0] += (
-                f" Not identifiable: {', '.join(name for name in self.names if name not in known)}."
-            )
+        others = [name for name in self.names if name not in known]
+        first = "None of the parameters is identifiable."
+        if known:
+            first = f"Identified: {', '.join(known)}."
+            if others:
+                first += f" Not identifiable: {', '.join(others)}."
         reasons = [each.reason for each in self.verdicts if each.parameter == "fit"]
-        lines += [f"{reason[0].upper()}{reason[1:]}." for reason in reasons]
+        lines = [first, *(f"{reason[0].upper()}{reason[1:]}." for reason in reasons)]
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 
     def table(self) -> str:
         """Return text in 80 columns: estimates, goodness of fit, correlations, then the verdicts and the rig."""
-        lines = []
+        heading = f"{'parameter':<15}{'value':>12}{'std. error':>12}  {'95 % interval':<25}unit"
+        lines = [heading]
         remarks = []
         intervals = self.intervals()
-        for name, value, error in zip(
-            self.names, self.values, self.standard_errors, strict=True
-        ):
-            shown = " to ".join(_digits(end, 4) for end in intervals[name])
-            spread = (
-                _digits(error, 2) if error < 1e3 * max(abs(value), 1e-12) else "unknown"
-            )
-            between = shown if self.identifiable(name) else "not identifiable"
+        for name, value in self.estimates.items():
+            error = self.errors[name]
+            spread = "unknown"
+            if error < 1e3 * max(abs(value), 1e-12):
+                spread = _digits(error, 2)
+            between = "not identifiable"
+            if self.identifiable(name):
+                between = " to ".join(_digits(end, 4) for end in intervals[name])
             lines.append(
                 f"{name:<15}{_digits(value, 5):>12}{spread:>12}  {between:<25}{ALL[name].unit}".rstrip()
             )
-            if reasons := [
-                each.reason for each in self.verdicts if each.parameter == name
-            ]:
-                remarks.append(
-                    textwrap.fill(
-                        f"{name}: {'; '.join(reasons)}", WIDTH, subsequent_indent="  "
-                    )
-                )
-        heading = f"{'parameter':<15}{'value':>12}{'std. error':>12}  {'95 % interval':<25}unit"
+            reasons = [each.reason for each in self.verdicts if each.parameter == name]
+            if reasons:
+                text = f"{name}: {'; '.join(reasons)}"
+                remarks.append(textwrap.fill(text, WIDTH, subsequent_indent="  "))
         if self.scores:
             samples = f"{self.samples[0]:,} samples, {len(self.names)} parameters"
-            lines.append(
-                f"reduced chi-square {_digits(self.scores[0].reduced_chi2, 4)} ({samples})"
-            )
+            chi2 = _digits(self.scores[0].reduced_chi2, 4)
+            lines.append(f"reduced chi-square {chi2} ({samples})")
         rig = [
             f"{_short(each):<27}{each.value:>11.3g}  {' to '.join(f'{end:.3g}' for end in each.interval)} {each.unit}"
             for each in self.rig
         ]
-        blocks = [
-            ["\n".join([heading, *lines])],
-            self._pairs(),
-            [self.summary()],
-            remarks,
-            [f"{'disturbance of the rig':<27}{'value':>11}  95 % interval, unit", *rig]
-            if rig
-            else [],
-        ]
+        if rig:
+            rig.insert(
+                0, f"{'disturbance of the rig':<27}{'value':>11}  95 % interval, unit"
+            )
+        blocks = [lines, self._pairs(), [self.summary()], remarks, rig]
         return "\n\n".join("\n".join(block) for block in blocks if block)
 
     def _pairs(self) -> list[str]:
         """Return lines on the most strongly correlated pairs of estimates, the strongest first."""
-        pairs = [
-            (self.correlations[i, j], i, j)
-            for j in range(len(self.names))
-            for i in range(j)
-        ]
-        pairs = sorted(
-            (each for each in pairs if abs(each[0]) >= CORRELATED),
-            key=lambda each: -abs(each[0]),
-        )[:PAIRS]
-        lines = [
-            f"{f'{self.names[i]}, {self.names[j]}':<27}{value:+.3f}"
-            for value, i, j in pairs
-        ]
-        return [f"correlations of {CORRELATED} and more", *lines] if lines else []
+        rows, columns = np.tril_indices(len(self.names), -1)
+        values = self.correlations[rows, columns]
+        lines = [f"correlations of {CORRELATED} and more"]
+        for k in np.argsort(-np.abs(values), kind="stable")[:PAIRS]:
+            if abs(values[k]) >= CORRELATED:
+                pair = f"{self.names[columns[k]]}, {self.names[rows[k]]}"
+                lines.append(f"{pair:<27}{values[k]:+.3f}")
+        return lines if len(lines) > 1 else []
 
     def __repr__(self) -> str:
         return self.table()
@@ -252,38 +216,31 @@ class Identification(ByValue):
         def plain(value: float) -> float | None:
             return float(value) if np.isfinite(value) else None
 
-        def estimate(
-            value: float, error: float, interval: tuple[float, float], unit: str
-        ) -> dict[str, Any]:
-            edges = [plain(edge) for edge in interval]
+        def estimate(value: float, error: float, interval: Any, unit: str) -> dict:
             return {
                 "estimate": float(value),
                 "standard_error": plain(error),
-                "interval_95": edges,
+                "interval_95": [plain(edge) for edge in interval],
                 "unit": unit,
             }
 
         intervals = self.intervals()
-        parameters = {
-            name: {
-                **estimate(value, error, intervals[name], ALL[name].unit),
-                "identifiable": self.identifiable(name),
-            }
-            for name, value, error in zip(
-                self.names, self.values, self.standard_errors, strict=True
-            )
-        }
+        errors = self.errors
+        channels = [name for name, _ in self.channels]
+        lagged = self.residual_correlations().T.tolist()
         return {
-            "parameters": parameters,
-            "correlations": {
-                name: row.tolist()
-                for name, row in zip(self.names, self.correlations, strict=True)
+            "parameters": {
+                name: {
+                    **estimate(value, errors[name], intervals[name], ALL[name].unit),
+                    "identifiable": self.identifiable(name),
+                }
+                for name, value in self.estimates.items()
             },
+            "correlations": dict(
+                zip(self.names, self.correlations.tolist(), strict=True)
+            ),
             "verdicts": [str(each) for each in self.verdicts],
-            "noise": {
-                name: plain(value)
-                for (name, _), value in zip(self.channels, self.noise, strict=True)
-            },
+            "noise": dict(zip(channels, map(plain, self.noise), strict=True)),
             "rig": [
                 {
                     "name": each.name,
@@ -294,12 +251,7 @@ class Identification(ByValue):
             ],
             "model": self.chosen,
             "models": [each._asdict() for each in self.scores],
-            "residual_correlations": {
-                name: column.tolist()
-                for (name, _), column in zip(
-                    self.channels, self.residual_correlations().T, strict=True
-                )
-            },
+            "residual_correlations": dict(zip(channels, lagged, strict=True)),
             "samples": {"used": self.samples[0], "total": self.samples[1]},
             "starts": {"agreeing": self.starts[0], "total": self.starts[1]},
         }
@@ -312,11 +264,9 @@ class Identification(ByValue):
 def _digits(value: float, count: int) -> str:
     """Return a number with `count` significant digits, without an exponent where it has few zeros."""
     text = f"{value:.{count}g}"
-    return (
-        np.format_float_positional(float(text), trim="-")
-        if 1e-3 <= abs(value) < 1e6
-        else text
-    )
+    if 1e-3 <= abs(value) < 1e6:
+        return np.format_float_positional(float(text), trim="-")
+    return text
 
 
 def _short(each: Nuisance) -> str:

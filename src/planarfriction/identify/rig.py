@@ -14,12 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction._support import validation
-from planarfriction.identify.logs import Log
+from planarfriction.identify.logs import Arrays, Log
 
 GROUPS = ("delay", "bias", "load", "twist")
 """Groups of disturbances: delay, zeros of the channels, scale and drift of the load cell, noise of the twist."""
 
 CHANNELS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
+
+FACTOR = 3
+"""Place of the factor on all channels, behind them."""
 
 DELAY = 0.01
 """Standard deviation of the delay a priori [s]."""
@@ -52,7 +55,7 @@ ORDER = 3
 """Order of the differences that give the noise: motions at a tenth of the sampling rate
 leave 2 % of themselves."""
 
-SIZE = float(np.sqrt(20.0))
+SIZE = np.sqrt(20.0)
 """Standard deviation of these differences of unit noise: 1 + 9 + 9 + 1 under the
 root."""
 
@@ -67,6 +70,8 @@ CLIP_VARIANCE = 0.9733
 
 CLIPPED = 5
 """Rounds of leaving differences out."""
+
+TINY = np.finfo(float).tiny
 
 LEAST_NOISE = 1e-3
 """Least noise of a sensor, as a share of the largest force or torque."""
@@ -108,8 +113,8 @@ class _Column(NamedTuple):
     """Standard deviation a priori [unit]."""
     degree: int = 0
     """Degree of the Legendre polynomial over the log."""
-    channel: int | None = None
-    """Channel to which it adds; None for the factor of all."""
+    channel: int = FACTOR
+    """Channel to which it adds, or `FACTOR` for the factor on all."""
 
 
 class Rig:
@@ -125,25 +130,15 @@ class Rig:
             largest[:2] = np.maximum(largest[:2], LEAST_FORCE * largest[:2].max())
             for k, (channel, unit) in enumerate(CHANNELS):
                 if "bias" in groups and log.channels[k]:
-                    columns.append(
-                        _Column(f"bias_{channel}", unit, i, BIAS * largest[k], 0, k)
-                    )
-                    columns.append(
-                        _Column(
-                            f"zero_drift_{channel}",
-                            unit,
-                            i,
-                            ZERO_DRIFT * largest[k],
-                            1,
-                            k,
-                        )
-                    )
+                    bias = BIAS * largest[k]
+                    drift = ZERO_DRIFT * largest[k]
+                    columns += [
+                        _Column(f"bias_{channel}", unit, i, bias, 0, k),
+                        _Column(f"zero_drift_{channel}", unit, i, drift, 1, k),
+                    ]
             for k, width in enumerate(DRIFT if "load" in groups else (), start=1):
-                columns.append(
-                    _Column(
-                        "load_drift" if k == 1 else f"load_drift_{k}", "-", i, width, k
-                    )
-                )
+                name = "load_drift" if k == 1 else f"load_drift_{k}"
+                columns.append(_Column(name, "-", i, width, k))
         self.columns = tuple(columns)
         self.widths = np.array([each.width for each in columns])
         self.limits = np.array(
@@ -151,52 +146,44 @@ class Rig:
         )
         """Largest sizes of the values, over their widths, `[K]`."""
 
-    def _effects(self, i: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives `[T, K]` of the factor on the wrench of log i, and those `[T, 3, K]` of its zeros."""
+    def _effects(self, i: int) -> np.ndarray:
+        """Return the derivatives `[T, 4, K]` of the zeros of log i and of the factor on its wrench."""
         time = self.logs[i].time
-        shapes = np.polynomial.legendre.legvander(
-            2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0, len(DRIFT)
-        )
-        factor = np.zeros((len(time), len(self.columns)))
-        zeros = np.zeros((len(time), 3, len(self.columns)))
+        u = 2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0
+        shapes = np.polynomial.legendre.legvander(u, len(DRIFT))
+        effects = np.zeros((len(time), 4, len(self.columns)))
         for j, column in enumerate(self.columns):
             if column.log in (None, i) and column.name != "delay":
-                changed = (
-                    factor[:, j]
-                    if column.channel is None
-                    else zeros[:, column.channel, j]
-                )
-                changed[:] = shapes[:, column.degree]
-        return factor, zeros
+                effects[:, column.channel, j] = shapes[:, column.degree]
+        return effects
 
     def delay(self, values: np.ndarray) -> float:
         """Return the delay [s] among the values `[K]`."""
-        return float(values[0]) if "delay" in self.groups else 0.0
+        return values[0] if "delay" in self.groups else 0.0
 
     def added(
         self, i: int, values: np.ndarray, wrench: np.ndarray, later: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, ...]:
         """Compute the wrench `[T, 3]` that sensors of log i show, the factor `[T]` on it, and derivatives `[T, 3, K]`.
 
         `later` is the derivative of the wrench with respect to the delay.
         """
-        by_factor, by_zeros = self._effects(i)
-        factor = 1.0 + by_factor @ values
-        slopes = by_factor[:, None] * wrench[:, :, None] + by_zeros
+        effects = self._effects(i)
+        changes = effects @ values
+        factor = 1.0 + changes[:, FACTOR]
+        slopes = effects[:, FACTOR, None] * wrench[:, :, None] + effects[:, :FACTOR]
         if "delay" in self.groups:
             slopes[:, :, 0] = factor[:, None] * later
-        return factor[:, None] * wrench + by_zeros @ values, factor, slopes
+        return factor[:, None] * wrench + changes[:, :FACTOR], factor, slopes
 
     def with_drift(self, values: np.ndarray) -> np.ndarray:
         """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift, half its largest range."""
-        drift = max(
-            0.5 * float(np.ptp(self._effects(i)[0] @ values))
-            for i in range(len(self.logs))
-        )
-        scales = np.array(
-            [each.name == "load_scale" for each in self.columns], dtype=bool
-        )
-        return np.where(scales, np.hypot(SCALE, drift / EDGE), self.widths)
+        ranges = [
+            np.ptp(self._effects(i)[:, FACTOR] @ values) for i in range(len(self.logs))
+        ]
+        scales = [each.name == "load_scale" for each in self.columns]
+        wide = np.hypot(SCALE, 0.5 * max(ranges) / EDGE)
+        return np.where(np.array(scales, dtype=bool), wide, self.widths)
 
     def strains(self, values: np.ndarray) -> list[tuple[float, str]]:
         """Return the size of each value `[K]` over its width and in words, the largest first."""
@@ -252,11 +239,11 @@ def jitter(values: np.ndarray) -> np.ndarray:
 def least_noise(logs: Sequence[Log]) -> np.ndarray:
     """Return the least noise `[3]` of a wrench that sensors can have."""
     largest = np.max([np.abs(log.wrench).max(axis=0) for log in logs], axis=0)
-    force = max(largest[:2].max(), np.finfo(float).tiny)
-    return LEAST_NOISE * np.array([force, force, max(largest[2], np.finfo(float).tiny)])
+    force = largest[:2].max()
+    return LEAST_NOISE * np.maximum([force, force, largest[2]], TINY)
 
 
-def wrench_noise(logs: Sequence[Log], *residuals: Sequence[np.ndarray]) -> np.ndarray:
+def wrench_noise(logs: Sequence[Log], *residuals: Arrays) -> np.ndarray:
     """Estimate the noise `[3]` of the wrench from the jitter of the logs or of the residuals `[T, 3]`, if that is less.
 
     A fit takes the sharp turns of friction out of the signal; its errors extend over many samples and so leave the
@@ -291,21 +278,19 @@ class SmoothTwist(NamedTuple):
     @property
     def noisy(self) -> np.ndarray:
         """Mask `[3]` of the channels whose remaining error counts."""
-        size = np.maximum(
-            np.sqrt(np.mean(self.values**2, axis=0)), np.finfo(float).tiny
-        )
-        return self.left > QUIET * size
+        return self.left > QUIET * _size(self.values)
 
     def error(self, random: np.random.Generator) -> np.ndarray:
         """Draw an error that the values may have, `[T, 3]`: noise through the same smoother."""
         drawn = random.standard_normal(self.values.shape)
-        for k, weight in enumerate(self.weights):
-            if weight > 0.0:
-                drawn[:, k] = _solved(drawn[:, k], weight)
-            drawn[:, k] *= self.left[k] / max(
-                np.sqrt(np.mean(drawn[:, k] ** 2)), np.finfo(float).tiny
-            )
-        return drawn
+        for k in np.flatnonzero(self.weights):
+            drawn[:, k] = _solved(drawn[:, k], self.weights[k])
+        return drawn * (self.left / _size(drawn))
+
+
+def _size(values: np.ndarray) -> np.ndarray:
+    """Compute the root mean square of the columns `[T, C]`, not quite zero."""
+    return np.maximum(np.sqrt(np.mean(values**2, axis=0)), TINY)
 
 
 def smoothed(log: Log) -> SmoothTwist:
@@ -315,80 +300,62 @@ def smoothed(log: Log) -> SmoothTwist:
     """
     if len(log.parts) > 1:
         return _joined([smoothed(part) for part in log.parts])
-    found = as_measured(log)
+    noise = jitter(log.twist)
+    found = SmoothTwist(log.twist.copy(), noise, noise.copy(), np.zeros(3))
     if log.even and len(log.time) >= LEAST_TO_SMOOTH:
-        size = np.maximum(np.sqrt(np.mean(log.twist**2, axis=0)), np.finfo(float).tiny)
-        for k in np.flatnonzero(found.noise > QUIET * size):
-            found.values[:, k], found.noise[k], found.left[k], found.weights[k] = (
-                _smooth(log.twist[:, k])
+        for k in np.flatnonzero(noise > QUIET * _size(log.twist)):
+            found.values[:, k], noise[k], found.left[k], found.weights[k] = _smooth(
+                log.twist[:, k]
             )
     return found
 
 
 def as_measured(log: Log) -> SmoothTwist:
-    """Return the twist of a log as it was measured, with the noise that it has."""
-    noise = jitter(log.twist)
-    return SmoothTwist(log.twist.copy(), noise, noise.copy(), np.zeros(3))
+    """Return the twist of a log that has no noise."""
+    return SmoothTwist(log.twist, *np.zeros((3, 3)))
 
 
 def _joined(parts: Sequence[SmoothTwist]) -> SmoothTwist:
     """Join the parts of a log: mean squares of errors, and the median weights."""
     sizes = [len(part.values) for part in parts]
+    values, noise, left, weights = zip(*parts, strict=True)
     noise, left = (
-        np.sqrt(
-            np.average(
-                [getattr(part, name) ** 2 for part in parts], axis=0, weights=sizes
-            )
-        )
-        for name in ("noise", "left")
+        np.sqrt(np.average(np.square(each), axis=0, weights=sizes))
+        for each in (noise, left)
     )
-    weights = np.median([part.weights for part in parts], axis=0)
-    return SmoothTwist(
-        np.concatenate([part.values for part in parts]), noise, left, weights
-    )
+    return SmoothTwist(np.concatenate(values), noise, left, np.median(weights, axis=0))
 
 
-def _smooth(values: np.ndarray) -> tuple[np.ndarray, float, float, float]:
+def _smooth(values: np.ndarray) -> tuple[Any, ...]:
     """Smooth values `[T]`; returns them with their noise, their remaining error, and the weight of third differences.
 
     The weight minimises the generalised cross-validation; the remaining error is Stein's estimate.
 
     Sources: Eilers 2003 (the smoother); Golub, Heath, Wahba 1979 (the weight); Stein 1981.
     """
-    count = len(values)
     stiffness = (2.0 - 2.0 * np.cos(np.linspace(0.0, np.pi, 4001))) ** ORDER
-    best = (np.inf, values, 0.0, 0.0, 0.0)
-    for weight in SMOOTHNESS:
+
+    def tried(weight: float) -> tuple[Any, ...]:
         smooth = _solved(values, weight)
-        freedom = float(np.mean(1.0 / (1.0 + weight * stiffness))) + ORDER / count
-        square = float(np.mean((values - smooth) ** 2))
-        score = square / (1.0 - freedom) ** 2
-        if score < best[0]:
-            variance = square / (1.0 - freedom)
-            error = max(
-                square + 2.0 * variance * freedom - variance, variance * freedom
-            )
-            best = (
-                score,
-                smooth,
-                float(np.sqrt(variance)),
-                float(np.sqrt(error)),
-                float(weight),
-            )
-    return best[1:]
+        freedom = np.mean(1.0 / (1.0 + weight * stiffness)) + ORDER / len(values)
+        square = np.mean((values - smooth) ** 2)
+        variance = square / (1.0 - freedom)
+        error = max(square + 2.0 * variance * freedom - variance, variance * freedom)
+        score = variance / (1.0 - freedom)
+        return score, smooth, np.sqrt(variance), np.sqrt(error), weight
+
+    return min(map(tried, SMOOTHNESS), key=lambda each: each[0])[1:]
 
 
 def _solved(values: np.ndarray, weight: float) -> np.ndarray:
     """Solve `(1 + weight D'D) x = values` for x `[T]`, with D the matrix of third differences."""
     from scipy.linalg import solveh_banded
 
-    count = len(values)
-    row = (-1.0, 3.0, -3.0, 1.0)
-    bands = np.zeros((ORDER + 1, count))
-    for shift in range(ORDER + 1):  # upper bands
-        for i in range(ORDER + 1 - shift):
-            bands[ORDER - shift, i + shift : count - ORDER + i + shift] += (
-                weight * row[i] * row[i + shift]
-            )
+    row = np.array([-1.0, 3.0, -3.0, 1.0])
+    ones = np.ones(len(values) - ORDER)
+    bands = np.zeros((ORDER + 1, len(values)))
+    for k in range(ORDER + 1):  # upper bands
+        products = row[: len(row) - k] * row[k:]
+        bands[ORDER - k, k:] = weight * np.convolve(ones, products)
     bands[ORDER] += 1.0
     return solveh_banded(bands, values)

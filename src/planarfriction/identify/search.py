@@ -8,14 +8,16 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from planarfriction.errors import IdentificationInterrupted
+from planarfriction.identify.logs import Arrays, Linear
 from planarfriction.identify.parameters import ALL, Coordinates
 from planarfriction.identify.problem import LogProblem, Problem
-from planarfriction.identify.uncertainty import Fit, Uncertainty, covariance_of
+from planarfriction.identify.uncertainty import Fit, Uncertainty, covariance_of, finite
 from planarfriction.identify.verdicts import VAGUE
 from planarfriction.laws import LuGre
 
@@ -55,9 +57,7 @@ SCATTER = 0.7
 """Standard deviation of the logarithms of starts around a given one."""
 
 
-def multistart(
-    problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray
-) -> Fit:
+def multistart(problem: Problem, starts: Arrays, noise: np.ndarray) -> Fit:
     """Find the best rough fit from starts `[F]` or `[F + K]`, with the same noise for all samples of a channel."""
     coordinates = problem.coordinates(starts[0])
     sigma = problem.even_sigma(noise)
@@ -88,14 +88,14 @@ def refine(fit: Fit) -> Fit:
 
 
 def warm_start(
-    problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray
+    problem: LogProblem, lead: Fit, guesses: Arrays, noise: np.ndarray
 ) -> Fit:
     """Find the best rough fit of another model than that of `lead`, from where this ended and from the best guess.
 
     A lead that does not fit ends far away, and one that fits may stay where the corner of the bristles is not seen.
     """
     guess = min(guesses, key=lambda values: misfit(problem, values, noise))
-    return multistart(problem, [lead.values, guess], noise=noise)
+    return multistart(problem, [lead.values, guess], noise)
 
 
 @contextlib.contextmanager
@@ -116,6 +116,7 @@ class _SettledError(Exception):
     """The cost changes no more."""
 
 
+@dataclass(eq=False)
 class Descent:
     """Search from one start, and the best point that it has found.
 
@@ -123,36 +124,27 @@ class Descent:
     its steps vanish, if derivatives that are kept from nearby promise a gain that is not there.
     """
 
-    def __init__(
-        self,
-        residuals: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
-        x: np.ndarray,
-        share: float,
-    ):
-        self.residuals = residuals
-        self.x = x
-        self.share = share
-        self.cost = np.inf
-        self._last = (np.empty(0), np.empty(0))
+    residuals: Callable[[np.ndarray], Linear]
+    x: np.ndarray
+    share: float
+    cost: Any = np.inf
+    _last: Any = None
 
     def run(self, bounds: tuple[np.ndarray, np.ndarray]) -> None:
         """Minimise the sum of squares."""
         from scipy.optimize import least_squares
 
-        settings: Any = {
-            "jac": self._jacobian,
-            "x_scale": "jac",
-            "xtol": 1e-9,
-            "ftol": self.share,
-            "gtol": 1e-12,
-        }
         with contextlib.suppress(_SettledError):
             least_squares(
                 self._residual,
                 self.x,
+                jac=self._jacobian,  # pyright: ignore[reportArgumentType]
                 bounds=bounds,
+                x_scale="jac",
+                xtol=1e-9,
+                ftol=self.share,
+                gtol=1e-12,
                 max_nfev=MOST_EVALUATIONS,
-                **settings,
             )
 
     def _residual(self, x: np.ndarray) -> np.ndarray:
@@ -173,9 +165,9 @@ class Descent:
 def _best(
     problem: Problem,
     coordinates: Coordinates,
-    points: Sequence[np.ndarray],
+    points: Arrays,
     noise: np.ndarray,
-    sigma: list[np.ndarray],
+    sigma: Arrays,
     change: float,
 ) -> Fit:
     """Minimise the sum of squares from coordinates `[F + K]` until the cost changes by less than `change`.
@@ -188,7 +180,7 @@ def _best(
     share = max(change / (0.5 * problem.numbers), problem.least_change)
     found = []
 
-    def told(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def told(x: np.ndarray) -> Linear:
         problem.report(
             f"start {len(found)} of {len(points)}, evaluation {next(evaluations)}"
         )
@@ -204,7 +196,7 @@ def _best(
         np.abs(best.x - each) <= TOUCHING * np.maximum(1.0, np.abs(best.x))
         for each in bounds
     )
-    x = np.where(low, bounds[0], np.where(high, bounds[1], best.x))
+    x = np.select([low, high], bounds, best.x)
     return Fit(
         problem,
         coordinates,
@@ -218,25 +210,18 @@ def _best(
     )
 
 
-def condensed(
-    residual: np.ndarray, jacobian: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def condensed(residual: np.ndarray, jacobian: np.ndarray) -> Linear:
     """Reduce residuals `[M]` and derivatives `[M, F]` to `F + 1` rows with the same sums of squares and products.
 
     They are the triangle of `[J, r] = Q R`: all that least squares needs, at a fraction of the cost.
     """
     rows = np.column_stack([jacobian, residual])
-    count = len(rows) // IN_CACHE
     width = rows.shape[1]
-    blocks = np.asarray(
-        np.linalg.qr(rows[: count * IN_CACHE].reshape(count, IN_CACHE, width), mode="r")
-    )
-    triangle = np.asarray(
-        np.linalg.qr(
-            np.concatenate([blocks.reshape(-1, width), rows[count * IN_CACHE :]]),
-            mode="r",
-        )
-    )
+    last = len(rows) // IN_CACHE * IN_CACHE
+    blocks = rows[:last].reshape(-1, IN_CACHE, width)
+    blocks = np.asarray(np.linalg.qr(blocks, mode="r")).reshape(-1, width)
+    rows = np.concatenate([blocks, rows[last:]])
+    triangle = np.asarray(np.linalg.qr(rows, mode="r"))
     return triangle[:, -1], triangle[:, :-1]
 
 
@@ -250,70 +235,59 @@ def guess_starts(
     starts: int,
     seed: int,
     noise: np.ndarray,
-) -> list[np.ndarray]:
+) -> Arrays:
     """Return `starts` vectors of values `[F]`, the best first.
 
     A whole law as start (`given` is None) leads, scattered copies follow. Otherwise the best points of a grid over
     Stribeck speed and stiffness are taken, with the values `given` by name.
     """
+    ranked = [problem.start_values()]
+    if given is not None:
+        grid = _grid(problem, given)
+        ranked = sorted(grid, key=lambda values: misfit(problem, values, noise))
     random = np.random.default_rng(seed)
-    if given is None:
-        first = problem.start_values()
-        return [
-            first,
-            *(_scattered(first, problem.names, random) for _ in range(starts - 1)),
-        ]
-    ranked = sorted(
-        _grid(problem, given), key=lambda values: misfit(problem, values, noise)
-    )
-    return ranked[:starts] + [
-        _scattered(ranked[0], problem.names, random)
-        for _ in range(starts - len(ranked))
-    ]
+    more = range(starts - len(ranked))
+    scattered = [_scattered(ranked[0], problem.names, random) for _ in more]
+    return ranked[:starts] + scattered
 
 
-def _grid(problem: LogProblem, given: dict[str, float]) -> list[np.ndarray]:
+def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
     """Return the values at all points of the grid; a parameter that is not estimated or is given has one value."""
     base = problem.start_values()
+    law = problem.law
     speeds = [each[0] for each in problem.sliding(base)]
     mu_c, mu_s = _friction(problem, speeds)
     wanted = [name for name in problem.names if name not in given]
     interval = min(log.interval for log in problem.logs)
+    grid = itertools.product(
+        _speeds(np.concatenate(speeds)) if "v_s" in wanted else [law.v_s],
+        _stiffnesses(problem, speeds, mu_c) if "sigma_0" in wanted else [law.sigma_0],
+    )
     results = []
-    for v_s in (
-        _speeds(np.concatenate(speeds)) if "v_s" in wanted else [problem.law.v_s]
-    ):
-        for sigma_0 in (
-            _stiffnesses(problem, speeds, mu_c)
-            if "sigma_0" in wanted
-            else [problem.law.sigma_0]
-        ):
-            guess = {
-                "mu_c": mu_c,
-                "mu_s": mu_s,
-                "v_s": v_s,
-                "gamma": 1.5,
-                "sigma_0": sigma_0,
-            }
-            guess |= {
-                "sigma_1": 0.3 * sigma_0 * interval,
-                "sigma_2": 0.02 * mu_c / max(np.max(speeds[0]), 1e-9),
-            }
-            picked = {name: guess[name] for name in wanted if name in guess}
-            results.append(np.array([*(problem.by_name(base) | picked).values()]))
+    for v_s, sigma_0 in grid:
+        guess = {
+            "mu_c": mu_c,
+            "mu_s": mu_s,
+            "v_s": v_s,
+            "gamma": 1.5,
+            "sigma_0": sigma_0,
+            "sigma_1": 0.3 * sigma_0 * interval,
+            "sigma_2": 0.02 * mu_c / max(np.max(speeds[0]), 1e-9),
+        }
+        picked = {name: guess[name] for name in wanted if name in guess}
+        results.append(np.array([*(problem.by_name(base) | picked).values()]))
     return results
 
 
-def _friction(problem: LogProblem, speeds: list[np.ndarray]) -> tuple[float, float]:
+def _friction(problem: LogProblem, speeds: Arrays) -> tuple[float, float]:
     """Estimate the friction coefficients of fast sliding and of the largest friction."""
     coefficient = np.concatenate(problem.coefficients(problem.start_values()))
-    speed = np.concatenate(speeds)
     usable = np.isfinite(coefficient)
     coefficient = coefficient[usable]
-    speed = speed[usable]
+    speed = np.concatenate(speeds)[usable]
     fast = coefficient[speed >= np.quantile(speed, 0.7)]
-    mu_c = float(np.clip(np.median(fast), 0.01, 10.0))
-    return mu_c, float(np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c))
+    mu_c = np.clip(np.median(fast), 0.01, 10.0)
+    return mu_c, np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c)
 
 
 def _speeds(speeds: np.ndarray) -> np.ndarray:
@@ -325,9 +299,7 @@ def _speeds(speeds: np.ndarray) -> np.ndarray:
     return np.geomspace(max(low, 1e-3 * high), high, SPEEDS)
 
 
-def _stiffnesses(
-    problem: LogProblem, speeds: list[np.ndarray], mu_c: float
-) -> np.ndarray:
+def _stiffnesses(problem: LogProblem, speeds: Arrays, mu_c: float) -> np.ndarray:
     """Return stiffnesses to try [1/m]: full deflection after a tenth of a usual step up to a tenth of all travel."""
     steps = np.concatenate(
         [s * log.durations for s, log in zip(speeds, problem.logs, strict=True)]
@@ -342,16 +314,14 @@ def _stiffnesses(
 
 def misfit(problem: LogProblem, values: np.ndarray, noise: np.ndarray) -> float:
     """Compute the sum of the squared residuals of values `[F]` or `[F + K]` over the noise `[3]`."""
-    return float((problem.residual(values, problem.even_sigma(noise)) ** 2).sum())
+    return (problem.residual(values, problem.even_sigma(noise)) ** 2).sum()
 
 
 def _scattered(
     values: np.ndarray, names: Sequence[str], random: np.random.Generator
 ) -> np.ndarray:
     factor = np.exp(SCATTER * random.standard_normal(len(values)))
-    positive = np.array(
-        [ALL[name].logarithmic or name.startswith("sigma") for name in names]
-    )
+    positive = [ALL[name].logarithmic or name.startswith("sigma") for name in names]
     return np.where(positive, values * factor, values)
 
 
@@ -387,7 +357,7 @@ def stretches(fit: Fit, u: Uncertainty) -> np.ndarray:
         error = np.sqrt(spread[i, i])
         if SURE * abs(value) < error < VAGUE * abs(value) and not fit.at_bound[i]:
             fit.problem.report(f"interval of {fit.problem.names[i]}")
-            way = np.where(np.isfinite(spread[i]), spread[i], 0.0) / error
+            way = finite(spread[i]) / error
             result[i] = max(_stretch(fit, i, way, sign) for sign in (-REACH, REACH))
     fit.problem.forget()
     return result
@@ -400,32 +370,24 @@ def _stretch(fit: Fit, i: int, way: np.ndarray, sign: float) -> float:
     residuals = problem.residuals(coordinates, fit.sigma)
     share = way[i] / fit.values[i]
     own = ALL[problem.names[i]]
-    factor: float = 1.0
+    factor: Any = 1.0
     wanted = 0.5 * REACH**2
     for _ in range(TRIES):
-        by = (
-            np.exp(sign * factor * share)
-            if own.logarithmic
-            else 1.0 + sign * factor * share
-        )
-        target = fit.values[i] * by
+        by = sign * factor * share
+        target = fit.values[i] * (np.exp(by) if own.logarithmic else 1.0 + by)
         if not own.low < target < own.high:
             break
 
-        def held(x: np.ndarray, at: float = target) -> tuple[np.ndarray, np.ndarray]:
+        def held(x: np.ndarray, at: float = target) -> Linear:
             rows, slopes = residuals(x)
             off = coordinates.values(x)[i] / at - 1.0
             slope = coordinates.slopes(x)[i] / at
-            return np.append(rows, STIFF * off), np.concatenate(
-                [slopes, STIFF * slope[None]]
-            )
+            return np.append(rows, STIFF * off), np.vstack([slopes, STIFF * slope])
 
-        start = fit.values + way * (target - fit.values[i]) / way[i]
-        search: Descent = Descent(
-            held, coordinates.of(start), SETTLED / max(fit.cost, 1.0)
-        )
+        start = coordinates.of(fit.values + way * (target - fit.values[i]) / way[i])
+        search = Descent(held, start, SETTLED / max(fit.cost, 1.0))
         search.run(coordinates.bounds())
-        rise: float = search.cost - fit.cost
+        rise = search.cost - fit.cost
         factor *= min(max(np.sqrt(wanted / max(rise, 1e-9)), 1.0), 2.0)
         if rise > NEAR * wanted:
             break

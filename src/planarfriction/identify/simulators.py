@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction._engine.compiler import threads
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
-from planarfriction.identify.decimation import DecimatedLog
-from planarfriction.identify.logs import EVEN, Log
+from planarfriction.identify.logs import EVEN, Linear, Log
 from planarfriction.identify.parameters import RADIUS, SHAPE
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
@@ -70,9 +69,7 @@ class PublishedSimulator:
         """Compute the wrenches `[N, 3]`."""
         return rollout(self._model, None, twists, loads, dt, parameters=vector).wrenches
 
-    def sensitivities(
-        self, twists, loads, dt, vector, names: Sequence[str]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def sensitivities(self, twists, loads, dt, vector, names: Sequence[str]) -> Linear:
         """Compute the wrenches `[N, 3]` and their derivatives `[N, 3, P]`."""
         found = rollout_jacobian(
             self._model, None, twists, loads, dt, names, parameters=vector
@@ -95,14 +92,11 @@ class DistributedSimulator(PublishedSimulator):
     own_radius = False
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
-        self._radius = float(patch.contact_radius())
+        self._radius = patch.contact_radius()
         self._centre = patch.centre_of_pressure()
-        few = (
-            patch.discs(DISCS)
-            if self.model_class is DistributedModel and patch.cells > CELLS
-            else patch
-        )
-        self._model = self.model(few, law, surface)
+        if self.model_class is DistributedModel and patch.cells > CELLS:
+            patch = patch.discs(DISCS)
+        self._model = self.model(patch, law, surface)
 
     @classmethod
     def model(cls, patch, law, surface):
@@ -119,9 +113,7 @@ class DistributedSimulator(PublishedSimulator):
         s = vector[RADIUS] / self._radius
         dx, dy = vector[CENTRE] - s * self._centre
         vx, vy, omega = twists.T
-        inner = np.ascontiguousarray(
-            np.stack([vx - omega * dy, vy + omega * dx, s * omega], -1)
-        )
+        inner = np.stack([vx - omega * dy, vy + omega * dx, s * omega], -1)
         fx, fy, tau = np.moveaxis(work(inner), 1, 0)
         return np.stack([fx, fy, s * tau + dx * fy - dy * fx], 1)
 
@@ -173,90 +165,57 @@ SIMULATORS: dict[str, type[PublishedSimulator]] = {
 """Simulators by the names of their models, the quickest first: a new model needs one class and one line."""
 
 
-class Prediction:
-    """Simulated wrenches of one log, by a model whose vector of parameters varies.
+class _Steps(NamedTuple):
+    """Half steps through consecutive samples of a log, and the samples among them.
 
     Between two samples the twist follows cubics that do not overshoot (Akima 1970) and the load is linear; both are
     held over half steps: node j holds from half a step before it to half a step after it. The displacement of a bristle
     is then that of the trapezoidal rule, and the wrench belongs to the twist of its sample; the error is of second
-    order in `interval/refine`. In a log whose twists are `held` each holds since the sample before. Wrenches that come
-    later than the motion by a `delay` [s] are read between the nodes, by cubic polynomials with continuous slopes.
+    order in `interval/refine`. In a log whose twists are `held` each holds since the sample before.
     """
 
-    def __init__(
-        self,
-        simulator: Any,
-        log: Log,
-        twist: np.ndarray,
-        *,
-        begins: str = "rest",
-        refine: int = 1,
-    ):
+    log: Log
+    twists: np.ndarray
+    """Twists of the half steps [m/s, m/s, rad/s], `[N, 3]`."""
+    loads: np.ndarray
+    """Loads of the half steps [N], `[N]`."""
+    half: float
+    """Half of a step [s]."""
+    steps: int
+    """Number of steps."""
+    first: int
+    """Number of half steps before the first node."""
+
+    @classmethod
+    def of(cls, log: Log, twist: np.ndarray, begins: str, refine: int) -> _Steps:
+        """Make the steps through a log whose twist is `twist`."""
         from scipy.interpolate import Akima1DInterpolator
 
-        self.simulator = simulator
-        self.log = log
         length = log.time[-1] - log.time[0]
-        steps = (
-            len(log.time) - 1
-            if log.even
-            else int(np.ceil(length / np.diff(log.time).min()))
-        )
-        self.steps = min(steps * refine, MOST_STEPS)
-        self._half = 0.5 * length / self.steps
-        grid = np.linspace(log.time[0], log.time[-1], self.steps + 1)
+        steps = len(log.time) - 1
+        if not log.even:
+            steps = int(np.ceil(length / np.diff(log.time).min()))
+        steps = min(steps * refine, MOST_STEPS)
+        grid = np.linspace(log.time[0], log.time[-1], steps + 1)
         if log.held:
             twists = twist[np.searchsorted(log.time, grid - EVEN * log.interval)]
         else:
             twists = Akima1DInterpolator(log.time, twist)(grid)
         loads = np.interp(grid, log.time, log.normal_force)
         # 0, 0, 1, 1, 2, 2, ..., steps, steps.
-        order = np.repeat(np.arange(self.steps + 1), 2)
+        order = np.repeat(np.arange(steps + 1), 2)
         order = order[2:] if log.held else order[1:-1]
-        self._first = STEADY_STEPS - 1 if begins == "steady" else 0
-        order = np.pad(order, (self._first + 1, 0))
-        self._inputs: tuple[np.ndarray, np.ndarray, Any] = (
-            twists[order],
-            loads[order],
-            self._half,
-        )
-        self._between: Any = 0.0
+        first = STEADY_STEPS - 1 if begins == "steady" else 0
+        order = np.pad(order, (first + 1, 0))
+        return cls(log, twists[order], loads[order], 0.5 * length / steps, steps, first)
 
-    def wrenches(self, vector: np.ndarray, delay: float = 0.0) -> np.ndarray:
-        """Compute the wrenches `[T, 3]` at the samples."""
-        return self._read(
-            self._nodes(self.simulator.wrenches(*self._inputs, vector)), delay
-        )[0]
+    def read(self, values: np.ndarray, delay: float) -> Linear:
+        """Interpolate values at the ends of the half steps at the samples, later by `delay` [s].
 
-    def moved(
-        self, vector: np.ndarray, change: np.ndarray, noise: np.ndarray
-    ) -> np.ndarray:
-        """Compute the wrenches `[T, 3]` at the samples with `change` `[3]` added to all twists.
-
-        Between the windows of a decimated log it is what means leave of the `noise` `[3]` of single samples.
+        Returns them and their derivatives over time.
         """
-        twists, loads, half = self._inputs
-        between = np.multiply.outer(self._between, noise)
-        changed = twists + np.where(between > 0.0, between, change)
-        return self._read(
-            self._nodes(self.simulator.wrenches(changed, loads, half, vector)), 0.0
-        )[0]
-
-    def sensitivities(
-        self, vector: np.ndarray, names: Sequence[str], delay: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Compute wrenches `[T, 3]` at the samples, derivatives by `names` `[T, 3, P]` and by the delay `[T, 3]`."""
-        values, slopes = self.simulator.sensitivities(*self._inputs, vector, names)
-        wrenches, per_second = self._read(self._nodes(values), delay)
-        return wrenches, self._read(self._nodes(slopes), delay)[0], -per_second
-
-    def _nodes(self, values: np.ndarray) -> Any:
-        """Return the values at the nodes among those at the ends of all steps."""
-        return values[self._first :: 2]
-
-    def _read(self, nodes: Any, delay: float) -> tuple[np.ndarray, np.ndarray]:
-        """Interpolate values at the samples, later by `delay` [s]; returns them and their derivatives over time."""
-        step = 2.0 * self._half
+        step = 2.0 * self.half
+        nodes = values[self.first :: 2]
         wanted = (self.log.time - self.log.time[0] - delay) / step
         place = np.clip(wanted, 0.0, self.steps)
         node = np.minimum(place.astype(int), self.steps - 1)
@@ -272,61 +231,72 @@ class Prediction:
         return b + t * (one + t * (two + t * three)), slopes
 
 
-class PartsPrediction(Prediction):
-    """Simulated wrenches of a decimated log: of its parts, with the motion between them in longer steps."""
+class Prediction:
+    """Simulated wrenches of one log, by a model whose vector of parameters varies.
+
+    A decimated log has several parts, with the motion between them in longer steps. Wrenches that come later than the
+    motion by a `delay` [s] are read between the nodes, by cubic polynomials with continuous slopes.
+    """
 
     def __init__(
         self,
         simulator: Any,
-        log: DecimatedLog,
+        log: Log,
         twist: np.ndarray,
         *,
-        begins="rest",
+        begins: str = "rest",
         refine: int = 1,
     ):
         self.simulator = simulator
-        self.log = log
         ends = np.cumsum([len(part.time) for part in log.parts])
-        self._parts = [
-            Prediction(
-                simulator,
-                part,
-                own,
-                begins=begins if number == 0 else "rest",
-                refine=refine,
-            )
-            for number, (part, own) in enumerate(
-                zip(log.parts, np.split(twist, ends[:-1]), strict=True)
-            )
-        ]
-        self.steps = sum(part.steps for part in self._parts)
+        twists = np.split(twist, ends[:-1])
+        gaps = (None, *getattr(log, "gaps", ()))
+        self._parts: list[tuple[_Steps, slice]] = []
         pieces = []
-        self._spans = []
         at = 0
-        for gap, part in zip((None, *log.gaps), self._parts, strict=True):
-            twists, loads, half = part._inputs
+        for part, own, gap in zip(log.parts, twists, gaps, strict=True):
+            steps = _Steps.of(part, own, begins, refine)
+            begins = "rest"
             if gap is not None:
-                pieces.append(gap.until(half, twists[0]))
+                pieces.append(gap.until(steps.half, steps.twists[0]))
                 at += len(gap.dt)
-            pieces.append(
-                (twists, loads, np.full(len(loads), half), np.zeros(len(loads)))
-            )
-            self._spans.append(slice(at, at + len(loads)))
-            at += len(loads)
-        twists, loads, dt, self._between = (
-            np.concatenate(each) for each in zip(*pieces, strict=True)
-        )
-        self._inputs = twists, loads, dt
+            size = len(steps.loads)
+            dt = np.full(size, steps.half)
+            pieces.append((steps.twists, steps.loads, dt, np.zeros(size)))
+            self._parts.append((steps, slice(at, at + size)))
+            at += size
+        self.steps = sum(steps.steps for steps, _ in self._parts)
+        *inputs, self._between = map(np.concatenate, zip(*pieces, strict=True))
+        self._inputs: Any = inputs
 
-    def _nodes(self, values):
-        return [
-            part._nodes(values[span])
-            for part, span in zip(self._parts, self._spans, strict=True)
-        ]
+    def wrenches(
+        self, vector: np.ndarray, delay: float = 0.0, change: Any = 0.0
+    ) -> np.ndarray:
+        """Compute the wrenches `[T, 3]` at the samples, with `change` added to the twists of all steps."""
+        twists, loads, half = self._inputs
+        wrenches = self.simulator.wrenches(twists + change, loads, half, vector)
+        return self._read(wrenches, delay)[0]
 
-    def _read(self, nodes, delay):
-        found = [
-            part._read(own, delay) for part, own in zip(self._parts, nodes, strict=True)
-        ]
-        read, slopes = zip(*found, strict=True)
-        return np.concatenate(read), np.concatenate(slopes)
+    def moved(
+        self, vector: np.ndarray, change: np.ndarray, noise: np.ndarray
+    ) -> np.ndarray:
+        """Compute the wrenches `[T, 3]` at the samples with `change` `[3]` added to all twists.
+
+        Between the windows of a decimated log it is what means leave of the `noise` `[3]` of single samples.
+        """
+        between = np.multiply.outer(self._between, noise)
+        return self.wrenches(vector, change=np.where(between > 0.0, between, change))
+
+    def sensitivities(
+        self, vector: np.ndarray, names: Sequence[str], delay: float = 0.0
+    ) -> tuple[np.ndarray, ...]:
+        """Compute wrenches `[T, 3]` at the samples, derivatives by `names` `[T, 3, P]` and by the delay `[T, 3]`."""
+        values, slopes = self.simulator.sensitivities(*self._inputs, vector, names)
+        wrenches, per_second = self._read(values, delay)
+        return wrenches, self._read(slopes, delay)[0], -per_second
+
+    def _read(self, values: np.ndarray, delay: float) -> Linear:
+        """Interpolate values at the ends of all steps at the samples, as `_Steps.read` does."""
+        found = [steps.read(values[span], delay) for steps, span in self._parts]
+        read, slopes = map(np.concatenate, zip(*found, strict=True))
+        return read, slopes

@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Checked, checked
 from planarfriction.derivatives.scene_inputs import STATES
-from planarfriction.identify.logs import increasing, unwrapped
+from planarfriction.identify.logs import Linear, increasing, unwrapped
 from planarfriction.identify.options import check_noise
-from planarfriction.identify.verdicts import Verdict
+from planarfriction.identify.verdicts import Verdict, caution, few_of
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide
 
@@ -110,57 +111,52 @@ class MassProperties(Checked):
 def parabola(time: np.ndarray, pose: np.ndarray, samples: int = 8) -> np.ndarray:
     """Estimate the velocity `[3]` at the first sample: the slope of a parabola through the first poses."""
     count = min(samples, len(time))
-    return np.polynomial.polynomial.polyfit(time[:count] - time[0], pose[:count], 2)[1]
+    return polynomial.polyfit(time[:count] - time[0], pose[:count], 2)[1]
 
 
 def slide_poses(
-    model: Any, body: MassProperties, time: np.ndarray, pose: Any, twist: Any
+    model: Any, body: MassProperties, time: np.ndarray, start: np.ndarray
 ) -> np.ndarray:
-    """Simulate poses x, y, theta `[T, 3]` at `time` `[T]` of a body on `model`, from a start pose and twist `[3]` each.
+    """Simulate poses x, y, theta `[T, 3]` at `time` `[T]` of a body on `model`, from a start (pose, then twist, `[6]`).
 
     A body that stopped stays where it is.
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    length = float(time[-1] - time[0])
-    every = max(length / max(len(time) - 1, 1), 1e-3)
-    start = {"position": tuple(pose[:2]), "angle": float(pose[2]), "twist": twist}
-    load = body.mass * body.gravity
+    length = time[-1] - time[0]
     scene = free_slide(
         model,
         mass=body.mass,
         inertia=body.inertia,
-        normal_force=load,
+        normal_force=body.mass * body.gravity,
         t_end=length,
-        **start,
+        position=tuple(start[:2]),
+        angle=start[2],
+        twist=start[3:].tolist(),
     )
+    every = max(length / max(len(time) - 1, 1), 1e-3)
     data = simulate(scene, save_every=every, **TOLERANCES).histories
     saved = data["time"].values
-    poses, twists = (
-        np.stack([data[name].values for name in names], -1)
-        for names in (STATES[3:], STATES[:3])
-    )
-    return CubicHermiteSpline(saved, poses, twists)(
-        np.minimum(time - time[0], saved[-1])
-    )
+    motion = np.stack([data[name].values for name in STATES], -1)
+    spline = CubicHermiteSpline(saved, motion[:, 3:], motion[:, :3])
+    return spline(np.minimum(time - time[0], saved[-1]))
 
 
 def start_slopes(
     model: Any, body: MassProperties, slide: Slide, start: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Linear:
     """Simulate poses `[T, 3]` from a start (pose, then twist, `[6]`), with derivatives `[T, 3, 6]` by differences.
 
     The start pose shifts the motion as a whole; the start angle of a contact that is not round changes more than that,
     which is left out.
     """
-    poses = slide_poses(model, body, slide.time, start[:3], start[3:])
+    poses = slide_poses(model, body, slide.time, start)
     slopes = np.zeros((*poses.shape, 6))
     slopes[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    for i, change in enumerate(CHANGES):
-        changed = slide_poses(
-            model, body, slide.time, start[:3], start[3:] + change * np.eye(3)[i]
-        )
-        slopes[:, :, 3 + i] = (changed - poses) / change
+    for i, change in enumerate(CHANGES, start=3):
+        moved = start + change * np.eye(6)[i]
+        changed = slide_poses(model, body, slide.time, moved)
+        slopes[:, :, i] = (changed - poses) / change
     return poses, slopes
 
 
@@ -180,9 +176,8 @@ def fit_start(
     """
     _check(body, slide)
     part = slide if samples is None else slide.first(samples)
-    return improve_start(
-        model, body, part, start_of(slide), check_noise("noise", noise), 3
-    )
+    weights = check_noise("noise", noise)
+    return improve_start(model, body, part, start_of(slide), weights, 3)
 
 
 def _check(body: Any, slide: Any) -> None:
@@ -207,12 +202,8 @@ def improve_start(
     for _ in range(turns):
         poses, slopes = start_slopes(model, body, slide, start)
         residual = ((slide.pose - poses) / noise).ravel()
-        start = (
-            start
-            + np.linalg.lstsq(
-                (slopes / noise[:, None]).reshape(-1, 6), residual, rcond=None
-            )[0]
-        )
+        rows = (slopes / noise[:, None]).reshape(-1, 6)
+        start = start + np.linalg.lstsq(rows, residual, rcond=None)[0]
     return start
 
 
@@ -226,10 +217,10 @@ def predict_slide(
     Raises InvalidValueError for what is not a body or a slide, SolverError where the simulation fails.
     """
     _check(body, slide)
-    if samples is None:
-        return slide_poses(model, body, slide.time, slide.pose[0], slide.twist)
-    start = fit_start(model, body, slide, samples=samples)
-    return slide_poses(model, body, slide.time, start[:3], start[3:])
+    start = start_of(slide)
+    if samples is not None:
+        start = fit_start(model, body, slide, samples=samples)
+    return slide_poses(model, body, slide.time, start)
 
 
 # ---------------------------------------------------------------------- slides that friction cannot explain
@@ -241,10 +232,10 @@ def speeds(slide: Slide, body: MassProperties) -> tuple[np.ndarray, np.ndarray, 
     times, twists, left = window_twists(slide)
     length = np.median(np.diff(slide.time)) * WINDOW
     sigma = np.std(left * scale) * np.sqrt(12.0 / WINDOW) / length
-    return times, np.linalg.norm(twists * scale, axis=1), float(sigma)
+    return times, np.linalg.norm(twists * scale, axis=1), sigma
 
 
-def window_twists(slide: Slide) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def window_twists(slide: Slide) -> tuple[np.ndarray, ...]:
     """Compute middle times `[W]` of windows, twists `[W, 3]` in them (world axes), and residuals of all poses `[T, 3]`.
 
     The twist of a window is the slope of a parabola through its poses.
@@ -252,15 +243,13 @@ def window_twists(slide: Slide) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     times = []
     twists = []
     left = []
-    for rows in np.array_split(
-        np.arange(len(slide.time)), max(len(slide.time) // WINDOW, 1)
-    ):
-        since = slide.time[rows] - slide.time[rows].mean()
-        fit = np.polynomial.polynomial.polyfit(
-            since, slide.pose[rows], 2 if len(rows) > 4 else 1
-        )
-        left.append(slide.pose[rows] - np.polynomial.polynomial.polyval(since, fit).T)
-        times.append(slide.time[rows].mean())
+    count = len(slide.time)
+    for rows in np.array_split(np.arange(count), max(count // WINDOW, 1)):
+        middle = slide.time[rows].mean()
+        since = slide.time[rows] - middle
+        fit = polynomial.polyfit(since, slide.pose[rows], 2 if len(rows) > 4 else 1)
+        left.append(slide.pose[rows] - polynomial.polyval(since, fit).T)
+        times.append(middle)
         twists.append(fit[1])
     return np.array(times), np.array(twists), np.concatenate(left)
 
@@ -272,21 +261,20 @@ def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, s
     """
     seen = [speeds(slide, body) for slide in slides]
     brakes = [brake for time, speed, _ in seen if (brake := _brake(time, speed)) > 0.0]
-    usual = float(np.median(brakes)) if brakes else 0.0
+    usual = np.median(brakes) if brakes else 0.0
     found = {}
     for i, (time, speed, noise) in enumerate(seen):
         grown = speed - np.minimum.accumulate(speed)
         last = int(grown.argmax())
-        first = int(speed[: last + 1].argmin())
-        free = _free(time, speed, FREE * usual)
         if grown[last] > max(GROWS * speed.max(), NOISE * noise):
+            first = speed[: last + 1].min()
             found[i] = (
-                f"its speed grows from {speed[first]:.2g} to {speed[last]:.2g} m/s: it was pushed"
+                f"its speed grows from {first:.2g} to {speed[last]:.2g} m/s: it was pushed"
             )
-        elif len(slides) > 2 and free > max(
-            LONG * (time[-1] - time[0]),
-            1.5 * (time[1] - time[0] if len(time) > 1 else 0),
-        ):
+            continue
+        free = _free(time, speed, FREE * usual)
+        most = max(LONG * np.ptp(time), 1.5 * np.diff(time[:2]).sum())
+        if len(slides) > 2 and free > most:
             found[i] = (
                 f"its speed hardly falls for {1e3 * free:.0f} ms: it lost contact, or was pushed"
             )
@@ -297,29 +285,26 @@ def _brake(time: np.ndarray, speed: np.ndarray) -> float:
     """Compute the mean deceleration until the speed is a tenth of the first [m/s^2]."""
     slow = np.flatnonzero(speed < 0.1 * speed[0])
     last = slow[0] if len(slow) else len(speed) - 1
-    return float((speed[0] - speed[last]) / (time[last] - time[0])) if last > 0 else 0.0
+    return (speed[0] - speed[last]) / (time[last] - time[0]) if last > 0 else 0.0
 
 
 def _free(time: np.ndarray, speed: np.ndarray, least: float) -> float:
     """Compute the longest time over which a moving body decelerates by less than `least` [m/s^2]."""
-    brakes = -np.diff(speed) / np.diff(time) if len(time) > 1 else np.zeros(0)
     longest = since = 0.0
-    for brake, before, after, step in zip(
-        brakes, speed[:-1], speed[1:], np.diff(time), strict=True
-    ):
+    for k, step in enumerate(np.diff(time)):
+        before, after = speed[k : k + 2]
         moves = min(before, after) > 0.25 * speed.max()
-        since = since + step if moves and brake < least else 0.0
+        free = moves and before - after < least * step
+        since = since + step if free else 0.0
         longest = max(longest, since)
     return longest
 
 
 def weights(errors: np.ndarray) -> np.ndarray:
     """Compute the weights `[S]` of slides from their root mean square residuals: 1 near the median, 0 beyond `FAR`."""
-    middle = float(np.median(errors))
+    middle = np.median(errors)
     ratio = errors / middle if middle > 0.0 else np.ones(len(errors))
-    return np.where(
-        ratio > FAR, 0.0, np.minimum(1.0, MODEST / np.maximum(ratio, 1e-300)) ** 2
-    )
+    return np.where(ratio > FAR, 0.0, (MODEST / np.maximum(ratio, MODEST)) ** 2)
 
 
 def verdicts_on_weights(
@@ -327,16 +312,14 @@ def verdicts_on_weights(
 ) -> list[Verdict]:
     """Return verdicts on slides whose weight `[S]` is 0 or below 1; `errors` are residuals over the median slide's."""
     found = []
-    for i in np.flatnonzero(weighed == 0.0).tolist():
-        why = f"its residuals are {errors[i]:.2g} times those of the median slide"
-        found.append(Verdict("fit", True, f"{slides[i].name} is left out: {why}"))
-    less = [
-        slides[i].name
-        for i in np.flatnonzero((weighed > 0.0) & (weighed < 1.0)).tolist()
-    ]
+    for slide, weight, error in zip(slides, weighed, errors, strict=True):
+        if weight == 0.0:
+            why = f"its residuals are {error:.2g} times those of the median slide"
+            found.append(caution(f"{slide.name} is left out: {why}"))
+    both = zip(slides, weighed, strict=True)
+    less = [slide.name for slide, weight in both if 0.0 < weight < 1.0]
     if less:
-        names = f"{', '.join(less[:5])}{' ...' if len(less) > 5 else ''}"
-        found.append(Verdict("fit", True, f"{names} have less weight: large residuals"))
+        found.append(caution(f"{few_of(less, 5)} have less weight: large residuals"))
     return found
 
 
@@ -348,14 +331,9 @@ def verdicts_on_influence(
     `moved` `[S, F]` is the change of the estimates `names` without each slide, `errors` `[F]` their standard errors.
     """
     known = np.isfinite(errors) & (errors > 0.0)
-    share = np.divide(
-        np.abs(moved),
-        errors,
-        out=np.zeros_like(moved),
-        where=known & np.ones_like(moved, dtype=bool),
-    )
+    share = np.abs(moved) / np.where(known, errors, np.inf)
     if len(slides) <= 2 or share.max() <= STRONG:
         return []
-    i, j = (int(place) for place in np.unravel_index(int(share.argmax()), share.shape))
+    i, j = np.argwhere(share == share.max())[0]
     change = f"{names[j]} would change by {moved[i, j]:+.2g} ({share[i, j]:.1f} standard errors)"
-    return [Verdict("fit", True, f"without {slides[i].name}, {change}")]
+    return [caution(f"without {slides[i].name}, {change}")]

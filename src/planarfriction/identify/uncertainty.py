@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction.identify.logs import Arrays
 from planarfriction.identify.parameters import ALL, LAW, PRIOR, Coordinates, fitted_law
+from planarfriction.identify.rig import TINY
 
 EXCESS = 1.25
 """Largest reduced chi-square that is still put down to the estimate of the noise."""
@@ -68,7 +70,7 @@ class Fit(NamedTuple):
     """Mask of the coordinates that lie on a bound, `[F + K]`."""
     noise: np.ndarray
     """Noise of each channel, `[3]`, or of the channels of each slide, `[S, 3]`."""
-    sigma: list[np.ndarray]
+    sigma: Arrays
     """Standard deviation of each residual, `[T, 3]` of each log or slide."""
     starts: tuple[int, int]
     """Number of starting points that led to this minimum, and number of all."""
@@ -137,15 +139,10 @@ def uncertainty(fit: Fit) -> Uncertainty:
     measured = sum(int(log.channels.sum()) * len(log.time[rows]) for log, rows in used)
     inverse = covariance_of(fit, np.concatenate([jacobian, pull]), free)
     plain = inverse * max(reduced_chi2, 1.0)
-    bread = np.where(np.isfinite(inverse), inverse, 0.0)
-    factor = np.sqrt(
-        np.maximum(
-            _over_time(fit, residual, jacobian, pull, neighbours, bread)
-            / np.diag(plain),
-            1.0,
-        )
-    )
-    factor = np.where(np.isfinite(factor), factor, 1.0)
+    bread = finite(inverse)
+    correlated = _over_time(fit, residual, jacobian, pull, neighbours, bread)
+    # no variance over an infinite one: a factor of 1
+    factor = np.sqrt(np.maximum(correlated / np.diag(plain), 1.0))
     moved = problem.twist_residuals(fit.values, fit.sigma, DRAWS)
     shifts = np.zeros((1, len(bread))) if moved is None else moved @ jacobian @ bread
     whole = plain * np.outer(factor, factor) + shifts.T @ shifts / len(shifts)
@@ -161,38 +158,30 @@ def uncertainty(fit: Fit) -> Uncertainty:
     )
 
 
-def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, ...]:
     """Compute the covariance `[F, F]` of a fit of slides from the spread over them.
 
     Each slide votes as one observation: `H^-1 (sum g g') H^-1 n/(n - 1)` with its vote `g = J' r`. Also returns the
     change `[S, F]` of the values without each slide, and the derivatives `[M, F]` of the scaled residuals.
     """
     residual, jacobian = fit.problem.linearised(fit.values, fit.sigma)
-    votes = np.array(
-        [
-            rows.sum(axis=(0, 1))
-            for rows in fit.problem.by_log(jacobian * residual[:, None])
-        ]
-    )
+    rows = fit.problem.by_log(jacobian * residual[:, None])
+    votes = np.array([each.sum(axis=(0, 1)) for each in rows])
     bread = covariance_of(fit, jacobian, ~fit.at_bound)
     if not np.isfinite(bread).all():
         return bread, np.zeros_like(votes), jacobian
-    counted = sum(bool(np.isfinite(each).all()) for each in fit.sigma)
-    covariance = (
-        bread
-        if counted < 2
-        else bread @ (votes.T @ votes) @ bread * len(votes) / (len(votes) - 1)
-    )
-    return covariance, votes @ bread, jacobian
+    moved = votes @ bread
+    if sum(bool(np.isfinite(each).all()) for each in fit.sigma) < 2:
+        return bread, moved, jacobian
+    return moved.T @ moved * len(votes) / (len(votes) - 1), moved, jacobian
 
 
 def _pull(fit: Fit) -> np.ndarray:
     """Compute the derivatives `[F + K, F + K]` of the pull of contact and rig to their starts."""
     problem = fit.problem
     count = len(problem.names)
-    result = np.linalg.solve(
-        fit.coordinates.slopes(fit.x).T, fit.coordinates.prior(fit.x)[1]
-    ).T
+    coordinates = fit.coordinates
+    result = np.linalg.solve(coordinates.slopes(fit.x).T, coordinates.prior(fit.x)[1]).T
     result[count:, count:] = np.diag(1.0 / problem.rig.with_drift(fit.values[count:]))
     return result
 
@@ -202,30 +191,22 @@ def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
     slopes = fit.coordinates.slopes(fit.x)
     inner = np.minimum(covariance(rows @ slopes, free), HUGE)
     result = slopes @ inner @ slopes.T
-    diagonal = np.diag(result)
-    result[np.diag_indices(len(result))] = np.where(
-        diagonal >= 1e-50 * HUGE, np.inf, diagonal
-    )
-    return result
+    unknown = np.diag(np.diag(result) >= 1e-50 * HUGE)
+    return np.where(unknown, np.inf, result)
 
 
 def _left(fit: Fit, residual: np.ndarray) -> tuple[float, float]:
     """Compute the mean square of the scaled residuals, and their correlation one sample apart."""
-    sums = np.zeros(4)
-    for rows, log in zip(
-        fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True
-    ):
-        each = rows[:, log.channels, 0]
-        now = each[1:]
-        before = each[:-1]
-        sums += (
-            each.size,
-            (each**2).sum(),
-            (now * before).sum(),
-            0.5 * (now**2 + before**2).sum(),
-        )
-    samples, squares, products, pairs = sums.tolist()
-    return squares / max(samples, 1), products / pairs if pairs > 0.0 else 0.0
+    both = zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True)
+    rows = [each[:, log.channels, 0] for each, log in both]
+    every = np.concatenate([each.ravel() for each in rows])
+    now = np.concatenate([each[1:].ravel() for each in rows])
+    before = np.concatenate([each[:-1].ravel() for each in rows])
+    pairs = 0.5 * (now @ now + before @ before)
+    return (
+        float(every @ every / max(len(every), 1)),
+        float(now @ before / pairs) if pairs > 0.0 else 0.0,
+    )
 
 
 def _over_time(
@@ -257,24 +238,20 @@ def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarra
     Noise leaves residuals `r` of covariance `I - H` in a fold of M, and `e = (I - H)^-1 r` if it is held out, so that
     `r' e/M` is 1 in the mean: also if little but this fold shows a parameter, and `e` is large.
     """
-    fold = []
-    seen = []
-    for rows, log in zip(
-        fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True
-    ):
+    folds = []
+    channels = []
+    both = zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True)
+    for rows, log in both:
         place = np.arange(len(rows)) * BLOCKS // len(rows) % FOLDS
-        fold.append(np.repeat(place, 3))
-        seen.append(np.tile(log.channels, len(rows)))
-    fold = np.concatenate(fold)
-    seen = np.concatenate(seen)
-    size = np.maximum(
-        np.linalg.norm(np.concatenate([jacobian, pull]), axis=0), np.finfo(float).tiny
-    )
-    slopes = jacobian / size
-    base = pull / size
-    whole = slopes.T @ slopes + base.T @ base + RIDGE * np.eye(len(fit.values))
+        folds.append(np.repeat(place, 3))
+        channels.append(np.tile(log.channels, len(rows)))
+    fold = np.concatenate(folds)
+    seen = np.concatenate(channels)
+    rows, size = _of_unit_columns(np.concatenate([jacobian, pull]))
+    slopes = rows[: len(jacobian)]
+    whole = rows.T @ rows + RIDGE * np.eye(len(size))
     result = []
-    unseen = np.empty_like(residual)
+    unseen = np.zeros_like(residual)
     for k in range(FOLDS):
         out = fold == k
         kept = whole - slopes[out].T @ slopes[out]
@@ -284,7 +261,18 @@ def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarra
     return np.array(result), unseen
 
 
+def _of_unit_columns(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Divide the columns of rows `[M, F]` by their lengths; returns them and the lengths `[F]`."""
+    size = np.maximum(np.linalg.norm(rows, axis=0), TINY)
+    return rows / size, size
+
+
 # ---------------------------------------------------------------------- covariance of least squares
+
+
+def finite(matrix: np.ndarray) -> np.ndarray:
+    """Return the matrix with zeros in place of infinite numbers."""
+    return np.where(np.isfinite(matrix), matrix, 0.0)
 
 
 def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
@@ -294,19 +282,14 @@ def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
     no part in the others. One that moves no residual has an infinite variance; a combination that moves none
     has a huge one, so that all in it show it.
     """
-    count = jacobian.shape[1]
     jacobian = np.asarray(np.linalg.qr(jacobian, mode="r"))
     size = np.linalg.norm(jacobian, axis=0)
-    size = np.where(size**2 * HUGE > 1.0, size, 0.0)
-    seen = free & (size > 0.0)
-    result = np.zeros((count, count))
-    result[np.diag_indices(count)] = np.where(
-        size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0) ** 2, np.inf
-    )
+    moves = size**2 * HUGE > 1.0
+    seen = free & moves
+    result = np.diag(np.where(moves, 1.0 / np.where(moves, size, 1.0) ** 2, np.inf))
     if seen.any():
-        _, strengths, axes = np.linalg.svd(
-            jacobian[:, seen] / size[seen], full_matrices=False
-        )
+        unit = jacobian[:, seen] / size[seen]
+        _, strengths, axes = np.linalg.svd(unit, full_matrices=False)
         strengths = np.maximum(strengths, 1e-12 * strengths[0])
         inner = (axes.T / strengths**2) @ axes
         result[np.ix_(seen, seen)] = inner / np.outer(size[seen], size[seen])
@@ -326,16 +309,16 @@ def draws(
     within the bounds of a fit, and where no error is known at the estimate.
     """
     strengths, axes = np.linalg.eigh(correlations)
-    errors = np.where(np.isfinite(errors), errors, np.inf)
     unit = normal @ (axes * np.sqrt(np.maximum(strengths, 0.0))) @ axes.T
     result = np.empty_like(unit)
     for i, (name, value, error) in enumerate(zip(names, values, errors, strict=True)):
         own = ALL[name]
         if own.logarithmic and value > 0.0:
-            result[:, i] = value * np.exp(min(error / value, PRIOR) * unit[:, i])
+            # fmin: an error that is not known is the prior's
+            drawn = value * np.exp(np.fmin(error / value, PRIOR) * unit[:, i])
         else:
-            result[:, i] = value + (error if np.isfinite(error) else 0.0) * unit[:, i]
-        result[:, i] = np.clip(result[:, i], own.low, own.high)
+            drawn = value + finite(error) * unit[:, i]
+        result[:, i] = np.clip(drawn, own.low, own.high)
     return result
 
 
@@ -343,13 +326,9 @@ def correlations(covariance: np.ndarray) -> np.ndarray:
     """Return the correlation matrix `[F, F]`; zero with a parameter that has no finite variance."""
     errors = np.sqrt(np.diag(covariance))
     usable = np.isfinite(errors) & (errors > 0.0)
-    safe = np.where(usable, errors, 1.0)
-    result = np.where(
-        np.outer(usable, usable),
-        np.where(np.isfinite(covariance), covariance, 0.0),
-        0.0,
-    )
-    result = result / np.outer(safe, safe)
+    # infinite where nothing is known: the quotient is zero there
+    safe = np.where(usable, errors, np.inf)
+    result = finite(covariance) / np.outer(safe, safe)
     result[np.diag_indices(len(errors))] = 1.0
     return np.clip(result, -1.0, 1.0)
 
@@ -397,25 +376,21 @@ def pulls_of_held(fit: Fit, u: Uncertainty) -> list[Pull]:
     law = fitted_law(problem.law, problem.by_name(fit.values))
     values = [float(getattr(law, name)) for name in held]
     residual, slopes = problem.slopes_of(held, np.array(values), fit.values, fit.sigma)
-    free = np.concatenate(
-        [~fit.at_bound[:count], np.full(len(fit.values) - count, True)]
-    )
-    rows = np.concatenate([u.jacobian, u.pull])
+    # values of the rig that lie on a bound count all the same
+    free = ~fit.at_bound | (np.arange(len(fit.values)) >= count)
+    rows = np.concatenate([u.jacobian, u.pull]) * free
+    below = np.zeros(len(u.pull))
     result = []
-    below = np.concatenate([residual, np.zeros(len(u.pull))])
     for i, (name, value) in enumerate(zip(held, values, strict=True)):
         if not slopes[:, i].any():
             result.append(Pull(name, value, 0.0, np.inf, np.zeros(count)))
             continue
-        column = np.concatenate([slopes[:, i], np.zeros(len(u.pull))])
-        both = np.column_stack([rows * free, column])
-        size = np.maximum(np.linalg.norm(both, axis=0), np.finfo(float).tiny)
-        curvature = np.linalg.inv(
-            (both / size).T @ (both / size) + RIDGE * np.eye(len(size))
-        )
+        column = np.append(slopes[:, i], below)
+        both, size = _of_unit_columns(np.column_stack([rows, column]))
+        curvature = np.linalg.inv(both.T @ both + RIDGE * np.eye(len(size)))
         # at the minimum, what was fitted has no slope left; its remainder is the pull's
-        score = np.append(np.zeros(len(size) - 1), column @ below) / size
-        step = -(curvature @ score) / size
-        error = float(np.sqrt(curvature[-1, -1] * max(u.reduced_chi2, 1.0)) / size[-1])
-        result.append(Pull(name, value, float(step[-1]), error, step[:count]))
+        score = slopes[:, i] @ residual / size[-1]
+        step = -score * curvature[:, -1] / size
+        error = np.sqrt(curvature[-1, -1] * max(u.reduced_chi2, 1.0)) / size[-1]
+        result.append(Pull(name, value, step[-1], error, step[:count]))
     return result

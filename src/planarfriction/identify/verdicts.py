@@ -5,6 +5,7 @@ Each rule names the parameter and what is missing in the data.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -13,7 +14,7 @@ import numpy as np
 
 from planarfriction._support.described import described
 from planarfriction.identify.decimation import samples_of
-from planarfriction.identify.logs import TWO_LOADS, Log
+from planarfriction.identify.logs import TWO_LOADS, Arrays, Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.problem import SPOILED
 from planarfriction.identify.rig import CHANNELS
@@ -87,6 +88,11 @@ class Verdict:
         return f"{self.parameter}: {'' if self.identifiable else 'not identifiable, '}{self.reason}"
 
 
+def caution(text: str) -> Verdict:
+    """Return a verdict on the fit as a whole that is no reason to doubt it."""
+    return Verdict("fit", True, text)
+
+
 def verdicts_on_samples(logs: Sequence[Log]) -> list[Verdict]:
     """Return a verdict that says how many samples were used, if some were not."""
     used, total = samples_of(logs)
@@ -94,13 +100,8 @@ def verdicts_on_samples(logs: Sequence[Log]) -> list[Verdict]:
         return []
     windows = sum(len(log.parts) for log in logs)
     text = f"of {total:,} samples, {used:,} were used: {windows} windows in which motion, load and friction differ most"
-    return [
-        Verdict(
-            "fit",
-            True,
-            f"{text}; between them the model follows the motion in longer steps",
-        )
-    ]
+    steps = "between them the model follows the motion in longer steps"
+    return [caution(f"{text}; {steps}")]
 
 
 def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
@@ -109,24 +110,22 @@ def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
     if not turned:
         return []
     count = f"{sum(turned.values())} jumps of theta by a whole turn were taken out"
-    return [
-        Verdict(
-            "fit",
-            True,
-            f"{count}, in {', '.join(list(turned)[:3])}{' ...' if len(turned) > 3 else ''}",
-        )
-    ]
+    return [caution(f"{count}, in {few_of([*turned], 3)}")]
+
+
+def few_of(names: Sequence[str], most: int) -> str:
+    """Return names in one line, with dots after `most` of them."""
+    return f"{', '.join(names[:most])}{' ...' if len(names) > most else ''}"
 
 
 def interval(name: str, value: float, error: float) -> tuple[float, float]:
     """Compute the 95 % interval [SI]: symmetric as factors for parameters that are > 0, else as differences."""
     if ALL[name].logarithmic and value > 0.0:
         with np.errstate(over="ignore"):
-            factor = float(np.exp(TWO_SIDED * error / value))
+            factor = np.exp(TWO_SIDED * error / value)
         return float(value / factor), float(value * factor)
-    return max(float(value - TWO_SIDED * error), ALL[name].low), float(
-        value + TWO_SIDED * error
-    )
+    half = TWO_SIDED * error
+    return max(float(value - half), ALL[name].low), float(value + half)
 
 
 # ---------------------------------------------------------------------- choice of the model
@@ -163,30 +162,34 @@ class Candidate(NamedTuple):
         """Measures of how well the model explains the data."""
         problem = self.fit.problem
         u = self.uncertainty
-        bristles = bristles_of(problem.law, problem.names)
-        estimates = problem.by_name(self.fit.values)
         return ModelScore(
-            problem.model, bristles, u.score, u.reduced_chi2, u.rejected, estimates
+            problem.model,
+            bristles_of(problem.law, problem.names),
+            u.score,
+            u.reduced_chi2,
+            u.rejected,
+            problem.by_name(self.fit.values),
         )
 
-    def cost(self, sigma: list[np.ndarray]) -> float:
+    def cost(self, sigma: Arrays) -> float:
         """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""
         fit = self.fit
         pull = fit.coordinates.prior(fit.x)[0]
-        return 0.5 * float(
+        return 0.5 * (
             (fit.problem.residual(fit.values, sigma) ** 2).sum() + (pull**2).sum()
         )
 
 
 def rivals(best: Candidate, candidates: Sequence[Candidate]) -> list[ModelScore]:
     """Return the other candidates that fit: none is rejected, and over the noise of the best one they fit as well."""
-    most = best.cost(best.fit.sigma) + SLIPPED
+    sigma = best.fit.sigma
+    most = best.cost(sigma) + SLIPPED
     return [
         each.score
         for each in candidates
         if each is not best
         and not each.uncertainty.rejected
-        and each.cost(best.fit.sigma) < most
+        and each.cost(sigma) < most
     ]
 
 
@@ -232,11 +235,14 @@ class Evidence:
 
     def value(self, name: str, otherwise: float) -> float:
         """Return the estimate of a parameter, or `otherwise` if it was not estimated."""
-        return (
-            float(self.values[self.names.index(name)])
-            if name in self.names
-            else otherwise
-        )
+        if name not in self.names:
+            return otherwise
+        return self.values[self.names.index(name)]
+
+    @property
+    def gap(self) -> str:
+        """Text on the speeds about v_s of which there is no sample, or nothing."""
+        return speed_gap(self.speeds, self.value("v_s", 1e-3))
 
     @property
     def spinning(self) -> bool:
@@ -255,46 +261,48 @@ def judge(
     """Return the verdicts on the fit, then on all parameters: if it is rejected, none of them is identifiable."""
     u = best.uncertainty
     chosen = best.score
-    others = rivals(best, candidates)
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
     if len(candidates) > 1:
-        scores = sorted(
-            (each.score for each in candidates if each is not best),
-            key=lambda each: each.held_out,
-        )
+        scores = [each.score for each in candidates if each is not best]
+        scores.sort(key=lambda each: each.held_out)
         rest = ", ".join(f"{each.held_out:.3g} times for {each}" for each in scores)
         text = f"on held-out parts of the logs, its errors are {chosen.held_out:.3g} times what noise explains ({rest})"
-        verdicts.append(Verdict("fit", True, text))
-    verdicts += _on_data(evidence, u) + [
-        Verdict("fit", each.agrees, str(each)) for each in held
-    ]
+        verdicts.append(caution(text))
+    verdicts += map(caution, _on_data(evidence, u))
+    verdicts += (Verdict("fit", each.agrees, str(each)) for each in held)
     if skipped:
         text = f'{" and ".join(skipped)} would take minutes and was not tried: choose it by model="{skipped[0]}"'
-        verdicts.append(Verdict("fit", True, text))
+        verdicts.append(caution(text))
+    others = rivals(best, candidates)
     for i, name in enumerate(evidence.names):
         verdict = judge_parameter(evidence, i)
         if verdict is None or verdict.identifiable:
-            low, high = interval(name, evidence.values[i], evidence.errors[i])
-            meaningless = f"{chosen.model} does not explain the data, so this value has no meaning"
-            denied = [
-                each
-                for each in held
-                if not each.agrees and abs(each.moves[i]) > MOVED * evidence.errors[i]
-            ]
-            resting = (
-                f"it changes by {denied[0].moves[i]:+.2g} if {denied[0].name} is not held"
-                if denied
-                else ""
-            )
-            for each in others if not u.rejected and not resting else ():
-                if not low <= each.estimates[name] <= high:
-                    resting = f"depends on the model: {each}, which also fits, gives {each.estimates[name]:.3g}"
-                    break
-            if reason := meaningless if u.rejected else resting:
+            reason = _depends(evidence, i, held, others)
+            if u.rejected:
+                reason = f"{chosen.model} does not explain the data, so this value has no meaning"
+            if reason:
                 verdict = Verdict(name, False, reason)
         if verdict is not None:
             verdicts.append(verdict)
     return tuple(verdicts)
+
+
+def _depends(
+    evidence: Evidence, i: int, held: Sequence[Pull], others: Sequence[ModelScore]
+) -> str:
+    """Return the value that was held, or the other model that fits, on which an estimate depends, or nothing."""
+    error = evidence.errors[i]
+    for each in held:
+        if not each.agrees and abs(each.moves[i]) > MOVED * error:
+            return f"it changes by {each.moves[i]:+.2g} if {each.name} is not held"
+    name = evidence.names[i]
+    low, high = interval(name, evidence.values[i], error)
+    for other in others:
+        if not low <= (estimate := other.estimates[name]) <= high:
+            return (
+                f"depends on the model: {other}, which also fits, gives {estimate:.3g}"
+            )
+    return ""
 
 
 def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
@@ -322,7 +330,7 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
     return f"{chosen} is rejected: {'; '.join(text)}. {cause}, and the intervals are only a rough guide"
 
 
-def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
+def _on_data(evidence: Evidence, u: Uncertainty) -> list[str]:
     """Return cautions: disturbances that a fit leans on, channels that were not measured, spoiled samples, one load."""
     found = []
     if leaning := [
@@ -330,98 +338,92 @@ def _on_data(evidence: Evidence, u: Uncertainty) -> list[Verdict]:
         for size, words in u.strains
         if size > LEANING
     ]:
-        text = f"the fit needs large disturbances of the rig: {', '.join(leaning)}"
-        found.append(Verdict("fit", True, text))
+        found.append(
+            f"the fit needs large disturbances of the rig: {', '.join(leaning)}"
+        )
     if not evidence.measured.all():
-        missing = [
-            name
-            for (name, _), seen in zip(CHANNELS, evidence.measured, strict=True)
-            if not seen
-        ]
+        both = zip(CHANNELS, evidence.measured, strict=True)
+        missing = [name for (name, _), seen in both if not seen]
         text = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} 0 throughout"
-        text += ", as without a sensor: the estimates use the other channels alone"
-        found.append(Verdict("fit", True, text))
+        found.append(
+            f"{text}, as without a sensor: the estimates use the other channels alone"
+        )
     if evidence.spoiled:
         text = f"{evidence.spoiled} values are off by more than {SPOILED:g} times the noise"
-        end = (
-            "they were left out"
-            if evidence.robust
-            else 'the loss "soft_l1" would leave them out'
-        )
-        found.append(Verdict("fit", True, f"{text}: {end}"))
+        end = 'the loss "soft_l1" would leave them out'
+        found.append(f"{text}: {'they were left out' if evidence.robust else end}")
     if "sigma_0" in evidence.names and evidence.load_ratio < TWO_LOADS:
-        stiffness = evidence.value("sigma_0", 0.0) * float(np.median(evidence.loads))
-        text = f"one load only: sigma_0 f_N = {stiffness:.3g} N/m is known, not if the stiffness grows with the load"
-        found.append(Verdict("fit", True, text))
+        stiffness = evidence.value("sigma_0", 0.0) * np.median(evidence.loads)
+        text = f"one load only: sigma_0 f_N = {stiffness:.3g} N/m is known"
+        found.append(f"{text}, not if the stiffness grows with the load")
     return found
 
 
 def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     """Return the verdict on parameter i, or None if there is nothing to say."""
     name = evidence.names[i]
-    value = float(evidence.values[i])
-    error = float(evidence.errors[i])
+    value = evidence.values[i]
+    error = evidence.errors[i]
     kind = ALL[name]
+    doubt = functools.partial(Verdict, name, False)
     if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
-        text = f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
-        return Verdict(name, False, text)
+        return doubt(
+            f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
+        )
     if name == "mu_s" and "mu_c" in evidence.names:
         c = evidence.names.index("mu_c")
-        if (
-            not evidence.errors[c] < VAGUE * evidence.values[c]
-            and not evidence.at_bound[c]
-        ):
-            text = "mu_c is unknown, as no sample is much faster than v_s, so that this may be mu_c"
-            return Verdict(name, False, text)
+        known = evidence.errors[c] < VAGUE * evidence.values[c]
+        if not known and not evidence.at_bound[c]:
+            return doubt(
+                "mu_c is unknown, as no sample is much faster than v_s, so that this may be mu_c"
+            )
     rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
     if evidence.at_bound[i] and not rests_on_zero:
-        return _on_bound(evidence, i)
-    size = abs(value)
-    seen = np.abs(evidence.jacobian[:, i]).max() * size
+        return doubt(_on_bound(evidence, i))
     if name in ("v_s", "gamma") and (reason := _no_stribeck(evidence)):
-        return Verdict(name, False, reason)
+        return doubt(reason)
+    size = abs(value)
     if not (error < VAGUE * size if kind.logarithmic else np.isfinite(error)):
-        return Verdict(name, False, _why(evidence, i, seen))
-    if name == "sigma_1" and value <= TWO_SIDED * error:
-        text = "cannot be distinguished from 0, so the corner frequency of the bristles may be above all samples"
-        return Verdict(name, False, text)
-    if kind.low == 0.0 and value < TWO_SIDED * error:
-        most = f"{value + TWO_SIDED * error:.3g} {kind.unit}"
-        return Verdict(name, True, f"cannot be distinguished from 0, at most {most}")
-    if (partner := _partner(evidence, i)) is not None:
-        other, correlation = partner
-        if not evidence.measured[2] and not {name, other}.isdisjoint(OF_TORQUE):
-            text = f"cannot be separated from {other} (correlation {correlation:.2f}) without the torque"
-            return Verdict(name, False, f"{text}, and tau is 0 throughout")
-        if error > WELL * size:
-            return Verdict(
-                name, True, f"strongly correlated with {other} ({correlation:.2f})"
-            )
-    return None
+        return doubt(_why(evidence, i))
+    half = TWO_SIDED * error
+    if name == "sigma_1" and value <= half:
+        return doubt(
+            "cannot be distinguished from 0, so the corner frequency of the bristles may be above all samples"
+        )
+    if kind.low == 0.0 and value < half:
+        text = f"cannot be distinguished from 0, at most {value + half:.3g} {kind.unit}"
+        return Verdict(name, True, text)
+    other, correlation = _partner(evidence, i)
+    if not other:
+        return None
+    if not evidence.measured[2] and not {name, other}.isdisjoint(OF_TORQUE):
+        text = f"cannot be separated from {other} (correlation {correlation:.2f}) without the torque"
+        return doubt(f"{text}, and tau is 0 throughout")
+    if error <= WELL * size:
+        return None
+    return Verdict(name, True, f"strongly correlated with {other} ({correlation:.2f})")
 
 
-def _why(evidence: Evidence, i: int, seen: float) -> str:
+def _why(evidence: Evidence, i: int) -> str:
     """Return the reason why a parameter is vague: a gap in the data, else another parameter, else the noise."""
     name = evidence.names[i]
-    if name in ("v_s", "gamma", "mu_s") and (
-        gap := speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
-    ):
+    if name in ("v_s", "gamma", "mu_s") and (gap := evidence.gap):
         return gap
     if name in ("contact_radius", *SOFT_FINGER) and not evidence.spinning:
         return "no spin"
-    if (
-        name in SOFT_FINGER
-        and name != "c"
-        and evidence.loads.max() < ONE_LOAD * evidence.loads.min()
-    ):
+    one_load = evidence.loads.max() < ONE_LOAD * evidence.loads.min()
+    if name in SOFT_FINGER and name != "c" and one_load:
         return "one load only"
     if name in OF_TORQUE and not evidence.measured[2]:
         return "only the torque depends on it, and tau is 0 throughout"
+    size = abs(evidence.values[i])
+    seen = np.abs(evidence.jacobian[:, i]).max() * size
     if seen < UNSEEN:
         return f"changes no sample by more than {seen:.2g} times the noise"
-    if (partner := _partner(evidence, i)) is not None:
-        return f"cannot be separated from {partner[0]} (correlation {partner[1]:.2f})"
-    return f"standard error {100 * evidence.errors[i] / abs(evidence.values[i]):.0f} % of the estimate"
+    other, correlation = _partner(evidence, i)
+    if other:
+        return f"cannot be separated from {other} (correlation {correlation:.2f})"
+    return f"standard error {100 * evidence.errors[i] / size:.0f} % of the estimate"
 
 
 def _no_stribeck(evidence: Evidence) -> str:
@@ -438,33 +440,25 @@ def _no_stribeck(evidence: Evidence) -> str:
             max(evidence.errors[s] ** 2 + evidence.errors[c] ** 2 - 2.0 * both, 0.0)
         )
     if evidence.at_bound[s] or not difference > TWO_SIDED * error:
-        gap = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
-        return gap or "mu_s cannot be distinguished from mu_c"
+        return evidence.gap or "mu_s cannot be distinguished from mu_c"
     return ""
 
 
-def _on_bound(evidence: Evidence, i: int) -> Verdict:
+def _on_bound(evidence: Evidence, i: int) -> str:
     name = evidence.names[i]
-    if name == "mu_s" and evidence.values[i] <= SAME * evidence.value(
-        "mu_c", evidence.held_mu_c
-    ):
-        reason = (
-            speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
-            or "no friction above mu_c was seen"
-        )
-        return Verdict(name, False, f"{reason}: equal to mu_c")
-    return Verdict(
-        name,
-        False,
-        f"the fit ran into the bound {evidence.values[i]:.3g} {ALL[name].unit}",
-    )
+    value = evidence.values[i]
+    mu_c = evidence.value("mu_c", evidence.held_mu_c)
+    if name == "mu_s" and value <= SAME * mu_c:
+        return f"{evidence.gap or 'no friction above mu_c was seen'}: equal to mu_c"
+    return f"the fit ran into the bound {value:.3g} {ALL[name].unit}"
 
 
-def _partner(evidence: Evidence, i: int) -> tuple[str, float] | None:
+def _partner(evidence: Evidence, i: int) -> tuple[str, float]:
+    """Return the parameter from which another one cannot be separated, and their correlation; or nothing, and zero."""
     row = evidence.correlations[i].copy()
     row[i] = 0.0
     j = int(np.argmax(np.abs(row)))
-    return (evidence.names[j], float(row[j])) if abs(row[j]) > TOGETHER else None
+    return (evidence.names[j], row[j]) if abs(row[j]) > TOGETHER else ("", 0.0)
 
 
 def speed_gap(speeds: np.ndarray, around: float) -> str:
@@ -477,8 +471,8 @@ def speed_gap(speeds: np.ndarray, around: float) -> str:
         return f"no sample below {1e3 * slow:.2g} and above {1e3 * fast:.2g} mm/s"
     below = moving[moving <= around]
     above = moving[moving > around]
-    low = float(below.max()) if len(below) else 0.0
-    high = float(above.min()) if len(above) else np.inf
+    low = below.max() if len(below) else 0.0
+    high = above.min() if len(above) else np.inf
     if high < GAP * low:
         return ""
     if not np.isfinite(high):

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from planarfriction._support import validation
-from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, size_of, with_findings
+from planarfriction.identify.columns import TWIST
 from planarfriction.identify.decimation import decimated, samples_of
 from planarfriction.identify.logs import (
     TWO_LOADS,
@@ -23,7 +23,17 @@ from planarfriction.identify.logs import (
     one_coordinate,
 )
 from planarfriction.identify.options import FitOptions
-from planarfriction.identify.parameters import fitted_law, scaled_patch
+from planarfriction.identify.parameters import (
+    LAW,
+    RADIUS,
+    SHAPE,
+    SOFT_FINGER,
+    USUAL,
+    check_names,
+    check_patch,
+    fitted_law,
+    scaled_patch,
+)
 from planarfriction.identify.problem import SPOILED, LogProblem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, wrench_noise
@@ -45,9 +55,7 @@ from planarfriction.identify.verdicts import (
     verdicts_on_turns,
 )
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 START_MU_S = 1.2
 """Static coefficient that a search starts with by default: above `mu_c`, free to move."""
@@ -83,7 +91,7 @@ def identify_lugre(
     log: Log | Sequence[Log],
     patch: ContactPatch,
     *,
-    parameters: Sequence[str] = known.USUAL,
+    parameters: Sequence[str] = USUAL,
     model: str = "auto",
     start: LuGre | Mapping[str, float] | None = None,
     options: FitOptions = FitOptions(),  # noqa: B008 (frozen)
@@ -125,11 +133,10 @@ def identify_lugre(
         Ctrl-C, with the best values so far.
     """
     logs = as_tuple("log", log, Log)
-    names = known.check_names(parameters)
-    if names == known.USUAL and one_coordinate(logs):
+    names = check_names(parameters)
+    if names == USUAL and one_coordinate(logs):
         names = tuple(name for name in names if name != "contact_radius")
-    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
-    refuse_anisotropy(patch, "identify_lugre")
+    check_patch(patch, "identify_lugre")
     models = _models_to_fit(
         validation.choice("model", model, ("auto", *SIMULATORS)), patch, names
     )
@@ -143,7 +150,8 @@ def identify_lugre(
         )
     findings = check_logs(logs, patch)
     whole = logs
-    logs = decimated(logs, size_of(logs[0], patch), options.samples)
+    size = size_of(logs[0], patch)
+    logs = decimated(logs, size, options.samples)
     noise = wrench_noise(logs) if options.noise is None else np.array(options.noise)
     if (
         given is not None
@@ -169,52 +177,45 @@ def identify_lugre(
                     if fit.cost < WORSE * lead.cost or not (sure or fit.near)
                 ]
             for law in kinds:
-                problems.append(
-                    LogProblem(logs, patch, names, law, options, name, progress)
-                )
-                late = problems[-1].work * USUAL_EVALUATIONS
+                more = patch, names, law, options, name, progress
+                problem = LogProblem(logs, *more)
+                late = problem.work * USUAL_EVALUATIONS
                 if model == "auto" and name != LEAD and late > PATIENCE:
-                    skipped += [] if name in skipped else [name]
+                    skipped.append(name)
                     continue
                 if late > SOON and model != "auto":
-                    fewer = decimated(
-                        whole,
-                        size_of(whole[0], patch),
-                        int(samples_of(logs)[0] * SOON / late),
-                    )
-                    problems[-1] = LogProblem(
-                        fewer, patch, names, law, options, name, progress
-                    )
+                    most = int(samples_of(logs)[0] * SOON / late)
+                    problem = LogProblem(decimated(whole, size, most), *more)
+                problems.append(problem)
                 if not leads:
-                    problems[-1].report("looking for starts")
+                    problem.report("looking for starts")
                     guesses = guess_starts(
-                        problems[-1],
+                        problem,
                         given,
                         starts=options.starts,
                         seed=options.seed,
                         noise=noise,
                     )
-                    fit = multistart(problems[-1], guesses, noise=noise)
-                    values = ", ".join(
-                        f"{key} {value:.3g}"
-                        for key, value in fit.problem.by_name(fit.values).items()
-                    )
-                    problems[-1].report(f"a first answer: {values}")
+                    fit = multistart(problem, guesses, noise)
+                    values = problem.by_name(fit.values).items()
+                    first = ", ".join(f"{key} {value:.3g}" for key, value in values)
+                    problem.report(f"a first answer: {first}")
                 else:
-                    fit = warm_start(
-                        problems[-1], lead or leads[0], guesses, noise=noise
-                    )
-                leads += [fit] if name == LEAD else []
+                    fit = warm_start(problem, lead or leads[0], guesses, noise)
+                if name == LEAD:
+                    leads.append(fit)
                 if name in models and (name != LEAD or law.reference_load is None):
                     fit = refine(fit)
                     candidates.append(Candidate(fit, uncertainty(fit)))
         best = min(candidates, key=lambda each: each.uncertainty.score)
-        alike = [each for each in candidates if each.score.model == best.score.model]
+        sigma = best.fit.sigma
         best = min(
-            alike,
-            key=lambda each: (each.uncertainty.rejected, each.cost(best.fit.sigma)),
+            (each for each in candidates if each.score.model == best.score.model),
+            key=lambda each: (each.uncertainty.rejected, each.cost(sigma)),
         )
-        found = _identification(best, candidates, skipped, leads[0].starts)
+        found = _identification(
+            best, candidates, [*dict.fromkeys(skipped)], leads[0].starts
+        )
     return with_findings(found, whole, findings)
 
 
@@ -223,12 +224,11 @@ def _models_to_fit(
 ) -> tuple[str, ...]:
     """Return the names of the models to fit; only some take a patch that changes with its load."""
     able = tuple(SIMULATORS)
-    if patch.depends_on_load or any(name in known.SOFT_FINGER for name in names):
+    if patch.depends_on_load or any(name in SOFT_FINGER for name in names):
         able = (LEAD,)
-        if model not in ("auto", LEAD):
-            raise InvalidValueError(
-                "model", f"be {LEAD!r} if the patch changes with the load", model
-            )
+    if model not in ("auto", *able):
+        rule = f"be {LEAD!r} if the patch changes with the load"
+        raise InvalidValueError("model", rule, model)
     return able if model == "auto" else (model,)
 
 
@@ -247,21 +247,19 @@ def _start_laws(
     if type(start) is LuGre:
         return [start], None
     if not isinstance(start, Mapping | None):
-        raise InvalidValueError(
-            "start", "be a LuGre law or a table of its parameters", start
-        )
-    given = {} if start is None else dict(start)
+        rule = "be a LuGre law or a table of its parameters"
+        raise InvalidValueError("start", rule, start)
+    given = dict(start or {})
     for name, value in given.items():
-        validation.choice("start", name, known.LAW)
+        validation.choice("start", name, LAW)
         given[name] = validation.number(f"start[{name!r}]", value)
     kinds = [USUAL_BRISTLES, None] if bristles == "auto" else [bristles]
-    if "breakaway_ratio" in given or "breakaway_ratio" in names:
-        kinds = [
-            ElastoPlastic(given["breakaway_ratio"])
-            if "breakaway_ratio" in given
-            else kinds[0] or USUAL_BRISTLES
-        ]
-    fields = {name: value for name, value in given.items() if name != "breakaway_ratio"}
+    fields = dict(given)
+    ratio = fields.pop("breakaway_ratio", None)
+    if ratio is not None:
+        kinds = [ElastoPlastic(ratio)]
+    elif "breakaway_ratio" in names:
+        kinds = [kinds[0] or USUAL_BRISTLES]
     fields.setdefault("mu_s", max(START_MU_S, fields.get("mu_c", LuGre.mu_c)))
     fields.setdefault("mu_c", min(LuGre.mu_c, fields["mu_s"]))
     return [LuGre(**fields, elasto_plastic=kind) for kind in kinds], given
@@ -322,16 +320,15 @@ def _evidence(
     count = len(problem.names)
     values, _ = problem.split(fit.values)
     still = fit.values.copy()
-    still[:count] *= np.where(np.isin(problem.names, ("mu_c", "mu_s")), NO_SLIP, 1.0)
-    costs = [
-        0.5 * float((problem.residual(each, fit.sigma) ** 2).sum())
+    still[:count][np.isin(problem.names, ("mu_c", "mu_s"))] *= NO_SLIP
+    slips, sticks = (
+        0.5 * (problem.residual(each, fit.sigma) ** 2).sum()
         for each in (fit.values, still)
-    ]
-    sliding = problem.sliding(values)
-    left_out = sum(
-        int(np.isinf(sigma[:, log.channels]).sum())
-        for sigma, log in zip(fit.sigma, problem.logs, strict=True)
     )
+    speeds, spins = np.concatenate(problem.sliding(values), axis=1)
+    spoiled = (np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()
+    for sigma, log in zip(fit.sigma, problem.logs, strict=True):
+        spoiled += np.isinf(sigma[:, log.channels]).sum()
     return Evidence(
         names=problem.names,
         values=values,
@@ -339,18 +336,17 @@ def _evidence(
         correlations=correlations(u.covariance)[:count, :count],
         at_bound=fit.at_bound[:count],
         jacobian=u.jacobian[:, :count],
-        speeds=np.concatenate([each[0] for each in sliding]),
-        spins=np.concatenate([each[1] for each in sliding]),
-        held_mu_c=float(problem.law.numbers.mu_c),
+        speeds=speeds,
+        spins=spins,
+        held_mu_c=problem.law.numbers.mu_c,
         loads=np.array([mean_load(log) for log in problem.logs]),
         load_ratio=load_ratio(problem.logs),
         measured=np.any([log.channels for log in problem.logs], axis=0),
-        spoiled=int((np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum())
-        + left_out,
+        spoiled=int(spoiled),
         robust=problem.options.loss != "linear",
-        without_slip=costs[1] - costs[0],
+        without_slip=sticks - slips,
         largest_coefficient=max(
-            float(np.nanquantile(each["coefficient"], 0.99)) for each in histories
+            np.nanquantile(each["coefficient"], 0.99) for each in histories
         ),
     )
 
@@ -360,71 +356,66 @@ def _histories(best: Candidate) -> list[dict[str, Any]]:
     fit = best.fit
     problem = fit.problem
     values, _ = problem.split(fit.values)
-    shown = problem.shown(fit.values)
-    sliding = problem.sliding(values)
-    coefficients = problem.coefficients(values)
-    unseen = problem.by_log(best.uncertainty.unseen[:, None])
+    each = zip(
+        problem.logs,
+        problem.used,
+        fit.sigma,
+        problem.by_log(best.uncertainty.unseen[:, None]),
+        problem.shown(fit.values),
+        problem.sliding(values),
+        problem.coefficients(values),
+        strict=True,
+    )
     histories = []
-    for i, (log, used, sigma, rows) in enumerate(
-        zip(problem.logs, problem.used, fit.sigma, unseen, strict=True)
-    ):
+    for log, used, sigma, rows, shown, (speed, _), coefficient in each:
         held_out = np.full_like(log.wrench, np.nan)
         known_noise = np.where(log.channels & np.isfinite(sigma), sigma, np.nan)
         held_out[used] = log.wrench[used] + rows[:, :, 0] * known_noise[used]
-        measured = np.where(log.channels, log.wrench, np.nan)
-        more = {"speed": sliding[i][0], "held_out": held_out}
-        each = {
-            "name": log.name,
-            "time": log.time,
-            "measured": measured,
-            "predicted": shown[i],
-            "twist": log.twist,
-        }
-        histories.append({**each, **more, "coefficient": coefficients[i]})
+        histories.append(
+            {
+                "name": log.name,
+                "time": log.time,
+                "measured": np.where(log.channels, log.wrench, np.nan),
+                "predicted": shown,
+                "twist": log.twist,
+                "speed": speed,
+                "held_out": held_out,
+                "coefficient": coefficient,
+            }
+        )
     return histories
 
 
 def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:
     """Return the noise of the twists of each log as quantities of the rig, if it is estimated."""
-    if "twist" not in problem.rig.groups:
-        return []
     result = []
     for log, twist in zip(problem.logs, problem.twists, strict=True):
         name = log.name if len(problem.logs) > 1 else ""
-        error = twist.noise / np.sqrt(0.3 * len(log.time))
-        for k, (channel, unit) in enumerate(
-            (("vx", "m/s"), ("vy", "m/s"), ("omega", "rad/s"))
-        ):
+        errors = twist.noise / np.sqrt(0.3 * len(log.time))
+        units = ("m/s", "m/s", "rad/s")
+        for row in zip(TWIST, units, twist.noise, errors, strict=True):
+            channel, unit, noise, error = row
             result.append(
-                Nuisance(
-                    f"noise_{channel}",
-                    unit,
-                    float(twist.noise[k]),
-                    float(error[k]),
-                    name,
-                )
+                Nuisance(f"noise_{channel}", unit, float(noise), float(error), name)
             )
-    return result
+    return result if "twist" in problem.rig.groups else []
 
 
 def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
     """Make the fitted model, with the patch scaled about its centre of pressure or fitted soft-finger constants."""
     given = problem.by_name(values)
     patch = problem.fixed_patch
-    surface = problem.options.surface
-    finger = {name: given[name] for name in known.SOFT_FINGER if name in given}
-    if finger:
+    surface: Any = problem.options.surface
+    if problem.fingers:
+        finger = {name: given[name] for name in problem.fingers}
         pressure = dataclasses.replace(problem.patch.pressure, **finger)
-        fitted = dataclasses.replace(problem.patch, pressure=pressure)
-        return ReducedModelPublished(
-            fitted, law, surface=surface(fitted, normal_force=problem.reference_load)
-        )
-    if any(name in known.SHAPE for name in given):
-        centre = patch.centre_of_pressure()
-        vector = problem.maps[0].base
-        radius = float(vector[PARAMETERS.index("contact_radius")])
-        new = np.array(
-            [given.get("centre_x", centre[0]), given.get("centre_y", centre[1])]
-        )
-        patch = scaled_patch(patch, given.get("contact_radius", radius) / radius, new)
-    return SIMULATORS[problem.model].model(patch, law, surface)
+        patch = dataclasses.replace(problem.patch, pressure=pressure)
+        load = problem.reference_load
+        surface = functools.partial(surface, normal_force=load)
+    elif any(name in SHAPE for name in given):
+        x, y = patch.centre_of_pressure()
+        radius = problem.maps[0].base[RADIUS]
+        centre = np.array([given.get("centre_x", x), given.get("centre_y", y)])
+        scale = given.get("contact_radius", radius) / radius
+        patch = scaled_patch(patch, float(scale), centre)
+    return problem.kind.model(patch, law, surface)

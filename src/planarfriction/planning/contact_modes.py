@@ -73,13 +73,11 @@ def motion_cone(
     validation.instance("surface", surface, LimitSurface, "a limit surface")
     at = validation.vector("at", at, 2)
     normal = validation.vector("normal", normal, 2)
-    length = validation.positive("length of normal", float(np.hypot(*normal)))
+    length = validation.positive("length of normal", np.hypot(*normal))
     angle = math.atan(validation.non_negative("mu", mu))
-    found = [
-        pushed_by(surface, TouchPoint(at, normal / length), each)[1]
-        for each in (-angle, angle)
-    ]
-    return np.array(found) / np.hypot(*np.transpose(found))[:, None]
+    place = TouchPoint(at, normal / length)
+    edges = np.array([pushed_by(surface, place, each)[1] for each in (-angle, angle)])
+    return edges / np.hypot(*edges.T)[:, None]
 
 
 def motion_at(
@@ -99,26 +97,32 @@ def motion_at(
     angle = math.atan(mu)
     wanted = _angle(place, velocity)
     edges = [pushed_by(surface, place, each) for each in (-angle, angle)]
-    right, left = (_angle(place, each[1]) for each in edges)
+    right, left = (_angle(place, moved) for _, moved in edges)
     if angle == 0.0:  # left or right, the force is the same, and no mode has an end
         held = LEFT if wanted >= left else RIGHT
     mode = held or (LEFT if wanted >= left else RIGHT if wanted <= right else STICK)
     if mode == STICK:
         twist, moved = _stuck(surface, place, angle + _BEYOND, wanted)
-        scale = math.hypot(velocity[0], velocity[1]) / math.hypot(moved[0], moved[1])
+        scale = math.hypot(*velocity[:2]) / math.hypot(*moved)
         return SliderMotion(scale * twist, mode, min(wanted - right, left - wanted))
     twist, moved = edges[mode == LEFT]
     scale = (velocity[:2] @ place.normal) / (moved @ place.normal)
-    slack = (
-        math.inf if angle == 0.0 else wanted - left if mode == LEFT else right - wanted
-    )
-    return SliderMotion(scale * twist, mode, slack)
+    slack = wanted - left if mode == LEFT else right - wanted
+    return SliderMotion(scale * twist, mode, math.inf if angle == 0.0 else slack)
+
+
+def rotation(angle: float) -> np.ndarray:
+    """Return the matrix `[2, 2]` that rotates by an angle [rad], counter-clockwise."""
+    c = math.cos(angle)
+    s = math.sin(angle)
+    return np.array([[c, -s], [s, c]])
 
 
 def _angle(place: TouchPoint, vector: Any) -> float:
     """Return the angle of a vector to the left of the normal [rad]."""
-    (x, y) = place.normal.tolist()
-    (a, b) = (float(vector[0]), float(vector[1]))
+    x, y = place.normal.tolist()
+    a = vector[0]
+    b = vector[1]
     return math.atan2(x * b - y * a, x * a + y * b)
 
 
@@ -126,8 +130,8 @@ def pushed_by(
     surface: LimitSurface, place: TouchPoint, angle: float
 ) -> tuple[np.ndarray, tuple[float, float]]:
     """Return the twist of unit power under a force at an angle to the normal, and the velocity of the place."""
-    (nx, ny) = place.normal.tolist()
-    (x, y) = place.at.tolist()
+    nx, ny = place.normal.tolist()
+    x, y = place.at.tolist()
     c = math.cos(angle)
     s = math.sin(angle)
     fx = c * nx - s * ny
@@ -165,25 +169,24 @@ def _flush(
 
     The pressure of the face has a resultant that crosses it, at an angle within the friction cone.
     """
-    (x, y) = place.at
-    (nx, ny) = place.normal
+    x, y = place.at
     h = place.half_width
-    tangent = np.array([-ny, nx])
     angle = math.atan(mu)
-    omega = velocity[2]
-    stuck = np.array([velocity[0] + omega * y, velocity[1] - omega * x, omega])
-    speed = math.hypot(velocity[0], velocity[1]) + abs(omega) * (h + math.hypot(x, y))
+    vx, vy, omega = velocity
+    stuck = np.array([vx + omega * y, vy - omega * x, omega])
+    speed = math.hypot(vx, vy) + abs(omega) * (h + math.hypot(x, y))
+    # to the normal and to its left
+    axes = np.stack([place.normal, rotation(0.5 * math.pi) @ place.normal])
 
     def of(slip: float) -> tuple[np.ndarray, float, float]:
         """Return twist, angle of the force, and its crossing of the face as a share of the half width."""
-        twist = stuck - slip * np.array([*tangent, 0.0])
+        twist = stuck - slip * np.append(axes[1], 0.0)
         fx, fy, tau = -surface.wrench(twist)
-        pressed = fx * nx + fy * ny
-        along = fx * tangent[0] + fy * tangent[1]
+        pressed, along = axes @ [fx, fy]
         turn = tau - (x * fy - y * fx)  # about the middle, of the normal force alone
-        share = (
-            -turn / (pressed * h) if pressed > 0.0 else math.copysign(math.inf, -turn)
-        )
+        share = math.copysign(math.inf, -turn)
+        if pressed > 0.0:
+            share = -turn / (pressed * h)
         return twist, math.atan2(along, pressed), share
 
     twist, lean, share = of(0.0)
@@ -193,15 +196,10 @@ def _flush(
         held = LEFT if lean > 0.0 else RIGHT
     if held in (LEFT, RIGHT) or (not held and slack < 0.0):
         mode = held or (LEFT if lean > 0.0 else RIGHT)
-        slip = _slip(lambda u: of(u)[1], angle if mode == LEFT else -angle, speed)
+        left = 1.0 if mode == LEFT else -1.0
+        slip = _slip(lambda u: of(u)[1], left * angle, speed)
         twist, _, share = of(slip)
-        slack = (
-            math.inf
-            if angle == 0.0
-            else slip / speed
-            if mode == LEFT
-            else -slip / speed
-        )
+        slack = math.inf if angle == 0.0 else left * slip / speed
     leans = int(math.copysign(1.0, share)) if abs(share) > _EDGE else 0
     return SliderMotion(twist, mode, min(slack, 1.0 - abs(share)), leans)
 

@@ -133,29 +133,22 @@ def plan_grip(
     chosen = scene.contacts[index]
     patch = chosen.model.patch
     law = chosen.model.law.numbers
-    at_start = holding_load(
-        load_on(scene, index, 0.0, np.zeros(2), 0.0), patch, law.mu_c
-    )
+    first = load_on(scene, index, 0.0, np.zeros(2), 0.0)
+    at_start = holding_load(first, patch, law.mu_c)
     if at_start == 0.0:
-        raise InvalidValueError(
-            "scene", "have a load that moves the body", "no gravity and no force"
-        )
-    at_end = _holding_at(
-        scene, index, load_on(scene, index, angle or 0.0, slide, scene.t_end)
-    )
+        rule = "have a load that moves the body"
+        raise InvalidValueError("scene", rule, "no gravity and no force")
+    last = load_on(scene, index, angle or 0.0, slide, scene.t_end)
+    at_end = _holding_at(scene, index, last)
     low, high = _bounds(bounds, at_start)
     least = (1.0 + validation.non_negative("margin", margin)) * at_end
     if least > high:
-        raise InvalidValueError(
-            "bounds",
-            f"reach the {least:.3g} N that hold the body at the end",
-            [low, high],
-        )
-    radius = float(patch.contact_radius(at_start))
+        rule = f"reach the {least:.3g} N that hold the body at the end"
+        raise InvalidValueError("bounds", rule, [low, high])
     shares = (1.0, 1.0 - friction, 1.0 + friction) if friction else (1.0,)
     seen = sorted({*shares, 0.99, 1.01})
     grips = Grips(scene, index, seen)
-    wanted = Aim(angle, slide, radius)
+    wanted = Aim(angle, slide, patch.contact_radius(at_start))
     factors = shares if aim == "worst" else (1.0,)
     searches = [
         _ProfileSearch(grips, wanted, factors, times, (low, least, high), at_start)
@@ -195,10 +188,8 @@ class _ProfileSearch:
         self._first = grips.first
         # Whoever holds the body at first goes on from there.
         if self._first is not None:
-            self._low[0], self._highest[0] = (
-                self._first * (1.0 - 1e-6),
-                self._first * (1.0 + 1e-6),
-            )
+            self._low[0] = self._first * (1.0 - 1e-6)
+            self._highest[0] = self._first * (1.0 + 1e-6)
         self._holding = holding
         self._bend = ROUGH / holding * np.diff(np.eye(len(times)), 2, axis=0)
         self._weights = np.full(len(factors), 1.0 / len(factors))
@@ -215,9 +206,8 @@ class _ProfileSearch:
         profiles = [values for _, values in found if values is not None]
         if not profiles:
             return -np.inf
-        costs = threads.each(
-            lambda values: float((self._residuals(values) ** 2).sum()), profiles
-        )
+        cost = lambda values: float((self._residuals(values) ** 2).sum())
+        costs = threads.each(cost, profiles)
         best = int(np.argmin(costs))
         self._values = profiles[best]
         return -0.5 * costs[best]
@@ -231,14 +221,13 @@ class _ProfileSearch:
         times = self._times
         first = np.array([min(level, kick), level]) * self._holding
         first = first if self._first is None else np.append(self._first, first)
-        rise = float(np.diff(times).max())
+        rise = np.diff(times).max()
         low = np.interp(times, times[0] + rise * np.arange(len(first)), first)
 
         def released(until: float) -> np.ndarray:
             """Return the values of a profile that stays low until some time, and then holds."""
-            return self._inside(
-                low + (hold - low) * np.interp(times, [until, until + rise], [0.0, 1.0])
-            )
+            held = np.interp(times, [until, until + rise], [0.0, 1.0])
+            return self._inside(low + (hold - low) * held)
 
         @functools.cache
         def missing(until: float) -> float:
@@ -246,8 +235,8 @@ class _ProfileSearch:
             off = self._aim.progress(end) - 1.0
             return off if abs(off) > NEAR else 0.0
 
-        earliest = float(times[0]) - rise
-        latest = float(times[-1]) - rise
+        earliest = times[0] - rise
+        latest = times[-1] - rise
         most = missing(latest)
         if most <= 0.0:
             return most + 1.0, None
@@ -258,20 +247,16 @@ class _ProfileSearch:
         from scipy.optimize import least_squares
 
         if not len(self._values):
-            name, goal = (
-                ("slide", self._aim.slide.tolist())
-                if self._aim.angle is None
-                else ("angle", self._aim.angle)
-            )
             rule = f"be within reach of the load on the body (it gets at most {100.0 * self._reached:.3g} % of the way)"
-            raise InvalidValueError(name, rule, goal)
+            if self._aim.angle is None:
+                raise InvalidValueError("slide", rule, self._aim.slide.tolist())
+            raise InvalidValueError("angle", rule, self._aim.angle)
         values = self._values
         best = self._values
         least = np.inf
-        rounds, tries = (
-            (1, TRIES) if len(self._factors) == 1 else (1 + ROUNDS, TRIES // 2)
-        )
-        for _ in range(rounds):
+        several = len(self._factors) > 1
+        tries = TRIES // 2 if several else TRIES
+        for _ in range(1 + ROUNDS * several):
             found = least_squares(
                 self._residuals,
                 values,
@@ -286,11 +271,8 @@ class _ProfileSearch:
             if misses.max() < least:
                 best = values
                 least = misses.max()
-            self._weights = (
-                self._weights * misses / (self._weights @ misses)
-                if misses.any()
-                else self._weights
-            )
+            if misses.any():
+                self._weights = self._weights * misses / (self._weights @ misses)
         return self._signal(best)
 
     def _signal(self, values: np.ndarray) -> Signal:
@@ -298,9 +280,8 @@ class _ProfileSearch:
 
     def _misses(self, values: np.ndarray) -> np.ndarray:
         """Return the misses `[F, 6]` with each friction."""
-        return self._aim.misses(
-            np.array(self._grips.ends(self._signal(values), self._factors))
-        )
+        ends = self._grips.ends(self._signal(values), self._factors)
+        return self._aim.misses(np.array(ends))
 
     def _inside(self, values: np.ndarray) -> np.ndarray:
         inside = 1e-2 * np.minimum(self._highest - self._low, self._holding)
@@ -311,13 +292,9 @@ class _ProfileSearch:
         return np.concatenate([misses.ravel(), self._bend @ values])
 
     def _slopes(self, values: np.ndarray) -> np.ndarray:
-        slopes = (
-            np.array(self._grips.slopes(self._signal(values), self._factors))
-            / self._aim.scales()[:, None]
-        )
-        return np.concatenate(
-            [*self._weights[:, None, None] ** 0.5 * slopes, self._bend]
-        )
+        slopes = self._grips.slopes(self._signal(values), self._factors)
+        shares = self._weights[:, None, None] ** 0.5 / self._aim.scales()[:, None]
+        return np.concatenate([*(shares * slopes), self._bend])
 
 
 # ---------------------------------------------------------------------- what was asked for
@@ -327,28 +304,22 @@ def _contact_of(scene: Any, name: str | None) -> int:
     """Return the index of the contact whose grip is planned."""
     validation.instance("scene", scene, Scene, "a Scene")
     if scene.start == "sliding":
-        raise InvalidValueError(
-            "start", "be 'rest' or 'equilibrium' for a grip plan", scene.start
-        )
+        rule = "be 'rest' or 'equilibrium' for a grip plan"
+        raise InvalidValueError("start", rule, scene.start)
     names = [each.name for each in scene.contacts]
-    for what, given, purpose in (
-        ("velocity", scene.velocity, "a body that a grip moves"),
-        ("stop_speed", scene.stop_speed, "a plan, which has to hold until the end"),
-        *(
-            (
-                f"support_velocity of contact {c.name!r}",
-                c.support_velocity,
-                "a grip plan",
-            )
-            for c in scene.contacts
-        ),
-    ):
+    unset = {
+        "velocity": (scene.velocity, "a body that a grip moves"),
+        "stop_speed": (scene.stop_speed, "a plan, which has to hold until the end"),
+    }
+    for each in scene.contacts:
+        support = f"support_velocity of contact {each.name!r}"
+        unset[support] = (each.support_velocity, "a grip plan")
+    for what, (given, purpose) in unset.items():
         if given is not None:
             raise InvalidValueError(what, f"be None for {purpose}", given)
     if name is None and len(names) > 1:
-        raise InvalidValueError(
-            "contact", f"be given if there are several ({', '.join(names)})", name
-        )
+        rule = f"be given if there are several ({', '.join(names)})"
+        raise InvalidValueError("contact", rule, name)
     return 0 if name is None else names.index(validation.choice("contact", name, names))
 
 
@@ -372,17 +343,14 @@ def _holding_at(scene: Scene, contact: int, load: np.ndarray) -> float:
 def _goal(goal: Any) -> tuple[float | None, np.ndarray]:
     """Return the angle of the goal, None for a slide, and the slide, zeros for an angle."""
     if not isinstance(goal, Mapping) or len(goal) != 1:
-        raise InvalidValueError(
-            "goal",
-            'be {"angle": radians} or {"slide": (dx, dy)}',
-            validation.quoted(goal),
-        )
+        rule = 'be {"angle": radians} or {"slide": (dx, dy)}'
+        raise InvalidValueError("goal", rule, validation.quoted(goal))
     validation.keys("goal", goal, [], ["angle", "slide"])
+    angle = None
+    slide = np.zeros(2)
     if "angle" in goal:
         angle = validation.number("angle", goal["angle"])
-        slide = np.zeros(2)
     else:
-        angle = None
         slide = validation.array("slide", goal["slide"], (2,))
     if not angle and not slide.any():
         raise InvalidValueError("goal", "not be zero", dict(goal))
@@ -395,18 +363,13 @@ def _knots(scene: Scene, knots: Any) -> list[np.ndarray]:
         count = validation.count("knots", knots, 4, MOST_KNOTS)
         return [np.linspace(0.0, share * scene.t_end, count) for share in SPANS]
     times = validation.array("knots", knots, (None,))
-    if (
-        not 4 <= len(times) <= MOST_KNOTS
-        or times[0] != 0.0
-        or (np.diff(times) <= 0.0).any()
-    ):
-        raise InvalidValueError(
-            "knots", f"be 4 to {MOST_KNOTS} increasing times >= 0", times.tolist()
-        )
+    increasing = times[:1] == 0.0 and (np.diff(times) > 0.0).all()
+    if not (4 <= len(times) <= MOST_KNOTS and increasing):
+        rule = f"be 4 to {MOST_KNOTS} increasing times >= 0"
+        raise InvalidValueError("knots", rule, times.tolist())
     if times[-1] >= scene.t_end:
-        raise InvalidValueError(
-            "knots", f"end before the scene does, at {scene.t_end:g} s", times.tolist()
-        )
+        rule = f"end before the scene does, at {scene.t_end:g} s"
+        raise InvalidValueError("knots", rule, times.tolist())
     return [times]
 
 
@@ -415,7 +378,6 @@ def _bounds(bounds: Any, holding: float) -> tuple[float, float]:
         return 0.02 * holding, 4.0 * holding
     low, high = validation.non_negative_array("bounds", bounds, (2,)).tolist()
     if not low < high:
-        raise InvalidValueError(
-            "bounds", "be the least and the largest normal force", [low, high]
-        )
+        rule = "be the least and the largest normal force"
+        raise InvalidValueError("bounds", rule, [low, high])
     return low, high

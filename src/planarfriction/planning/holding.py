@@ -78,36 +78,28 @@ def holding_load(
         return 0.0
     if not patch.depends_on_load:
         return (1.0 + margin) * _needed(load, patch, mu, None)
-    reach = float(np.hypot(*patch.positions.T).max())
-    metric = (
-        1.0
-        if patch.root is None
-        else float(np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max())
-    )
+    reach = np.hypot(*patch.positions.T).max()
+    metric = 1.0
+    if patch.root is not None:
+        metric = np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max()
     # Bounds friction over mu.
-    strongest = metric * (1.0 + float(np.hypot(*patch.asymmetries().T).max()))
-    low = max(float(np.hypot(*load[:2])), abs(float(load[2])) / reach) / (
-        mu * strongest
-    )
+    strongest = metric * (1.0 + np.hypot(*patch.asymmetries().T).max())
+    force = max(np.hypot(*load[:2]), abs(load[2]) / reach)
+    low = float(force / (mu * strongest))
     tried = low * (1.0 - 1e-9)
     for _ in range(_STEPS):
         if _needed(load, patch, mu, tried) <= tried:
             break
         tried, low = _STEP * tried, tried
     else:
-        raise InvalidValueError(
-            "wrench",
-            "be a load that this patch holds at some normal force",
-            load.tolist(),
-        )
-    if tried <= low:
-        return (1.0 + margin) * tried
-    from scipy.optimize import brentq
+        rule = "be a load that this patch holds at some normal force"
+        raise InvalidValueError("wrench", rule, load.tolist())
+    if tried > low:
+        from scipy.optimize import brentq
 
-    found = brentq(
-        lambda each: each - _needed(load, patch, mu, each), low, tried, xtol=1e-12 * low
-    )
-    return (1.0 + margin) * float(found)  # pyright: ignore[reportArgumentType]
+        off = lambda each: each - _needed(load, patch, mu, each)
+        tried: Any = brentq(off, low, tried, xtol=1e-12 * low)
+    return (1.0 + margin) * tried
 
 
 def _needed(
@@ -157,56 +149,48 @@ def dynamic_holding_load(
     checked_model("model", model)
     ramp = validation.non_negative("ramp", ramp)
     margin = validation.non_negative("margin", margin)
-    if not model.law.holds_at_rest:
-        raise InvalidValueError(
-            "model", "have a law that holds at rest", type(model.law).__name__
-        )
+    law = model.law
+    if not law.holds_at_rest:
+        rule = "have a law that holds at rest"
+        raise InvalidValueError("model", rule, type(law).__name__)
     fall = validation.number("fall", fall)
     if fall < 1.0 + CLOSE:
         raise InvalidValueError("fall", f"be at least {1.0 + CLOSE:g}", fall)
-    slow = holding_load(load, model.patch, model.law.numbers.mu_s)
+    slow = holding_load(load, model.patch, law.numbers.mu_s)
     if slow == 0.0:
         return 0.0
     # Soft fingers shrink to a point.
-    radius = max(float(model.patch.contact_radius(slow)), SLIP)
+    radius = max(model.patch.contact_radius(slow), SLIP)
     if mass is None:
         mass = float(np.linalg.norm(load / [1.0, 1.0, radius])) / GRAVITY
     mass = validation.positive("mass", mass)
-    inertia = (
-        mass * radius**2 if inertia is None else validation.positive("inertia", inertia)
-    )
+    if inertia is None:
+        inertia = mass * radius**2
+    inertia = validation.positive("inertia", inertia)
     body = Body(mass, inertia, gravity=(0.0, 0.0))
 
     def slips(share: float) -> bool:
-        return _slips(
-            model, body, load, _falling(max(fall, share) * slow, share * slow, ramp)
-        )
+        grip = _falling(max(fall, share) * slow, share * slow, ramp)
+        return _slips(model, body, load, grip)
 
     return (1.0 + margin) * slow * _least_share(slips)
 
 
 def _least_share(slips: Any) -> float:
     """Return a share of a load at which `slips` is false, within `CLOSE` of one at which it is true."""
-    low = high = 1.0
-    step = 1.0 + FIRST_STEP
-    if slips(1.0):
-        while slips(high := low * step):
-            low = high
-            step = step**2
-            if high > WIDEST:
-                raise InvalidValueError(
-                    "wrench",
-                    f"be held within {WIDEST:g} times the holding_load",
-                    "a slip",
-                )
-    else:
-        while not slips(low := high / step):
-            high = low
-            step = step**2
-            if low < 1.0 / WIDEST:
-                raise InvalidValueError(
-                    "model", f"let go below 1/{WIDEST:g} of the holding_load", "no slip"
-                )
+    share = 1.0
+    at_first = slips(share)
+    factor = (1.0 + FIRST_STEP) ** (1 if at_first else -1)
+    while slips(share * factor) == at_first:
+        share = share * factor
+        factor = factor**2
+        if share > WIDEST:
+            rule = f"be held within {WIDEST:g} times the holding_load"
+            raise InvalidValueError("wrench", rule, "a slip")
+        if share < 1.0 / WIDEST:
+            rule = f"let go below 1/{WIDEST:g} of the holding_load"
+            raise InvalidValueError("model", rule, "no slip")
+    low, high = sorted((share, share * factor))
     while high - low > CLOSE:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if slips(middle) else (low, middle)
@@ -222,15 +206,14 @@ def _falling(high: float, low: float, ramp: float) -> Signal:
 
 def _slips(model: Any, body: Body, load: np.ndarray, grip: Signal) -> bool:
     """Return True if a body under a constant load `[3]` slips as the grip changes."""
-    end = float(grip.times[-1]) + AFTER
-    scene = Scene(
-        body, Contact(model, grip), end, force=load, save_every=end, start="equilibrium"
-    )
+    end = grip.times[-1] + AFTER
+    contact = Contact(model, grip)
+    scene = Scene(body, contact, end, force=load, save_every=end, start="equilibrium")
     data = simulate(scene).data
-    force = float(grip.values[-1])
-    x, y, theta = (float(data[name][-1]) for name in ("x", "y", "theta"))
-    dx, dy, _ = twist_at(np.array([x, y, theta]), model.patch.centre_of_pressure(force))
-    moved = np.hypot(dx, dy) + float(model.patch.contact_radius(force)) * abs(theta)
+    force = grip.values[-1]
+    moved = np.array([data[name][-1] for name in ("x", "y", "theta")])
+    dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(force))
+    way = np.hypot(dx, dy) + model.patch.contact_radius(force) * abs(theta)
     numbers = model.law.numbers
-    bends = numbers.mu_s / (numbers.sigma_0 * float(model.law.stiffness_factor(force)))
-    return bool(moved > bends + SLIP)
+    bends = numbers.mu_s / (numbers.sigma_0 * model.law.stiffness_factor(force))
+    return bool(way > bends + SLIP)

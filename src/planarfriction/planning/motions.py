@@ -71,7 +71,7 @@ class Aim(NamedTuple):
             slide = SHIFT * self.radius
             angle = ANGLE * abs(self.angle)
         else:
-            slide = 1e-3 * float(np.hypot(*self.slide))
+            slide = 1e-3 * np.hypot(*self.slide)
             angle = TURN
         return np.array([SPEED, SPEED, SPEED / self.radius, slide, slide, angle])
 
@@ -90,7 +90,8 @@ class Grips:
         self.scene = scene
         self.index = contact
         self.name = f"{scene.contacts[contact].name}.normal_force"
-        for law in (each.model.law for each in scene.contacts):
+        for each in scene.contacts:
+            law = each.model.law
             if not (hasattr(law, "mu_c") or hasattr(law, "mu_s")):
                 rule = "have mu_c and mu_s to plan with uncertain friction"
                 raise InvalidValueError("law", rule, type(law).__name__)
@@ -99,7 +100,7 @@ class Grips:
             for factor in factors
         }
         held = scene.start == "equilibrium"
-        self.first = float(scene.contacts[contact].normal_force(0.0)) if held else None
+        self.first = scene.contacts[contact].normal_force(0.0) if held else None
         """Normal force that holds the body at first [N]; None where it may be any."""
         self._simulated: list[int] = []  # of several threads
         self.jacobians = 0
@@ -112,9 +113,8 @@ class Grips:
     def scene_of(self, profile: Signal, factor: float = 1.0) -> Scene:
         """Return the scene with the profile in place."""
         contacts = list(self._members[factor])
-        contacts[self.index] = dataclasses.replace(
-            contacts[self.index], normal_force=profile
-        )
+        own = contacts[self.index]
+        contacts[self.index] = dataclasses.replace(own, normal_force=profile)
         return dataclasses.replace(self.scene, contacts=contacts)
 
     def ends(
@@ -126,16 +126,9 @@ class Grips:
         def one(factor: float) -> np.ndarray:
             scene = self.scene_of(profile, factor)
             histories = simulate(scene, rtol=rtol, save_every=scene.t_end).histories
-            last = np.array(
-                [float(np.asarray(histories[name].values)[-1]) for name in STATES]
-            )
-            return np.array(
-                [
-                    *last[:3],
-                    *slide_of(scene, self.index, last[3:]),
-                    last[5] - scene.body.angle,
-                ]
-            )
+            last = np.array([histories[name].values[-1] for name in STATES])
+            slide = slide_of(scene, self.index, last[3:])
+            return np.array([*last[:3], *slide, last[5] - scene.body.angle])
 
         return threads.each(one, factors)
 
@@ -150,11 +143,8 @@ class Grips:
             found = scene_sensitivities(scene, (), signals=knots, options=options)
             slopes = found.d_motion[-1].copy()
             pose = found.motion[-1, 3:]
-            x, y = (
-                slide_of(scene, self.index, pose)
-                + grip_position(scene, self.index)
-                - pose[:2]
-            )
+            place = grip_position(scene, self.index) - pose[:2]
+            x, y = slide_of(scene, self.index, pose) + place
             slopes[3:5] += np.outer([-y, x], slopes[5])
             return slopes
 
@@ -173,11 +163,8 @@ def grip_position(scene: Scene, contact: int) -> np.ndarray:
 def slide_of(scene: Scene, contact: int, pose: np.ndarray) -> np.ndarray:
     """Return the displacement `[..., 2]` [m] of the place that was under a contact, at poses `[..., 3]`."""
     grip = grip_position(scene, contact)
-    return (
-        pose[..., :2]
-        + rotate(grip - scene.body.position, pose[..., 2] - scene.body.angle)
-        - grip
-    )
+    arm = rotate(grip - scene.body.position, pose[..., 2] - scene.body.angle)
+    return pose[..., :2] + arm - grip
 
 
 def load_on(
@@ -196,10 +183,8 @@ def load_on(
         body, position=at, angle=body.angle + angle, velocity=(0.0, 0.0, 0.0)
     )
     there = dataclasses.replace(scene, body=moved, start="rest")
-    return (
-        np.linalg.solve(contact_map(there, chosen).T, pull_on(scene, moved, time))
-        / chosen.count
-    )
+    pull = pull_on(scene, moved, time)
+    return np.linalg.solve(contact_map(there, chosen).T, pull) / chosen.count
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -241,22 +226,20 @@ class GripReport(ByValue):
         return float(np.hypot(*(self.slides - self.goal["slide"]).T).max())
 
     def __str__(self) -> str:
-        turns = "angle" in self.goal
-        if turns:
+        if "angle" in self.goal:
             wanted = f"turn by {np.rad2deg(self.goal['angle']):.4g} degrees"
             per = f"{np.rad2deg(self.per_percent):.2g} degrees"
         else:
-            wanted = "slide by ({:.4g}, {:.4g}) mm".format(
-                *(1e3 * np.array(self.goal["slide"]))
-            )
+            x, y = 1e3 * np.array(self.goal["slide"])
+            wanted = f"slide by ({x:.4g}, {y:.4g}) mm"
             per = f"{1e3 * self.per_percent:.2g} mm"
-        lines = [f"Grip plan: {wanted}.", ""]
-        lines += [
-            f"{'friction':>9}{'turn [deg]':>13}{'slide x [mm]':>15}{'slide y [mm]':>15}"
+        lines = [
+            f"Grip plan: {wanted}.",
+            "",
+            f"{'friction':>9}{'turn [deg]':>13}{'slide x [mm]':>15}{'slide y [mm]':>15}",
         ]
-        for factor, angle, (x, y) in zip(
-            self.frictions, self.angles, self.slides, strict=True
-        ):
+        both = zip(self.frictions, self.angles, self.slides, strict=True)
+        for factor, angle, (x, y) in both:
             change = f"{100.0 * (factor - 1.0):+.3g} %" if factor != 1.0 else "nominal"
             lines.append(
                 f"{change:>9}{np.rad2deg(angle):>13.3f}{1e3 * x:>15.3f}{1e3 * y:>15.3f}"
@@ -264,12 +247,8 @@ class GripReport(ByValue):
         lines += [
             "",
             f"An error of one percent in friction changes the result by {per}.",
-        ]
-        lines += [
-            f"The final grip is {self.grip:.3g} N, {self.grip / self.holding:.2f} times the holding force."
-        ]
-        lines += [
-            f"{self.simulations} simulations, {self.jacobians} Jacobians, {self.wall_time:.2g} s."
+            f"The final grip is {self.grip:.3g} N, {self.grip / self.holding:.2f} times the holding force.",
+            f"{self.simulations} simulations, {self.jacobians} Jacobians, {self.wall_time:.2g} s.",
         ]
         return "\n".join(lines)
 
@@ -286,17 +265,12 @@ def report_of(
 ) -> GripReport:
     """Return the report on the ends `[6]` of a plan, one for each friction (see `motions.Aim`)."""
     less, end, more = (ends[frictions.index(each)] for each in (0.99, 1.0, 1.01))
-    goal = (
-        {"slide": tuple(aim.slide.tolist())}
-        if aim.angle is None
-        else {"angle": aim.angle}
-    )
-    per_percent = (
-        abs(aim.progress(more) - aim.progress(less))
-        / 2.0
-        * float(np.linalg.norm(aim.end))
-    )
+    goal = {"angle": aim.angle}
+    if aim.angle is None:
+        goal = {"slide": tuple(aim.slide.tolist())}
+    change = 0.5 * abs(aim.progress(more) - aim.progress(less))
     speed = float(np.linalg.norm(end[:3] * [1.0, 1.0, aim.radius]))
+    per_percent = change * float(np.linalg.norm(aim.end))
     every = np.array(ends)
     of_nominal = goal, float(end[5]), end[3:5], speed, grip, holding
     return GripReport(

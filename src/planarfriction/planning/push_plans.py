@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 import warnings
@@ -39,7 +40,7 @@ ROUNDS = 2
 """Times that a plan aims beside the goal by what the spline and its lines have
 missed."""
 
-_TURNS = ((-0.7, 0.0, 0.7), (0.7, 0.0, -0.7), (0.7, 0.0, 0.7), (-0.7, 0.0, -0.7))
+_TURNS = 0.7 * np.array([[-1, 0, 1], [1, 0, -1], [1, 0, 1], [-1, 0, -1]])
 """Forces that a search begins with, as shares of the angle that they may have."""
 
 REACHED = 1e-6
@@ -71,19 +72,19 @@ class PushReport:
     """Computing time of the plan [s]."""
 
     def __str__(self) -> str:
-        rows = (
-            ("goal", self.goal),
-            ("reached", self.end),
-            ("with an ellipsoid", self.ellipsoid_end),
-        )
+        rows = {
+            "goal": self.goal,
+            "reached": self.end,
+            "with an ellipsoid": self.ellipsoid_end,
+        }
         lines = [f"{'':18}{'x [mm]':>10}{'y [mm]':>10}{'turn [deg]':>12}"]
-        lines += [
-            f"{name:18}{1e3 * x:>10.2f}{1e3 * y:>10.2f}{math.degrees(a):>12.2f}"
-            for name, (x, y, a) in rows
-        ]
-        lines += [
+        for name, (x, y, a) in rows.items():
+            lines.append(
+                f"{name:18}{1e3 * x:>10.2f}{1e3 * y:>10.2f}{math.degrees(a):>12.2f}"
+            )
+        lines.append(
             f"{1e3 * self.length:.4g} mm long, on edge {self.edge}, using {self.used:.0%} of the friction cone."
-        ]
+        )
         return "\n".join(lines)
 
 
@@ -133,43 +134,38 @@ def plan_push(
     validation.instance("slider", slider, Slider, "a Slider")
     validation.instance("pusher", pusher, Pusher, "a Pusher")
     if pusher.width > 0.0 or pusher.mu == 0.0:
-        raise InvalidValueError(
-            "pusher", "be a point with friction, for a plan", pusher
-        )
+        rule = "be a point with friction, for a plan"
+        raise InvalidValueError("pusher", rule, pusher)
     start = validation.vector("start", start, 3)
     goal = validation.vector("goal", goal, 3)
     margin = validation.number("margin", margin)
     if not 0.0 <= margin < 1.0:
         raise InvalidValueError("margin", "be >= 0 and < 1", margin)
     count = len(slider.outline)
-    chosen = (
-        range(count)
-        if edges is None
-        else [validation.count("edges", each, 0, count - 1) for each in edges]
-    )
+    chosen: Any = range(count) if edges is None else edges
+    chosen = [validation.count("edges", each, 0, count - 1) for each in chosen]
     begin = time.perf_counter()
-    largest = (1.0 - margin) * math.atan(pusher.mu)
+    cone = math.atan(pusher.mu)
+    largest = (1.0 - margin) * cone
     if not np.any(goal - start):
         raise InvalidValueError("goal", "differ from the start", goal.tolist())
     aim = _relative(start, goal)
     found = []
     for shares in PLACES:
-        for edge in chosen:
+        for edge, share in itertools.product(chosen, shares):
             corner = slider.outline[edge]
-            end = slider.outline[(edge + 1) % count]
-            for at in (corner + share * (end - corner) for share in shares):
-                length, x = _shortest(
-                    slider, TouchPoint(at, slider.inward[edge]), largest, aim
-                )
-                found += [(length, x, edge, at)] if length < math.inf else []
+            at = corner + share * (slider.outline[(edge + 1) % count] - corner)
+            place = TouchPoint(at, slider.inward[edge])
+            length, x = _shortest(slider, place, largest, aim)
+            if length < math.inf:
+                found.append((length, x, edge, place))
         if found:
             break
     if not found:
         raise SolverError(
             "no plan reaches the goal: try other edges, a smaller margin or a pose further ahead"
         )
-    length, x, edge, at = min(found, key=lambda each: each[0])
-    place = TouchPoint(at, slider.inward[edge])
+    length, x, edge, place = min(found, key=lambda each: each[0])
     path = _path(slider, place, x, start)
     done = push(slider, pusher, path, start=start)
     for _ in range(ROUNDS):
@@ -179,25 +175,33 @@ def plan_push(
             break
         tried = _path(slider, place, x, start)
         both = (path, done), (tried, push(slider, pusher, tried, start=start))
-        path, done = min(
-            both,
-            key=lambda e: np.abs((e[1].end - goal) * [1.0, 1.0, slider.size]).max(),
-        )
-    ellipsoid = LimitSurfaceEllipsoid(
-        slider.surface.patch, normal_force=slider.surface.normal_force
+        scale = [1.0, 1.0, slider.size]
+        path, done = min(both, key=lambda e: np.abs((e[1].end - goal) * scale).max())
+    surface = slider.surface
+    rest = push(
+        Slider(
+            LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force),
+            slider.outline,
+        ),
+        pusher,
+        path,
+        start=start,
     )
-    rest = push(Slider(ellipsoid, slider.outline), pusher, path, start=start)
+    goal, end, ellipsoid_end, at = (
+        tuple(each.tolist()) for each in (goal, done.end, rest.end, place.at)
+    )
     report = PushReport(
-        _triple(goal), _triple(done.end), _triple(rest.end), edge, (float(at[0]), float(at[1])), length,
-        float(np.abs(x[:PARTS]).max() / math.atan(pusher.mu)), bool((done.mode[1:] == STICK).all()),
+        goal,
+        end,
+        ellipsoid_end,
+        edge,
+        at,
+        length,
+        float(np.abs(x[:PARTS]).max() / cone),
+        bool((done.mode[1:] == STICK).all()),
         time.perf_counter() - begin,
-    )  # fmt: skip
+    )
     return PushPlan(path, done, report)
-
-
-def _triple(values: np.ndarray) -> tuple[float, float, float]:
-    x, y, angle = (float(value) for value in values)
-    return x, y, angle
 
 
 def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
@@ -209,7 +213,7 @@ def _moved(pose: np.ndarray, twist: np.ndarray, distance: float) -> np.ndarray:
     """Return a pose after a twist of its own axes has been held: an arc."""
     vx, vy, omega = twist.tolist()
     half = 0.5 * distance * omega
-    (x, y, angle) = pose.tolist()
+    x, y, angle = pose.tolist()
     chord = distance * (math.sin(half) / half if abs(half) > 1e-12 else 1.0)
     c = chord * math.cos(angle + half)
     s = chord * math.sin(angle + half)
@@ -247,29 +251,26 @@ def _shortest(
         return x[PARTS:].sum()
 
     far = max(math.hypot(goal[0], goal[1]) / unit, 0.3)
-    bounds = [(-largest, largest)] * PARTS + [(0.0, 10.0 * far + 20.0)] * PARTS
+    low = np.repeat([-largest, 0.0], PARTS)
+    high = np.repeat([largest, 10.0 * far + 20.0], PARTS)
     slope = np.repeat([0.0, 1.0], PARTS)
     best = math.inf
     found = np.zeros(2 * PARTS)
-    begins = [
-        np.array([largest * each for each in turns] + [0.4 * far] * PARTS)
-        for turns in _TURNS
-    ]
+    begins = [np.append(largest * turns, [0.4 * far] * PARTS) for turns in _TURNS]
     for begin in begins if known is None else [known]:
         # Older SciPy rounds beyond the bounds.
         with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
             run = minimize(
-                length, begin, jac=lambda x: slope, method="SLSQP", bounds=bounds,
-                constraints={"type": "eq", "fun": miss}, options={"ftol": 1e-6, "maxiter": 30},
-            )  # fmt: skip
-        low, high = np.transpose(bounds)
-        x = least_squares(
-            miss,
-            np.clip(run.x, low + 1e-9, high - 1e-9),
-            bounds=(low, high),
-            xtol=1e-14,
-            ftol=1e-14,
-        ).x
+                length,
+                begin,
+                jac=lambda x: slope,
+                method="SLSQP",
+                bounds=np.stack([low, high], -1),
+                constraints={"type": "eq", "fun": miss},
+                options={"ftol": 1e-6, "maxiter": 30},
+            )
+        inside = np.clip(run.x, low + 1e-9, high - 1e-9)
+        x = least_squares(miss, inside, bounds=(low, high), xtol=1e-14, ftol=1e-14).x
         if np.abs(miss(x)).max() < REACHED and length(x) < best:
             best = length(x)
             found = x
@@ -288,10 +289,10 @@ def _path(
         if distance < 1e-9:
             continue
         twist = _twist(slider, place, angle)
-        for share in np.linspace(0.0, 1.0, CHORDS + 1)[0 if not times else 1 :]:
-            here = _moved(pose, twist, share * distance)
+        for way in np.linspace(0.0, distance, CHORDS + 1)[1 if times else 0 :]:
+            here = _moved(pose, twist, way)
             at.append(here[:2] + rotate(place.at, here[2]))
-            times.append(now + share * distance)
+            times.append(now + way)
         pose = _moved(pose, twist, distance)
         now = now + distance
     return Signal.sampled(times, at, "linear")

@@ -19,6 +19,7 @@ from planarfriction.planning.contact_modes import (
     STICK,
     TouchPoint,
     motion_at,
+    rotation,
 )
 from planarfriction.planning.slider import (
     FACE,
@@ -123,21 +124,19 @@ def push(
     validation.instance("slider", slider, Slider, "a Slider")
     validation.instance("pusher", pusher, Pusher, "a Pusher")
     if not isinstance(path, Signal) or path.hold != "linear" or len(path.times) < 2:
-        raise InvalidValueError(
-            "path", 'be a Signal of two samples or more with hold="linear"', path
-        )
-    path = as_signal(
-        "path", path, 2 if path.columns == 2 and pusher.width == 0.0 else 3
-    )
-    start = validation.vector("start", start, 3).astype(float)
+        rule = 'be a Signal of two samples or more with hold="linear"'
+        raise InvalidValueError("path", rule, path)
+    of_point = path.columns == 2 and pusher.width == 0.0
+    path = as_signal("path", path, 2 if of_point else 3)
+    start = validation.vector("start", start, 3)
     count = validation.count("samples", samples, 2, MOST_SAMPLES)
     rtol = validation.positive("rtol", rtol)
     poses = path.values if path.columns == 3 else np.pad(path.values, ((0, 0), (0, 1)))
     scenery = Scenery(slider, pusher, path.times, poses)
     time = np.linspace(path.times[0], path.times[-1], count)
-    found = _follow(scenery, start, time, rtol)
+    pose, modes, places = _follow(scenery, start, time, rtol)
     at = np.array([scenery.pose(t) for t in time])
-    return Push(slider, pusher, time, found[0], at, np.array(found[1]), found[2])
+    return Push(slider, pusher, time, pose, at, np.array(modes), places)
 
 
 def _follow(
@@ -155,25 +154,25 @@ def _follow(
         raise InvalidValueError(
             "path", "begin outside the slider", scenery.pose(time[0]).tolist()
         )
-    now = float(time[0])
-    q = start.copy()
+    now = time[0]
+    q = start
     held = ""
     contact: Touch | None = None
     restless = 0
     for _ in range(MOST_PHASES):
         if now >= time[-1]:
-            return poses, modes, places
+            break
         if contact is None:
             poses[time > now] = q
             touched = touch_after(scenery, now, q)
             if touched is None:
-                return poses, modes, places
-            (now, contact) = touched
+                break
+            now, contact = touched
             held = ""
         end = scenery.piece_end(now)
         place, velocity = place_of(scenery, contact, now, q, forward=True)
         if velocity[:2] @ place.normal <= 0.0:
-            now = float(np.nextafter(now, np.inf))
+            now = np.nextafter(now, np.inf)
             contact = None
             continue
         first = motion_at(slider.surface, place, mu, velocity)
@@ -188,33 +187,29 @@ def _follow(
             continue
         mode = "" if restless >= RESTLESS and not place.half_width else mode
         rate, ends = _phase(scenery, contact, mode)
-        options = {
-            "rtol": rtol,
-            "atol": rtol * np.array([slider.size, slider.size, 1.0]),
-            "first_step": end - now,
-        }
         run = solve_ivp(
             rate,
             (now, end),
             q,
-            events=list(ends.values()),
+            events=[*ends.values()],
             dense_output=True,
-            **options,
+            rtol=rtol,
+            atol=rtol * np.array([slider.size, slider.size, 1.0]),
+            first_step=end - now,
         )
         here = (time > now) & (time <= run.t[-1]) | (time == now)
-        if here.any():
-            poses[here] = run.sol(time[here]).T
-            for k in np.flatnonzero(here):
-                place, velocity = place_of(scenery, contact, time[k], poses[k])
-                modes[k] = (
-                    mode
-                    if mode and mu > 0.0
-                    else motion_at(slider.surface, place, mu, velocity).mode
-                )
-                places[k] = place.at
+        for k in np.flatnonzero(here):
+            poses[k] = run.sol(time[k])
+            place, velocity = place_of(scenery, contact, time[k], poses[k])
+            modes[k] = (
+                mode
+                if mode and mu > 0.0
+                else motion_at(slider.surface, place, mu, velocity).mode
+            )
+            places[k] = place.at
         restless = restless + 1 if run.t[-1] - now < STILL * (time[-1] - time[0]) else 0
         q = run.y[:, -1].copy()
-        now = float(run.t[-1])
+        now = run.t[-1]
         poses[time > now] = q
         if run.status == 0:
             continue
@@ -227,11 +222,10 @@ def _follow(
             contact = scenery.flush(now, q)
         else:
             contact = None
-    raise InvalidValueError(
-        "path",
-        f"change the contact of the pusher at most {MOST_PHASES} times",
-        f"t = {now:g} s",
-    )
+    else:
+        rule = f"change the contact of the pusher at most {MOST_PHASES} times"
+        raise InvalidValueError("path", rule, f"t = {now:g} s")
+    return poses, modes, places
 
 
 def _neighbour(
@@ -240,11 +234,8 @@ def _neighbour(
     """Return the mode after one that has come to its end, where rounding still takes it for the old one."""
     if held != STICK:
         return STICK
-    left, right = (
-        motion_at(slider.surface, place, mu, velocity, mode).slack
-        for mode in (LEFT, RIGHT)
-    )
-    return LEFT if left > right else RIGHT
+    slack = lambda mode: motion_at(slider.surface, place, mu, velocity, mode).slack
+    return LEFT if slack(LEFT) > slack(RIGHT) else RIGHT
 
 
 def _phase(scenery: Scenery, contact: Touch, mode: str) -> tuple[Any, dict[str, Any]]:
@@ -253,17 +244,13 @@ def _phase(scenery: Scenery, contact: Touch, mode: str) -> tuple[Any, dict[str, 
     @functools.lru_cache(maxsize=1)
     def motion(t: float, *q: float) -> tuple[Any, Any, np.ndarray]:
         place, velocity = place_of(scenery, contact, t, np.array(q))
-        return (
-            motion_at(scenery.slider.surface, place, scenery.pusher.mu, velocity, mode),
-            place,
-            velocity,
-        )
+        surface = scenery.slider.surface
+        found = motion_at(surface, place, scenery.pusher.mu, velocity, mode)
+        return found, place, velocity
 
     def rate(t: float, q: np.ndarray) -> np.ndarray:
-        vx, vy, omega = motion(t, *q)[0].twist
-        c = np.cos(q[2])
-        s = np.sin(q[2])
-        return np.array([c * vx - s * vy, s * vx + c * vy, omega])
+        twist = motion(t, *q)[0].twist
+        return np.append(rotation(q[2]) @ twist[:2], twist[2])
 
     def approach(t: float, q: np.ndarray) -> float:
         _, place, velocity = motion(t, *q)

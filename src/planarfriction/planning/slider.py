@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Checked, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
-from planarfriction.planning.contact_modes import TouchPoint
+from planarfriction.planning.contact_modes import TouchPoint, rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,24 +33,15 @@ class Slider(ByValue):
         validation.instance("surface", self.surface, LimitSurface, "a limit surface")
         corners = validation.array("outline", self.outline, (None, 2))
         if len(corners) < 3:
-            raise InvalidValueError(
-                "outline", "have at least 3 points", f"{len(corners)}"
-            )
-        edges = np.roll(corners, -1, axis=0) - corners
-        turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(
-            edges[:, 0], -1
-        )
-        winding = np.angle(
-            np.roll(edges, -1, axis=0)
-            @ [1, 1j]
-            / np.where(edges.any(1), edges @ [1, 1j], 1)
-        ).sum()
-        if not ((turns > 0.0).all() or (turns < 0.0).all()) or abs(winding) > 7.0:
-            raise InvalidValueError(
-                "outline",
-                "be convex, without three corners on a line",
-                "another polygon",
-            )
+            found = f"{len(corners)}"
+            raise InvalidValueError("outline", "have at least 3 points", found)
+        edges = (np.roll(corners, -1, axis=0) - corners) @ [1.0, 1.0j]
+        turns = np.imag(np.roll(edges, -1) * edges.conj())
+        winding = np.angle(np.roll(edges, -1) / np.where(edges, edges, 1.0)).sum()
+        convex = (turns > 0.0).all() or (turns < 0.0).all()
+        if not convex or abs(winding) > 7.0:
+            rule = "be convex, without three corners on a line"
+            raise InvalidValueError("outline", rule, "another polygon")
         if turns[0] < 0.0:
             corners = corners[::-1].copy()
         corners.setflags(write=False)
@@ -77,9 +68,8 @@ class Slider(ByValue):
 
         Raises `InvalidValueError` unless it is a point.
         """
-        return np.einsum(
-            "mi,mi->m", self.outline - validation.vector("point", point, 2), self.inward
-        )
+        away = self.outline - validation.vector("point", point, 2)
+        return (away * self.inward).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -134,7 +124,7 @@ class Scenery:
         self.pusher = pusher
         self._times = times
         self._poses = poses
-        self.path_end = float(times[-1])
+        self.path_end = times[-1]
         self._rates = np.diff(poses, axis=0) / np.diff(times)[:, None]
         self._ends = pusher.ends
         self.near = _NEAR * slider.size
@@ -147,33 +137,25 @@ class Scenery:
         return self._poses[i] + (t - self._times[i]) * self._rates[i]
 
     def _piece(self, t: float, forward: bool = False) -> int:
-        i = (
-            int(np.searchsorted(self._times, t, side="right" if forward else "left"))
-            - 1
-        )
+        side = "right" if forward else "left"
+        i = int(np.searchsorted(self._times, t, side)) - 1
         return min(max(i, 0), len(self._rates) - 1)
 
     def piece_end(self, t: float) -> float:
         """Return the time at which the line ends that the pusher follows from a time on."""
-        return float(self._times[self._piece(t, forward=True) + 1])
+        return self._times[self._piece(t, forward=True) + 1]
 
     def end(self, i: int, t: float, q: np.ndarray) -> np.ndarray:
         """Return an end of the pusher in the slider's axes `[2]`."""
-        x, y, angle = self.pose(t)
-        (a, b) = self._ends[i]
-        c = math.cos(angle)
-        s = math.sin(angle)
-        return _inside(q, x + c * a - s * b, y + s * a + c * b)
+        pose = self.pose(t)
+        world = pose[:2] + rotation(pose[2]) @ self._ends[i]
+        return (world - q[:2]) @ rotation(q[2])
 
     def corners(self, t: float, q: np.ndarray) -> np.ndarray:
         """Return the corners of the slider in the pusher's axes `[M, 2]`."""
-        c = math.cos(q[2])
-        s = math.sin(q[2])
-        world = self.slider.outline @ np.array([[c, s], [-s, c]]) + q[:2]
-        x, y, angle = self.pose(t)
-        c = math.cos(angle)
-        s = math.sin(angle)
-        return (world - [x, y]) @ np.array([[c, -s], [s, c]])
+        pose = self.pose(t)
+        world = q[:2] + self.slider.outline @ rotation(q[2]).T
+        return (world - pose[:2]) @ rotation(pose[2])
 
     def features(self, t: float, q: np.ndarray) -> list[tuple[float, Touch]]:
         """Return everything that may touch, with its distance [m]."""
@@ -181,13 +163,12 @@ class Scenery:
         for i in range(len(self._ends)):
             gaps = self.slider.gaps(self.end(i, t, q))
             edge = int(gaps.argmax())
-            found.append((float(gaps[edge]), Touch(END, edge, i)))
+            found.append((gaps[edge], Touch(END, edge, i)))
         half = 0.5 * self.pusher.width
-        if half > 0.0:
-            # a corner behind the face's line by more than the face is wide is on its back
-            for k, (ahead, aside) in enumerate(self.corners(t, q)):
-                if abs(aside) <= (1.0 + _NEAR) * half and ahead > -half:
-                    found.append((float(ahead), Touch(CORNER, k)))
+        # a corner behind the face's line by more than the face is wide is on its back
+        for k, (ahead, aside) in enumerate(self.corners(t, q) if half > 0.0 else ()):
+            if abs(aside) <= (1.0 + _NEAR) * half and ahead > -half:
+                found.append((ahead, Touch(CORNER, k)))
         return found
 
     def gap(self, t: float, q: np.ndarray) -> float:
@@ -200,40 +181,27 @@ class Scenery:
 
         ends = [self.end(i, t, q) for i in range(len(self._ends))]
         pusher = shapely.Point(ends[0]) if len(ends) == 1 else shapely.LineString(ends)
-        away = max(
-            shapely.distance(shapely.Polygon(self.slider.outline), pusher),
-            _LEAST * self.slider.size,
-        )
+        away = shapely.distance(shapely.Polygon(self.slider.outline), pusher)
+        away = max(away, _LEAST * self.slider.size)
         vx, vy, omega = self.rate(t, forward=True)
-        speed = math.hypot(vx, vy) + abs(omega) * float(
-            np.hypot(*np.transpose(self._ends)).max()
-        )
+        speed = math.hypot(vx, vy) + abs(omega) * 0.5 * self.pusher.width
         end = self.piece_end(t)
         return min(end, t + away / speed) if speed * (end - t) > away else end
 
     def clear(self, contact: Touch, t: float, q: np.ndarray) -> float:
         """Return the distance of all that does not touch yet [m]."""
+        features = self.features(t, q)
         return (
-            min(
-                gap
-                for gap, each in self.features(t, q)
-                if not _same(contact, each, len(self._lengths))
-            )
-            + self.near
+            min(gap for gap, each in features if not _same(contact, each)) + self.near
         )
 
     def flush(self, t: float, q: np.ndarray) -> Touch:
         """Return the face at the edge that it has closed with."""
-        c = math.cos(self.pose(t)[2] - q[2])
-        s = math.sin(self.pose(t)[2] - q[2])
-        along = self.slider.inward @ [c, s]
-        edge = int(along.argmax())
-        if math.acos(min(along[edge], 1.0)) > _FLUSH:
-            raise InvalidValueError(
-                "path",
-                "not wedge the slider between two points of the face",
-                f"t = {t:g} s",
-            )
+        facing = self.slider.inward @ rotation(self.pose(t)[2] - q[2])[:, 0]
+        edge = int(facing.argmax())
+        if math.acos(min(facing[edge], 1.0)) > _FLUSH:
+            rule = "not wedge the slider between two points of the face"
+            raise InvalidValueError("path", rule, f"t = {t:g} s")
         return Touch(FACE, edge)
 
     def within(self, contact: Touch, t: float, q: np.ndarray) -> float:
@@ -248,7 +216,7 @@ class Scenery:
 
     def along(self, edge: int, point: np.ndarray) -> float:
         """Return the position of a point along an edge [m]."""
-        return float((point - self.slider.outline[edge]) @ self.slider.along[edge])
+        return (point - self.slider.outline[edge]) @ self.slider.along[edge]
 
     def overlap(self, edge: int, t: float, q: np.ndarray) -> tuple[float, float]:
         """Return the part of an edge that the face covers, from its left to its right end as it looks [m]."""
@@ -260,22 +228,11 @@ class Scenery:
         return self._rates[self._piece(t, forward)]
 
 
-def _inside(q: np.ndarray, x: float, y: float) -> np.ndarray:
-    """Return a point of the world in the axes of a slider with the pose q."""
-    c = math.cos(q[2])
-    s = math.sin(q[2])
-    dx = x - q[0]
-    dy = y - q[1]
-    return np.array([c * dx + s * dy, c * dy - s * dx])
-
-
-def _same(contact: Touch, other: Touch, edges: int) -> bool:
+def _same(contact: Touch, other: Touch) -> bool:
     """Return True if a feature is the one that touches: an end at any edge, or a corner."""
-    return contact.kind == other.kind and (
-        contact.end == other.end
-        if contact.kind == END
-        else contact.edge % edges == other.edge
-    )
+    if contact.kind == END == other.kind:
+        return contact.end == other.end
+    return contact[:2] == other[:2]
 
 
 def place_of(
@@ -283,29 +240,24 @@ def place_of(
 ) -> tuple[TouchPoint, np.ndarray]:
     """Return the place at which a slider is touched, and the velocity of the pusher there, `[3]`, in its axes."""
     slider = scenery.slider
-    (x, y, angle) = scenery.pose(t)
+    edge = contact.edge
+    pose = scenery.pose(t)
     half = 0.0
+    at = slider.outline[edge]
+    normal = slider.inward[edge]
     if contact.kind == END:
         at = scenery.end(contact.end, t, q)
-        normal = slider.inward[contact.edge]
     elif contact.kind == CORNER:
-        at = slider.outline[contact.edge]
-        normal = np.array([math.cos(angle - q[2]), math.sin(angle - q[2])])
+        normal = rotation(pose[2] - q[2])[:, 0]
     else:
-        low, high = scenery.overlap(contact.edge, t, q)
+        low, high = scenery.overlap(edge, t, q)
         half = 0.5 * max(high - low, 0.0)
-        normal = slider.inward[contact.edge]
-        at = (
-            slider.outline[contact.edge]
-            + 0.5 * (low + high) * slider.along[contact.edge]
-        )
-    vx, vy, omega = scenery.rate(t, forward)
-    c = math.cos(q[2])
-    s = math.sin(q[2])
-    arm = at - _inside(q, x, y)
-    velocity = np.array(
-        [c * vx + s * vy - omega * arm[1], c * vy - s * vx + omega * arm[0], omega]
-    )
+        at = at + 0.5 * (low + high) * slider.along[edge]
+    *rate, omega = scenery.rate(t, forward)
+    axes = rotation(q[2])
+    x, y = at - (pose[:2] - q[:2]) @ axes
+    vx, vy = rate @ axes
+    velocity = np.array([vx - omega * y, vy + omega * x, omega])
     return TouchPoint(at, normal, half), velocity
 
 
@@ -314,12 +266,12 @@ def flush_after(
 ) -> Touch:
     """Return what still touches when a face turns about its left end (1) or its right one (-1)."""
     edge = contact.edge
-    corners = len(scenery.slider.outline)
+    following = (edge + 1) % len(scenery.slider.outline)
     right, left = (scenery.along(edge, scenery.end(i, t, q)) for i in range(2))
     if leans > 0:
         return Touch(END, edge, 1) if left >= 0.0 else Touch(CORNER, edge)
-    inside = right <= scenery.along(edge, scenery.slider.outline[(edge + 1) % corners])
-    return Touch(END, edge, 0) if inside else Touch(CORNER, (edge + 1) % corners)
+    inside = right <= scenery.along(edge, scenery.slider.outline[following])
+    return Touch(END, edge, 0) if inside else Touch(CORNER, following)
 
 
 def touch_after(
@@ -329,21 +281,16 @@ def touch_after(
     from scipy.optimize import brentq
 
     off = lambda at: scenery.gap(at, q) + scenery.near
-    low = t
     before = off(t)
-    while low < scenery.path_end:
-        high = scenery.not_before(low, q)
-        after = off(high)
+    while t < scenery.path_end:
+        end = scenery.not_before(t, q)
+        after = off(end)
         if after < 0.0 <= before:
-            at = brentq(off, low, high, xtol=1e-14 * max(abs(high), 1.0))
-            near = [
-                each
-                for gap, each in scenery.features(at, q)
-                if gap < 100.0 * scenery.near
-            ]  # pyright: ignore
-            if len(near) > 1:
-                return at, scenery.flush(at, q)  # pyright: ignore
-            return at, min(scenery.features(at, q))[1]  # pyright: ignore
-        low = high
+            at: Any = brentq(off, t, end, xtol=1e-14 * max(abs(end), 1.0))
+            found = sorted(scenery.features(at, q))
+            if sum(gap < 100.0 * scenery.near for gap, _ in found) > 1:
+                return at, scenery.flush(at, q)
+            return at, found[0][1]
+        t = end
         before = after
     return None

@@ -355,7 +355,7 @@ def _slide(model: Any, question: SlideQuestion) -> np.ndarray:
     part = Slide(question.time[:first], question.first, begun[3:])
     noise = np.array([1.0, 1.0, 1.0 / np.sqrt(question.inertia / question.mass)])
     begun = improve_start(model, body, part, begun, noise, TURNS - 1)
-    return slide_poses(model, body, question.time, begun[:3], begun[3:])
+    return slide_poses(model, body, question.time, begun)
 
 
 LARGEST, FEET = 1.8, 3
