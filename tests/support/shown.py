@@ -84,7 +84,7 @@ COMMANDS = (
     "limit-surface --pressure many.csv --cell-size 0.001 --surface ellipsoid --no-header --no-index",
     "limit-surface --patch ring", "limit-surface --alone", "limit-surface --patch Line --pressure pad.csv",
     "limit-surface --csv a.txt", "limit-surface --out a.gif", "limit-surface --patch disc --invert",
-    "run in-hand --model distributed --cells 8", "run nothing", "run in-hand --parts 3",
+    "run in-hand --model distributed --cells 8", "run nothing",
     "run in-hand --set mass=1,2", "run in-hand --set mas=1", "run scene.toml --width 0.1",
     "run scene.toml --set pad.mu=1", "run in-hand --t-end -1", "run in-hand --rtol 0", "run in-hand --max-steps 0",
     "sweep in-hand --set a", "sweep in-hand --set mass=1 --model x",
