@@ -110,7 +110,6 @@ def complete_log(
 @click.option(
     "--model",
     default="auto",
-    show_default=True,
     help="reduced-published, reduced, distributed, or auto.",
 )
 @click.option(
@@ -121,13 +120,11 @@ def complete_log(
 @click.option(
     "--starts",
     default=4,
-    show_default=True,
     help="Number of starting points of the search.",
 )
 @click.option(
     "--seed",
     default=0,
-    show_default=True,
     help="Random seed of the starting points.",
 )
 @click.option(
@@ -284,7 +281,7 @@ def parse_noise(text: str | None) -> list[float] | None:
     multiple=True,
     help="Load in N; may be repeated. Default: the logs', or 1.",
 )
-@click.option("--speed", default=0.05, show_default=True, help="Largest speed in m/s.")
+@click.option("--speed", default=0.05, help="Largest speed in m/s.")
 @click.option(
     "--spin",
     type=float,
@@ -293,10 +290,9 @@ def parse_noise(text: str | None) -> list[float] | None:
 @click.option(
     "--duration",
     default=2.0,
-    show_default=True,
     help="Length of a motion in s.",
 )
-@click.option("--rate", default=1000.0, show_default=True, help="Samples per second.")
+@click.option("--rate", default=1000.0, help="Samples per second.")
 @click.option(
     "--noise",
     metavar="FX,FY,TAU",
@@ -412,20 +408,17 @@ def _known(
 @click.option(
     "--gain",
     default=1.0,
-    show_default=True,
     help="Duty per rad at a gain of 1.",
 )
 @click.option("--supply", type=float, help="Voltage of the servo in V.")
 @click.option(
     "--sag",
     default=0.0,
-    show_default=True,
     help="Voltage lost at full duty in V.",
 )
 @click.option(
     "--terms",
     default="auto",
-    show_default=True,
     help="gravity,stribeck,load,bristles,asymmetry for torques, load,stribeck,bristles,directional for goals; or auto.",
 )
 @click.option(

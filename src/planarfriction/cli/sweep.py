@@ -55,7 +55,6 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
     "--out",
     type=FILE,
     default=Path("sweep"),
-    show_default=True,
     help="Folder for the runs.",
 )
 def sweep(

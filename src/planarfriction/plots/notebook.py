@@ -154,7 +154,8 @@ def _pressure(patch: pf.ContactPatch, load: float | None) -> style.PlotFigure | 
 
 
 def _section(surface: pf.limit_surface.LimitSurface) -> style.PlotFigure:
-    around = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1)
+    # From a slide along x on to a spin.
+    around = np.linspace(0.5 * np.pi, -1.5 * np.pi, _DIRECTIONS + 1)
     fx, _, torque = scaled_samples(surface, around, np.zeros(1))[1].T
     figure = style.new_figure(1.5, 1.5)
     axes = figure.add_subplot()

@@ -216,10 +216,9 @@ class SegmentBatches:
         self._pieces = Segments(scene, t_end, marks)
         self._done = 0
         contacts = scene.contacts
-        follows = [contact.model.patch.depends_on_load for contact in contacts]
         self._between = [
-            self._pieces.between(c) if follows[c] else None
-            for c in range(len(contacts))
+            self._pieces.between(c) if contact.model.patch.depends_on_load else None
+            for c, contact in enumerate(contacts)
         ]
         self.models: list[PackedModel] = []
         """The model of each contact, as packed last."""
@@ -333,7 +332,11 @@ class SegmentBatches:
         pieces = np.arange(
             self._done, min(self._done + self._ahead, self._pieces.count)
         )
-        old = self.models
+        # Models that follow the load are packed anew, and not kept meanwhile.
+        old = [
+            None if between else model
+            for model, between in zip(self.models, self._between, strict=False)
+        ]
         rows = []
         count = len(pieces)
         self.models = []

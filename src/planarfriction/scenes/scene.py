@@ -115,15 +115,14 @@ class Scene(ByValue):
             if self.springs:
                 rule = "be none if the velocity is prescribed"
                 raise InvalidValueError("springs", rule, f"{len(self.springs)}")
-            for name in ("force", "stop_speed"):
-                if (given := getattr(self, name)) is not None:
+            others = {"force": self.force, "stop_speed": self.stop_speed}
+            for contact in self.contacts:
+                name = f"support_velocity of contact {contact.name!r}"
+                others[name] = contact.support_velocity
+            for name, given in others.items():
+                if given is not None:
                     rule = "be None if the velocity is prescribed"
                     raise InvalidValueError(name, rule, given)
-            for contact in self.contacts:
-                if contact.support_velocity is not None:
-                    name = f"support_velocity of contact {contact.name!r}"
-                    rule = "be None if the body's velocity is prescribed"
-                    raise InvalidValueError(name, rule, contact.support_velocity)
         for contact in self.contacts:
             if contact.pressure == "follows" and len(self.contacts) > 1:
                 rule = "be 'fixed' beside other contacts, which share the load in a way that statics leaves open"

@@ -268,7 +268,7 @@ def scene_of(solution: Solution, what: str) -> Scene:
     """Return the scene of a solution, which `what` needs; raises FileError where it was loaded without one."""
     if solution.scene is None:
         raise FileError(
-            f"the file has no scene, which {what} needs: {solution.data.attrs[_LEFT_OUT]}"
+            f"the file has no scene, which {what} needs: {solution.data.attrs.get(_LEFT_OUT, 'it was left out')}"
         )
     return solution.scene
 
