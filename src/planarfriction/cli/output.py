@@ -53,13 +53,13 @@ def write_solution(solution: pf.Solution, folder: Path, label: str) -> list[Path
 
 def history_columns(solution: pf.Solution) -> dict[str, np.ndarray]:
     """Return the histories as columns [SI]: time, the body, then each contact's columns (`name.vx`) of a log."""
-    values = {name: each.values for name, each in solution.histories.items()}
+    histories = solution.histories
     names = ("time", "x", "y", "theta", "vx", "vy", "omega")
-    columns = {name: values[name] for name in names}
-    for index, contact in enumerate(map(str, values["contact"])):
+    columns = {name: histories[name].values for name in names}
+    for index, contact in enumerate(map(str, histories["contact"].values)):
         own = dict(zip(names[4:], solution.contact_twist(contact).T, strict=True))
         for name in ("fx", "fy", "tau", "normal_force"):
-            own[name] = values[name][:, index]
+            own[name] = histories[name].values[:, index]
         columns |= {f"{slug(contact)}.{name}": each for name, each in own.items()}
     return columns
 
