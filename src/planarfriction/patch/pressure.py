@@ -181,6 +181,9 @@ class SoftFinger(Pressure):
         Raises InvalidValueError for a load below zero.
         """
         load = validation.non_negative_numbers("normal_force", normal_force)
+        return self._exponent(load)
+
+    def _exponent(self, load: np.ndarray) -> np.ndarray:
         if self.k_per_newton is None:
             return np.full_like(load, self.k)
         return np.maximum(self.k_per_newton * load, validation.SMALLEST)
@@ -189,7 +192,7 @@ class SoftFinger(Pressure):
         self, positions: np.ndarray, normal_force: np.ndarray | None = None
     ) -> np.ndarray:
         load = np.array([1.0]) if normal_force is None else normal_force[..., None]
-        k = self.exponent(load)
+        k = self._exponent(load)
         distance, nearest = _distances(positions)
         ratio = distance / self._radius(load)
         inside = ratio < 1.0

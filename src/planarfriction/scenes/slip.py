@@ -10,7 +10,6 @@ from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.geometry import twist_at
-from planarfriction.scenes.solution import scene_of
 
 if TYPE_CHECKING:
     from planarfriction.models import DistributedModel
@@ -49,7 +48,7 @@ class SlipField(NamedTuple):
 
 def slip_events(solution: Solution) -> tuple[SlipEvent, ...]:
     """Return the slips of all contacts of a solution, contact by contact, each in the order of time."""
-    contacts = scene_of(solution, "a slip event").contacts
+    contacts = solution.scene.contacts
     return tuple(event for each in contacts for event in _events(solution, each))
 
 

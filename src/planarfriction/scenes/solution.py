@@ -190,6 +190,7 @@ class Solution:
         """
         from planarfriction.scenes.slip import slip_events
 
+        scene_of(self, "a slip event")
         return slip_events(self)
 
     def plot(self) -> Any:
