@@ -456,6 +456,8 @@ class ContactPatch(ByValue):
 
         With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise. A disc counts
         with the mean distance of its points.
+
+        Raises InvalidValueError as `weights` does.
         """
         weights, *offset = self._about_centre_of_pressure(normal_force)
         x, y = self.lever_coordinates(*offset)
@@ -468,7 +470,10 @@ class ContactPatch(ByValue):
     @overload
     def second_moment(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def second_moment(self, normal_force: Any = None) -> Any:
-        """Return the second moment `<rho^2> = sum(w (|rho - CoP|^2 + a^2/2))` of cells with radii a [m^2]."""
+        """Return the second moment `<rho^2> = sum(w (|rho - CoP|^2 + a^2/2))` of cells with radii a [m^2].
+
+        Raises InvalidValueError as `weights` does.
+        """
         weights, *offset = self._about_centre_of_pressure(normal_force)
         dx, dy = self.lever_coordinates(*offset)
         return (weights * (dx**2 + dy**2 + 0.5 * self.lever_radii**2)).sum(-1)
@@ -478,7 +483,7 @@ class ContactPatch(ByValue):
     @overload
     def area(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def area(self, normal_force: Any = None) -> Any:
-        """Return the area of the cells under load [m^2]."""
+        """Return the area of the cells under load [m^2]. Raises InvalidValueError as `weights` does."""
         return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
 
     def moments(
