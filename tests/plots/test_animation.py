@@ -120,7 +120,8 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
         vy=1.5 * arm * np.cos(turn),
         omega=1.5 + 0.0 * time,
     )
-    from planarfriction.plots.track import _displacements, contact_poses
+    from planarfriction.plots.track import _displacements
+    from planarfriction.scenes.contact import contact_poses
 
     poses = np.stack([np.asarray(run.data[name]) for name in ("x", "y", "theta")], -1)
     for contact in run.scene.contacts:

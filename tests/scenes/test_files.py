@@ -365,7 +365,7 @@ def test_unusual_names_survive(tmp_path):
         (
             "normal_force = 2.0",
             "normal_force = { csv = 'load.csv', value = 3 }",
-            "scene.toml: [contact.normal_force]: time must be the name of a column",
+            "scene.toml: [contact.normal_force]: value must be the name of a column, or a list of names, got 3",
         ),
         (
             "normal_force = 2.0",

@@ -98,7 +98,11 @@ class MemberOf(click.Choice):
 @click.group(
     cls=Commands,
     name="planarfriction",
-    context_settings={"max_content_width": 100, "help_option_names": ["-h", "--help"]},
+    context_settings={
+        "max_content_width": 100,
+        "help_option_names": ["-h", "--help"],
+        "show_default": True,
+    },
 )
 @click.version_option(__version__, message="%(prog)s %(version)s")
 def app() -> None:
@@ -184,7 +188,6 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
     "--surface",
     type=MemberOf(SURFACES),
     default="exact",
-    show_default=True,
     help="Kind of limit surface.",
 )
 @click.option(

@@ -47,11 +47,8 @@ class Check(NamedTuple):
         except Exception as error:  # whatever is broken here is what the report is for
             return one_line(f"FAILS, {type(error).__name__}: {error}"), False
         right = abs(found - self.expected) <= self.tolerance
-        verdict = "holds" if right else "FAILS"
-        return (
-            f"{verdict}, {found:.9g} (expected {self.expected:.9g} to {self.tolerance:.2g})",
-            right,
-        )
+        wanted = f"expected {self.expected:.9g} to {self.tolerance:.2g}"
+        return f"{'holds' if right else 'FAILS'}, {found:.9g} ({wanted})", right
 
 
 def checks() -> list[Check]:
@@ -147,9 +144,8 @@ def state_of(requirement: Requirement) -> tuple[str, bool]:
     except metadata.PackageNotFoundError:
         return f"{requirement.name} is missing", False
     right = requirement.specifier.contains(version, prereleases=True)
-    return f"{requirement.name} {version}" + (
-        "" if right else f" (needs {requirement.specifier})"
-    ), right
+    needs = "" if right else f" (needs {requirement.specifier})"
+    return f"{requirement.name} {version}{needs}", right
 
 
 def processor() -> list[tuple[str, str]]:

@@ -50,16 +50,12 @@ def read_model(file: Path, contact: str | None) -> Any:
 @click.option(
     "--name",
     default="friction",
-    show_default=True,
     help="Name of the files, and prefix of the names in them.",
 )
-@click.option(
-    "--precision", default="double", show_default=True, help="double or float."
-)
+@click.option("--precision", default="double", help="double or float.")
 @click.option(
     "--patches",
     default=1,
-    show_default=True,
     help="Patches of this model below a body.",
 )
 @click.option(

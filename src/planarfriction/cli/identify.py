@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,8 +42,8 @@ class FitOrPlan(click.Command):
         with formatter.section("Commands"):
             formatter.write_dl(
                 [
-                    (each, f"{OTHERS[each].short_help} See identify {each} --help.")
-                    for each in OTHERS
+                    (name, f"{each.short_help} See identify {name} --help.")
+                    for name, each in OTHERS.items()
                 ]
             )
 
@@ -51,12 +52,12 @@ def complete_log(
     ctx: click.Context, parameter: object, incomplete: str
 ) -> list[CompletionItem]:
     """Return completions of a log: files, and the names of subcommands where they may stand."""
-    names = (
-        []
-        if ctx.params.get("logs")
-        else [name for name in OTHERS if name.startswith(incomplete)]
-    )
-    words = [CompletionItem(name, help=OTHERS[name].short_help) for name in names]
+    others = {} if ctx.params.get("logs") else OTHERS
+    words = [
+        CompletionItem(name, help=each.short_help)
+        for name, each in others.items()
+        if name.startswith(incomplete)
+    ]
     return [*words, CompletionItem(incomplete, type="file")]
 
 
@@ -109,7 +110,6 @@ def complete_log(
 @click.option(
     "--model",
     default="auto",
-    show_default=True,
     help="reduced-published, reduced, distributed, or auto.",
 )
 @click.option(
@@ -119,16 +119,12 @@ def complete_log(
 )
 @click.option(
     "--starts",
-    type=int,
     default=4,
-    show_default=True,
     help="Number of starting points of the search.",
 )
 @click.option(
     "--seed",
-    type=int,
     default=0,
-    show_default=True,
     help="Random seed of the starting points.",
 )
 @click.option(
@@ -174,11 +170,8 @@ def identify(
     from planarfriction.identify import FitOptions, identify_lugre
 
     given = find_patch(patch, size)
-    chosen: dict[str, Any] = {
-        "parameters": parse_names(parameters),
-        "start": parse_start(start),
-        "model": model,
-    }
+    names = parse_names(parameters)
+    guess = parse_start(start)
     options = FitOptions(
         noise=parse_noise(noise),
         elasto_plastic=None if plain else "auto",
@@ -192,12 +185,17 @@ def identify(
     with work_progress("identifying") as progress:
         for path in logs:
             progress(f"reading {path.name}")
-            read.append(
-                pf.Log.from_csv(path, normal_force=normal_force, contact=contact)
-            )
+            log = pf.Log.from_csv(path, normal_force=normal_force, contact=contact)
+            read.append(log)
         try:
             found = identify_lugre(
-                read, given, **chosen, options=options, progress=progress
+                read,
+                given,
+                parameters=names,
+                start=guess,
+                model=model,
+                options=options,
+                progress=progress,
             )
         except IdentificationInterrupted as stop:
             print(stop)
@@ -233,11 +231,9 @@ def parse_names(text: str | None) -> tuple[str, ...]:
     """Parse the names of `--parameters`, separated by commas; the usual ones without it."""
     from planarfriction.identify.parameters import USUAL, check_names
 
-    return (
-        USUAL
-        if text is None
-        else check_names([name.strip() for name in text.split(",") if name.strip()])
-    )
+    if text is None:
+        return USUAL
+    return check_names([name.strip() for name in text.split(",") if name.strip()])
 
 
 def parse_nuisance(text: str | None) -> tuple[str, ...]:
@@ -246,22 +242,17 @@ def parse_nuisance(text: str | None) -> tuple[str, ...]:
 
     if text is None:
         return GROUPS
-    return (
-        ()
-        if text.strip() == "none"
-        else tuple(name.strip() for name in text.split(","))
-    )
+    names = tuple(name.strip() for name in text.split(","))
+    return () if names == ("none",) else names
 
 
 def parse_noise(text: str | None) -> list[float] | None:
     """Parse the three numbers of `--noise`."""
     from planarfriction._support import validation
 
-    return (
-        None
-        if text is None
-        else [validation.number_in("--noise", part) for part in text.split(",")]
-    )
+    if text is None:
+        return None
+    return [validation.number_in("--noise", part) for part in text.split(",")]
 
 
 @click.command(short_help="Suggest which motion to measure next.")
@@ -290,9 +281,7 @@ def parse_noise(text: str | None) -> list[float] | None:
     multiple=True,
     help="Load in N; may be repeated. Default: the logs', or 1.",
 )
-@click.option(
-    "--speed", type=float, default=0.05, show_default=True, help="Largest speed in m/s."
-)
+@click.option("--speed", default=0.05, help="Largest speed in m/s.")
 @click.option(
     "--spin",
     type=float,
@@ -300,14 +289,10 @@ def parse_noise(text: str | None) -> list[float] | None:
 )
 @click.option(
     "--duration",
-    type=float,
     default=2.0,
-    show_default=True,
     help="Length of a motion in s.",
 )
-@click.option(
-    "--rate", type=float, default=1000.0, show_default=True, help="Samples per second."
-)
+@click.option("--rate", default=1000.0, help="Samples per second.")
 @click.option(
     "--noise",
     metavar="FX,FY,TAU",
@@ -348,10 +333,8 @@ def plan(
     spread = parse_noise(noise)
     if out is not None:
         output.check_kind(out)
-    measured = [
-        pf.Log.from_csv(path, normal_force=normal_force[0] if normal_force else None)
-        for path in logs
-    ]
+    load = normal_force[0] if normal_force else None
+    measured = [pf.Log.from_csv(path, normal_force=load) for path in logs]
     patch, law = _known(measured, patch, names, values, spread)
     loads = (
         list(normal_force)
@@ -385,9 +368,14 @@ def _known(
     if not logs:
         return patch, law
     with work_progress("identifying") as progress:
-        chosen = {"parameters": names, "start": start, "model": "reduced-published"}
         found = identify_lugre(
-            logs, patch, **chosen, options=FitOptions(noise=noise), progress=progress
+            logs,
+            patch,
+            parameters=names,
+            start=start,
+            model="reduced-published",
+            options=FitOptions(noise=noise),
+            progress=progress,
         )
     note(found.summary().replace("\n", " "))
     return current_estimate(found, patch, law)
@@ -397,10 +385,8 @@ def _known(
     short_help="Estimate the friction of a joint from a torque, a voltage or the goal of a servo."
 )
 @click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True)
-@click.option(
-    "--mass", type=float, default=0.0, help="Mass at the end of a pendulum in kg."
-)
-@click.option("--length", type=float, default=0.0, help="Length of the pendulum in m.")
+@click.option("--mass", default=0.0, help="Mass at the end of a pendulum in kg.")
+@click.option("--length", default=0.0, help="Length of the pendulum in m.")
 @click.option("--arm-mass", type=float, help="Mass of its arm in kg.")
 @click.option(
     "--offset",
@@ -421,23 +407,18 @@ def _known(
 )
 @click.option(
     "--gain",
-    type=float,
     default=1.0,
-    show_default=True,
     help="Duty per rad at a gain of 1.",
 )
 @click.option("--supply", type=float, help="Voltage of the servo in V.")
 @click.option(
     "--sag",
-    type=float,
     default=0.0,
-    show_default=True,
     help="Voltage lost at full duty in V.",
 )
 @click.option(
     "--terms",
     default="auto",
-    show_default=True,
     help="gravity,stribeck,load,bristles,asymmetry for torques, load,stribeck,bristles,directional for goals; or auto.",
 )
 @click.option(
@@ -479,22 +460,12 @@ def joint(
         )
     if kp and supply is None:
         raise InvalidValueError("--supply", "be given with --kp", "none")
-    gains = (kp * len(logs) if len(kp) == 1 else kp) or (None,) * len(logs)
-    drives = [
-        None if each is None else Drive(each, supply or 0.0, gain, sag)
-        for each in gains
-    ]
+    drives = [Drive(each, supply or 0.0, gain, sag) for each in kp] or [None]
     read = [
         JointLog.from_csv(path, drive=drive)
-        for path, drive in zip(logs, drives, strict=True)
+        for path, drive in zip(logs, itertools.cycle(drives), strict=False)
     ]
-    words = (
-        terms.split(",")
-        if terms not in ("auto", "none")
-        else terms
-        if terms == "auto"
-        else ()
-    )
+    words: Any = {"auto": "auto", "none": ()}.get(terms, terms.split(","))
     if out is not None:
         make_folder(out)
     with work_progress("identifying") as progress:
@@ -507,21 +478,18 @@ def joint(
         )
     print(fit.table())
     if out is not None:
-        stem = slug(read[0].name)
-        write_text(
-            out / f"{stem}-joint.json", json.dumps(fit.to_dict(), indent=2) + "\n"
-        )
-        files = [
-            out / f"{stem}-joint.json",
-            write_picture(fit.plot(), out / f"{stem}-joint.png"),
-        ]
+        stem = f"{slug(read[0].name)}-joint"
+        table = out / f"{stem}.json"
+        write_text(table, json.dumps(fit.to_dict(), indent=2) + "\n")
+        files = [table, write_picture(fit.plot(), out / f"{stem}.png")]
         if not fit.unclear:
             files += export_joint_c(fit.friction, out, name="friction")
         for file in files:
             note(f"wrote {file}")
         if fit.unclear:
+            unclear = ", ".join(fit.unclear)
             note(
-                f"no C source: leave out the terms that these logs do not show ({', '.join(fit.unclear)})"
+                f"no C source: leave out the terms that these logs do not show ({unclear})"
             )
     return 0
 

@@ -81,10 +81,8 @@ def show(
         from planarfriction.plots.limit_surface import sample_limit_surface
 
         columns = np.hstack(sample_limit_surface(shown, *_directions())).T
-        write_csv(
-            csv,
-            dict(zip(("vx", "vy", "omega", "fx", "fy", "tau"), columns, strict=True)),
-        )
+        names = ("vx", "vy", "omega", "fx", "fy", "tau")
+        write_csv(csv, dict(zip(names, columns, strict=True)))
         note(f"wrote {csv}")
     if out is not None:
         from planarfriction import plots
@@ -92,12 +90,8 @@ def show(
         beside = None if alone else "ellipsoid"
         # With plotly's own code in it, so that it opens without a network.
         if out.suffix.lower() == HTML:
-            write_text(
-                out,
-                plots.interactive_limit_surface(shown, beside=beside).to_html(
-                    include_plotlyjs=True
-                ),
-            )
+            figure = plots.interactive_limit_surface(shown, beside=beside)
+            write_text(out, figure.to_html(include_plotlyjs=True))
         else:
             write_picture(plots.plot_limit_surface(shown, beside=beside), out)
         note(f"wrote {out}")
@@ -122,9 +116,8 @@ def _directions() -> tuple[np.ndarray, np.ndarray]:
         np.linspace(0.0, 2 * np.pi, AZIMUTH_SAMPLES, endpoint=False),
         indexing="ij",
     )
-    return np.concatenate([[0.0], polar.ravel(), [np.pi]]), np.concatenate(
-        [[0.0], azimuth.ravel(), [0.0]]
-    )
+    polar = np.concatenate([[0.0], polar.ravel(), [np.pi]])
+    return polar, np.pad(azimuth.ravel(), 1)
 
 
 def _distance_from_ellipsoid(surface: Any) -> float:

@@ -47,12 +47,10 @@ def find_patch(
     if make := makers.get(text.lower()):
         for name in size:
             if name != "width":
+                option = f"--{name.replace('_', '-')}"
                 given = f"{size[name]} for the patch {text}"
-                raise InvalidValueError(
-                    f"--{name.replace('_', '-')}",
-                    "be given only for a pressure map",
-                    given,
-                )
+                rule = "be given only for a pressure map"
+                raise InvalidValueError(option, rule, given)
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
         from planarfriction._support import validation  # loads NumPy
@@ -74,13 +72,10 @@ def _shapes(width: float) -> dict[str, Callable[[], pf.ContactPatch]]:
     makers = {}
     for name, make in SHAPES.items():
         # None, in a shape of one's own.
-        parameters = list(inspect.signature(make).parameters.values())
-        if any(each.default is each.empty for each in parameters[1:]):
-            continue
-        if parameters and parameters[0].name in _PER_WIDTH:
-            makers[name] = functools.partial(
-                make, _PER_WIDTH[parameters[0].name] * width
-            )
+        first, *others = inspect.signature(make).parameters.values() or [None]
+        needed = any(each.default is each.empty for each in others)
+        if not needed and first and first.name in _PER_WIDTH:
+            makers[name] = functools.partial(make, _PER_WIDTH[first.name] * width)
     return makers
 
 
@@ -140,21 +135,12 @@ def complete_patch(
     return [*names, CompletionItem(incomplete, type="file")]
 
 
-def _replaced(context: object, parameter: click.Parameter, value: Any) -> None:
-    """Refuse an option that another one has replaced."""
-    if value is not None:
-        raise InvalidValueError(
-            "--parts",
-            "be left out: write --cells, the number of discs of the reduced model",
-            value,
-        )
-
-
-def cells_option(function: Any) -> Any:
-    """Add `--cells`, and a clear line for what stood in its place."""
-    words = "Number of discs of the reduced model. Default: 24, or the file's."
-    old = click.option("--parts", hidden=True, expose_value=False, callback=_replaced)
-    return click.option("--cells", type=int, help=words)(old(function))
+cells_option = click.option(
+    "--cells",
+    type=int,
+    help="Number of discs of the reduced model. Default: 24, or the file's.",
+)
+"""Option of commands that make models."""
 
 
 def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:

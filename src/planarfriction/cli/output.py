@@ -53,24 +53,14 @@ def write_solution(solution: pf.Solution, folder: Path, label: str) -> list[Path
 
 def history_columns(solution: pf.Solution) -> dict[str, np.ndarray]:
     """Return the histories as columns [SI]: time, the body, then each contact's columns (`name.vx`) of a log."""
-
-    def values(name: str) -> np.ndarray:
-        return solution.histories[name].values
-
-    columns = {
-        name: values(name) for name in ("time", "x", "y", "theta", "vx", "vy", "omega")
-    }
-    for index, contact in enumerate(map(str, values("contact"))):
-        wrench = {
-            name: values(name)[:, index] for name in ("fx", "fy", "tau", "normal_force")
-        }
-        twist = dict(
-            zip(("vx", "vy", "omega"), solution.contact_twist(contact).T, strict=True)
-        )
-        columns |= {
-            f"{slug(contact)}.{name}": column
-            for name, column in (twist | wrench).items()
-        }
+    histories = solution.histories
+    names = ("time", "x", "y", "theta", "vx", "vy", "omega")
+    columns = {name: histories[name].values for name in names}
+    for index, contact in enumerate(map(str, histories["contact"].values)):
+        own = dict(zip(names[4:], solution.contact_twist(contact).T, strict=True))
+        for name in ("fx", "fy", "tau", "normal_force"):
+            own[name] = histories[name].values[:, index]
+        columns |= {f"{slug(contact)}.{name}": each for name, each in own.items()}
     return columns
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -35,30 +36,28 @@ def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
     rows = [
         [
             f"final {called} [{unit.label}]",
-            *(f"{unit.factor * end:.5g}" for end in ends[name]),
+            *(f"{unit.factor * end:.5g}" for end in each),
         ]
-        for name, called, unit in (
-            ("x", "x", length),
-            ("y", "y", length),
-            ("theta", "angle", angle),
+        for (called, unit), each in zip(
+            (("x", length), ("y", length), ("angle", angle)), ends.values(), strict=True
         )
     ]
     if len(every) > 1:
-        differences = [largest_differences(each, every[0]) for each in every[1:]]
-        rows.append(
+        ways, angles = zip(
+            *(largest_differences(each, every[0]) for each in every[1:]), strict=True
+        )
+        rows += [
             [
                 "largest difference, position [mm]",
                 "",
-                *(f"{1e3 * each[0]:.4g}" for each in differences),
-            ]
-        )
-        rows.append(
+                *(f"{1e3 * d:.4g}" for d in ways),
+            ],
             [
                 "largest difference, angle [deg]",
                 "",
-                *(f"{np.degrees(each[1]):.4g}" for each in differences),
-            ]
-        )
+                *(f"{np.degrees(d):.4g}" for d in angles),
+            ],
+        ]
     statistics = [each.statistics for each in every]
     rows += [
         ["simulated time [s]", *(f"{_last(each, 'time'):g}" for each in every)],
@@ -68,12 +67,8 @@ def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
         ["times faster than real time", *(_speed(each) for each in every)],
     ]
     if any(each.compile_time > 0.1 for each in statistics):
-        rows.append(
-            [
-                "loading or compiling the solver [s]",
-                *(f"{each.compile_time:.3g}" for each in statistics),
-            ]
-        )
+        times = (f"{each.compile_time:.3g}" for each in statistics)
+        rows.append(["loading or compiling the solver [s]", *times])
     if any(each.status != FINISHED for each in every):
         rows.append(["ended", *(each.status for each in every)])
     return rows
@@ -168,11 +163,8 @@ def scene_makers(
     """Return functions that make the scenes of some values, by the kind of their model; "" for the file's own."""
     if t_end is not None:
         validation.positive("--t-end", t_end)
-    kinds = list(
-        dict.fromkeys(
-            kind for each in models for kind in (BOTH if each == "both" else [each])
-        )
-    )
+    both = [BOTH if each == "both" else [each] for each in models]
+    kinds = list(dict.fromkeys(itertools.chain(*both)))
     if Path(name).suffix.lower() in (".toml", ".json"):
         return _makers_from_file(name, kinds, cells, patch, size or {})
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
@@ -201,12 +193,9 @@ def _ready(
     from planarfriction.sweeps.settings import Settable
 
     own = [name for name in inspect.signature(make).parameters if name != "model"]
-    scene = make(
-        model,
-        **options | {name: value for name, value in values.items() if name in own},
-    )
-    rest = {path: value for path, value in values.items() if path not in own}
-    return Settable(scene, own)(**rest) if rest else scene
+    given = {name: values.pop(name) for name in own if name in values}
+    scene = make(model, **options | given)
+    return Settable(scene, own)(**values) if values else scene
 
 
 def one_each(settings: Sequence[str]) -> dict[str, Any]:
@@ -234,20 +223,15 @@ def _check_cells(cells: int | None, makes: Iterable[Any]) -> None:
     validation.count("--cells", cells)
     if not any(map(_has_cells, makes)):
         kinds = ", ".join(kind for kind, make in MODELS.items() if _has_cells(make))
-        raise InvalidValueError(
-            "--cells",
-            f"be given only for a model that has a number of cells ({kinds})",
-            cells,
-        )
+        rule = f"be given only for a model that has a number of cells ({kinds})"
+        raise InvalidValueError("--cells", rule, cells)
 
 
 def _make(make: Any, patch: pf.ContactPatch, law: Any, cells: int | None) -> Any:
     """Make a model of a class, of so many `cells` if it has a number of them."""
-    return make(
-        patch,
-        law,
-        **({"cells": cells} if cells is not None and _has_cells(make) else {}),
-    )
+    if cells is None or not _has_cells(make):
+        return make(patch, law)
+    return make(patch, law, cells=cells)
 
 
 def _makers_from_file(
@@ -271,10 +255,10 @@ def _makers_from_file(
     if kinds:
         _check_cells(cells, [MODELS[kind] for kind in kinds])
 
-    def changed(kind: str) -> Callable[..., pf.Scene]:
-        return lambda **values: _with_models(make(**values), kind, contact_patch, cells)
+    def changed(kind: str, /, **values: Any) -> pf.Scene:
+        return _with_models(make(**values), kind, contact_patch, cells)
 
-    return {kind: changed(kind) for kind in kinds or [""]}
+    return {kind: functools.partial(changed, kind) for kind in kinds or [""]}
 
 
 def _label(scene: pf.Scene) -> str:
@@ -299,9 +283,8 @@ def _with_models(
         if patch is not None or kind not in ("mixed", MODELS.name_of(model)):
             make = type(model) if kind == "mixed" else MODELS[kind]
             wanted = getattr(model, "cells", None) if cells is None else cells
-            model = _make(
-                make, model.patch if patch is None else patch, model.law, wanted
-            )
+            below = model.patch if patch is None else patch
+            model = _make(make, below, model.law, wanted)
         elif cells is not None and _has_cells(type(model)):
             model = dataclasses.replace(model, cells=cells)
         contacts.append(dataclasses.replace(contact, model=model))
@@ -387,18 +370,16 @@ def _draw(
     name = output.slug(first.scene.name)
     if "plot" in pictures:
         with simulation_progress("drawing", 1.0):
-            figures = {f"{name}-histories": plots.plot_histories(solutions)}
-            figures |= {
-                f"{name}-motion-{output.slug(each)}": plots.plot_motion(solutions[each])
-                for each in solutions
-            }
+            figures = {"histories": plots.plot_histories(solutions)}
+            for label, solution in solutions.items():
+                figures[f"motion-{output.slug(label)}"] = plots.plot_motion(solution)
             contact = first.scene.contacts[0]
             load = float(contact.normal_force(0.0))
-            figures[f"{name}-patch"] = plots.plot_patch(
-                contact.model.patch, normal_force=load
-            )
+            patch = contact.model.patch
+            figures["patch"] = plots.plot_patch(patch, normal_force=load)
             for stem, figure in figures.items():
-                note(f"wrote {output.write_picture(figure, folder / f'{stem}.png')}")
+                path = folder / f"{name}-{stem}.png"
+                note(f"wrote {output.write_picture(figure, path)}")
     if "animate" in pictures:
         for label, solution in solutions.items():
             path = folder / f"{name}-motion-{output.slug(label)}.gif"

@@ -55,7 +55,6 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
     "--out",
     type=FILE,
     default=Path("sweep"),
-    show_default=True,
     help="Folder for the runs.",
 )
 def sweep(
@@ -86,19 +85,17 @@ def sweep(
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import note, work_progress
     from planarfriction.cli.run import scene_makers
-    from planarfriction.errors import FrictionError, SweepInterrupted
+    from planarfriction.errors import SweepInterrupted
     from planarfriction.families import MODELS
-    from planarfriction.sweeps.settings import parse_all
+    from planarfriction.sweeps.settings import parse_all, try_ends
 
     values = parse_all(settings)
     if model is not None:
         validation.choice("--model", model, MODELS)
     models = [model] if model is not None else ["reduced"] if scene in SCENES else []
     make = next(iter(scene_makers(scene, models, **options).values()))
-    try:  # a path that leads nowhere is wrong in all runs
-        make(**{path: next(iter(each.values())) for path, each in values.items()})
-    except FrictionError:
-        make(**{path: list(each.values())[-1] for path, each in values.items()})
+    # A path that leads nowhere is wrong in all runs.
+    try_ends(make, {path: list(each.values()) for path, each in values.items()})
     function = None if measure is None else load_function("--measure", measure)[1]
     last: list[sweeps.Progress] = []
     try:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction._support import validation
-from planarfriction._support.equality import ByValue
+from planarfriction._support.equality import ByValue, checked
 from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
@@ -37,6 +37,14 @@ MOST_DEGREE = 40
 """Largest degree of polynomial moments: beyond it powers are rounding."""
 
 _UNIT_BOX = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+
+
+def _sizes(name: str, value: Any) -> tuple[float, ...]:
+    """Return `value` as two finite numbers >= 0, or raise."""
+    size = validation.vector(name, value, 2)
+    if not (size >= 0.0).all():
+        raise InvalidValueError(name, "be >= 0", float(size.min()))
+    return tuple(size.tolist())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,17 +73,19 @@ class ContactPatch(ByValue):
     pressure, and a normal force that is negative or missing where it is needed.
     """
 
-    positions: np.ndarray
+    positions: np.ndarray = checked(validation.array, (None, 2))
     """Positions of the cells (centroids of their parts inside the patch), shape `[N, 2]` [m]."""
     areas: np.ndarray
     """Areas of the cells inside the patch, shape `[N]` [m^2]."""
     pressure: Any = field(default_factory=Uniform)
     """Pressure law."""
-    grid: Grid | None = None
+    grid: Grid | None = checked(
+        validation.instance, Grid, "a Grid or None", default=None
+    )
     """Regular grid from which the cells were cut, or None."""
-    name: str = "patch"
+    name: str = checked(validation.text, default="patch")
     """Name for plots and tables."""
-    cell_size: tuple[float, float] | None = None
+    cell_size: tuple[float, float] | None = checked(_sizes, default=None)
     """Width and height of a whole cell [m], with its load spread evenly over it; None for points (lines: one is 0)."""
     point_shares: Any = None
     """Factors `q` on the areas `[N]` [-] that give evenly pressed shapes by name or outline the second moments of their
@@ -91,47 +101,34 @@ class ContactPatch(ByValue):
     _fixed_weights: np.ndarray | None = field(init=False, default=None, compare=False)
 
     def __post_init__(self) -> None:
-        validation.text("name", self.name)
-        if not (self.grid is None or isinstance(self.grid, Grid)):
-            raise InvalidValueError("grid", "be a Grid or None", self.grid)
-        positions = validation.array("positions", self.positions, (None, 2))
+        super().__post_init__()
+        positions = self.positions
+        shape = positions.shape[:1]
         if len(positions) == 0:
             raise InvalidValueError("patch", "have at least one cell", "none")
-        if self.cell_size is not None:
-            size = validation.vector("cell_size", self.cell_size, 2)
-            if not (size >= 0.0).all():
-                raise InvalidValueError("cell_size", "be >= 0", float(size.min()))
-            self._set(cell_size=tuple(size.tolist()))
-        elif self.grid is not None:
+        if self.cell_size is None and self.grid is not None:
             self._set(cell_size=(self.grid.cell_width, self.grid.cell_height))
         check_cells(len(positions))
-        areas = validation.positive_array("areas", self.areas, (len(positions),))
-        radii = np.zeros(len(positions)) if self.radii is None else self.radii
-        radii = validation.non_negative_array("radii", radii, (len(positions),))
+        areas = validation.positive_array("areas", self.areas, shape)
+        radii = np.zeros(shape) if self.radii is None else self.radii
+        radii = validation.non_negative_array("radii", radii, shape)
         law = pressures.as_law(self.pressure, positions)
         if not law.depends_on_load:
             pressures.check_pressure(law.relative(positions), positions)
         kept = law.ever_loaded(positions)
         if not kept.any():
-            raise InvalidValueError(
-                "pressure", "be > 0 on at least one cell", "0 on all of them"
-            )
+            rule = "be > 0 on at least one cell"
+            raise InvalidValueError("pressure", rule, "0 on all of them")
         self._check_anisotropy(kept)
-        self._set(
-            positions=positions[kept],
-            areas=areas[kept],
-            radii=radii[kept],
-            pressure=law.only(kept),
-        )
+        self._set(positions=positions[kept], areas=areas[kept], radii=radii[kept])
+        self._set(pressure=law.only(kept))
         if type(law) is not Uniform:  # other pressures keep their ratios
             self._set(point_shares=None)
         elif self.point_shares is not None:
-            self._set(
-                point_shares=validation.positive_array(
-                    "point_shares", self.point_shares, (len(positions),)
-                )
-            )
-            np.asarray(self.point_shares).setflags(write=False)
+            shares = self.point_shares
+            shares = validation.positive_array("point_shares", shares, shape)
+            shares.setflags(write=False)
+            self._set(point_shares=shares)
         for numbers in (self.positions, self.areas, np.asarray(self.radii)):
             numbers.setflags(write=False)
         if not law.depends_on_load:
@@ -150,13 +147,9 @@ class ContactPatch(ByValue):
         InvalidValueError for a parameter that breaks its rule.
         """
         radius = validation.length("radius", radius)
-        return outlines.clipped(
-            cls,
-            outlines.RoundOutline(0.0, radius),
-            Grid.square(2 * radius, cells),
-            pressure,
-            name,
-        )
+        grid = Grid.square(2 * radius, cells)
+        outline = outlines.RoundOutline(0.0, radius)
+        return outlines.clipped(cls, outline, grid, pressure, name)
 
     @classmethod
     def disc_published(
@@ -179,12 +172,11 @@ class ContactPatch(ByValue):
                 "cells", "be odd (the published mask is centred on a cell)", cells
             )
         reach = grid.columns // 2
-        row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
-        inside = (row - reach) ** 2 + (column - reach) ** 2 <= reach**2
-        positions = grid.centres()[inside]
-        return cls(
-            positions, np.full(len(positions), grid.cell_area), pressure, grid, name
-        )
+        squares = (np.arange(grid.columns) - reach) ** 2
+        inside = np.add.outer(squares, squares) <= reach**2
+        positions = grid.centres()[inside.ravel()]
+        areas = np.full(len(positions), grid.cell_area)
+        return cls(positions, areas, pressure, grid, name)
 
     @classmethod
     def rectangle(
@@ -212,11 +204,8 @@ class ContactPatch(ByValue):
         shares = point_shares(positions, areas, (grid.cell_width, grid.cell_height))
         patch = cls(positions, areas, pressure, grid, name, point_shares=shares)
         patch = outlines.with_outline(patch, outlines.polygon_outline(corners))
-        return (
-            patch.discs()
-            if 1 in (grid.columns, grid.rows) and len(areas) > 1
-            else patch
-        )
+        line = 1 in (grid.columns, grid.rows) and len(areas) > 1
+        return patch.discs() if line else patch
 
     @classmethod
     def ring(
@@ -238,13 +227,9 @@ class ContactPatch(ByValue):
             raise InvalidValueError(
                 "inner_radius", "be < outer_radius", f"{inner} and {outer}"
             )
-        return outlines.clipped(
-            cls,
-            outlines.RoundOutline(inner, outer),
-            Grid.square(2 * outer, cells),
-            pressure,
-            name,
-        )
+        grid = Grid.square(2 * outer, cells)
+        outline = outlines.RoundOutline(inner, outer)
+        return outlines.clipped(cls, outline, grid, pressure, name)
 
     @classmethod
     def line(
@@ -279,9 +264,8 @@ class ContactPatch(ByValue):
             side if along == 0 else -side
         )
         if callable(profile):
-            profile = pressures.evaluated(
-                "profile", profile, positions[:, along, None].tolist()
-            )
+            places = positions[:, along, None].tolist()
+            profile = pressures.evaluated("profile", profile, places)
         elif profile is not None:
             profile = pressures.non_negative_array("profile", profile, (cells,))
         size = (side, 0.0) if along == 0 else (0.0, side)
@@ -330,17 +314,11 @@ class ContactPatch(ByValue):
         InvalidValueError for weights below zero.
         """
         positions = validation.array("positions", positions, (None, 2))
+        shape = positions.shape[:1]
         if weights is not None:
-            weights = pressures.non_negative_array(
-                "weights", weights, (len(positions),)
-            )
-        return cls(
-            positions,
-            np.full(len(positions), validation.positive("area", area)),
-            weights,
-            None,
-            name,
-        )
+            weights = pressures.non_negative_array("weights", weights, shape)
+        areas = np.full(shape, validation.positive("area", area))
+        return cls(positions, areas, weights, None, name)
 
     @classmethod
     def from_pressure(
@@ -360,13 +338,8 @@ class ContactPatch(ByValue):
         law, shape, file = read_maps(pressure, loads, **reading)
         grid = map_grid(*shape, cell_size, width)
         name = (file or "pressure map") if name is None else name
-        return cls(
-            grid.centres(),
-            np.full(grid.rows * grid.columns, grid.cell_area),
-            law,
-            grid,
-            name,
-        )
+        areas = np.full(grid.rows * grid.columns, grid.cell_area)
+        return cls(grid.centres(), areas, law, grid, name)
 
     def refined(self, parts: int) -> ContactPatch:
         """Return the same patch with every cell divided into `parts` x `parts` (a cell of a line into `parts`).
@@ -431,11 +404,8 @@ class ContactPatch(ByValue):
             return weights_under(self, normal_force, moments)
         if normal_force is None:
             if self._fixed_weights is None:
-                raise InvalidValueError(
-                    "normal_force",
-                    "be given: the shape of this patch depends on it",
-                    "None",
-                )
+                rule = "be given: the shape of this patch depends on it"
+                raise InvalidValueError("normal_force", rule, "None")
             return self._fixed_weights
         load = validation.non_negative_numbers("normal_force", normal_force)
         if load.size * self.cells > validation.MOST_NUMBERS:
@@ -444,9 +414,8 @@ class ContactPatch(ByValue):
         if self._fixed_weights is not None:
             return np.broadcast_to(self._fixed_weights, (*load.shape, self.cells))
         loaded = load > 0.0
-        weights = self._shares(
-            self.pressure.relative(self.positions, np.where(loaded, load, 1.0))
-        )
+        held = np.where(loaded, load, 1.0)
+        weights = self._shares(self.pressure.relative(self.positions, held))
         return np.where(loaded[..., None], weights, 0.0)
 
     def tile_weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
@@ -474,9 +443,7 @@ class ContactPatch(ByValue):
         Raises InvalidValueError without a load that is needed, as all sums here.
         """
         weights = self.weights(normal_force)
-        return np.stack(
-            [(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1
-        )
+        return np.stack([(weights * x).sum(-1) for x in self.positions.T], -1)
 
     @overload
     def contact_radius(self, normal_force: float | None = None) -> float: ...
@@ -489,6 +456,8 @@ class ContactPatch(ByValue):
 
         With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise. A disc counts
         with the mean distance of its points.
+
+        Raises InvalidValueError as `weights` does.
         """
         weights, *offset = self._about_centre_of_pressure(normal_force)
         x, y = self.lever_coordinates(*offset)
@@ -501,7 +470,10 @@ class ContactPatch(ByValue):
     @overload
     def second_moment(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def second_moment(self, normal_force: Any = None) -> Any:
-        """Return the second moment `<rho^2> = sum(w (|rho - CoP|^2 + a^2/2))` of cells with radii a [m^2]."""
+        """Return the second moment `<rho^2> = sum(w (|rho - CoP|^2 + a^2/2))` of cells with radii a [m^2].
+
+        Raises InvalidValueError as `weights` does.
+        """
         weights, *offset = self._about_centre_of_pressure(normal_force)
         dx, dy = self.lever_coordinates(*offset)
         return (weights * (dx**2 + dy**2 + 0.5 * self.lever_radii**2)).sum(-1)
@@ -511,7 +483,7 @@ class ContactPatch(ByValue):
     @overload
     def area(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def area(self, normal_force: Any = None) -> Any:
-        """Return the area of the cells under load [m^2]."""
+        """Return the area of the cells under load [m^2]. Raises InvalidValueError as `weights` does."""
         return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
 
     def moments(
@@ -571,16 +543,15 @@ class ContactPatch(ByValue):
         `B_i = L_i [[1, 0, -y_i], [0, 1, x_i]]`; the wrench of a traction `t` of cell i is `B_i' t`. If any cell is a
         disc, all have a third row `(0, 0, kappa a_i)` with the `lever_radii` a and `kappa^2 = 1/2`: `[N, 3, 3]`.
         """
-        x, y = self.positions.T
-        one = np.ones_like(x)
-        zero = np.zeros_like(x)
-        plain = np.moveaxis(np.array([[one, zero, -y], [zero, one, x]]), -1, 0)
-        levers = plain if self.root is None else self.root @ plain
-        if not self.has_discs:
-            return levers
-        spin = np.zeros((len(x), 1, 3))
-        spin[:, 0, 2] = math.sqrt(0.5) * self.lever_radii
-        return np.concatenate([levers, spin], axis=1)
+        levers = np.zeros((self.cells, self.bristles, 3))
+        levers[:, :2, :2] = np.eye(2)
+        levers[:, 0, 2] = -self.positions[:, 1]
+        levers[:, 1, 2] = self.positions[:, 0]
+        if self.root is not None:
+            levers[:, :2] = self.root @ levers[:, :2]
+        if self.has_discs:
+            levers[:, 2, 2] = math.sqrt(0.5) * self.lever_radii
+        return levers
 
     @functools.cached_property
     def has_discs(self) -> bool:
@@ -595,21 +566,14 @@ class ContactPatch(ByValue):
     @functools.cached_property
     def lever_radii(self) -> np.ndarray:
         """Radii `[N]` [m] of the cells in the space of the metric M, `a sqrt(tr M/2)`; those of points are 0."""
-        radii = self.radii
-        return (
-            radii
-            if self.root is None
-            else radii * np.sqrt(0.5 * (self.root**2).sum((-2, -1)))
-        )
+        if self.root is None:
+            return self.radii
+        return self.radii * np.sqrt(0.5 * (self.root**2).sum((-2, -1)))
 
     def asymmetries(self) -> np.ndarray:
         """Return the asymmetry `a_i` of each cell, shape `[N, 2]`; zeros where there is none."""
-        shape = self.positions.shape
-        return (
-            np.zeros(shape)
-            if self.asymmetry is None
-            else np.broadcast_to(self.asymmetry, shape).copy()
-        )
+        asymmetry = 0.0 if self.asymmetry is None else self.asymmetry
+        return np.broadcast_to(asymmetry, self.positions.shape).copy()
 
     @functools.cached_property
     def root(self) -> np.ndarray | None:
@@ -638,14 +602,11 @@ class ContactPatch(ByValue):
         return picture("patch", self, normal_force=normal_force)
 
     def __repr__(self) -> str:
-        grid = (
-            "" if self.grid is None else f" of {self.grid.columns} x {self.grid.rows}"
-        )
+        grid = self.grid
+        of_grid = "" if grid is None else f" of {grid.columns} x {grid.rows}"
         law = type(self.pressure).__name__
-        cells = "discs" if self.has_discs else "cells"
-        return (
-            f"ContactPatch({self.name!r}, {self.cells} {cells}{grid}, {law} pressure)"
-        )
+        count = f"{self.cells} {'discs' if self.has_discs else 'cells'}"
+        return f"ContactPatch({self.name!r}, {count}{of_grid}, {law} pressure)"
 
     def _repr_html_(self) -> str:
         return picture("patch in a notebook", self)
@@ -672,20 +633,10 @@ class ContactPatch(ByValue):
         """Return weights `[..., N]` from relative pressures of that shape, scaled first so that no sum can overflow."""
         peak = relative.max(-1, keepdims=True)
         if not (peak > 0.0).all():
-            raise InvalidValueError(
-                "pressure",
-                "be > 0 on at least one cell at every load",
-                f"a peak of {peak.min()}",
-            )
-        load = (
-            relative
-            / peak
-            * (
-                self.areas
-                if self.point_shares is None
-                else self.areas * self.point_shares
-            )
-        )
+            rule = "be > 0 on at least one cell at every load"
+            raise InvalidValueError("pressure", rule, f"a peak of {peak.min()}")
+        shares = 1.0 if self.point_shares is None else self.point_shares
+        load = relative / peak * (self.areas * shares)
         return load / load.sum(-1, keepdims=True)
 
     def to_dict(self) -> dict[str, Any]:
@@ -718,28 +669,14 @@ class ContactPatch(ByValue):
         pressure = data.get("pressure")
         grid = data.get("grid")
         if isinstance(pressure, Mapping):
-            parts = {
-                key: cls.from_dict(value)
-                for key, value in pressure.items()
-                if key == "patch"
-            }
-            pressure = Pressure.from_dict({**pressure, **parts})
+            if "patch" in pressure:
+                pressure = {**pressure, "patch": cls.from_dict(pressure["patch"])}
+            pressure = Pressure.from_dict(pressure)
         if grid is not None:
-            validation.keys(
-                "grid",
-                grid,
-                required=[entry.name for entry in dataclasses.fields(Grid)],
-            )
+            validation.keys("grid", grid, required=Grid.__dataclass_fields__)
             grid = Grid(**grid)
-        given = {key: data.get(key) for key in options}
-        patch = cls(
-            data["positions"],
-            data["areas"],
-            pressure,
-            grid,
-            data.get("name", "patch"),
-            **given,
-        )
-        return outlines.with_outline(
-            patch, outlines.outline_from_dict(data.get("outline"))
-        )
+        given = {key: data.get(key) for key in ("positions", "areas", *options)}
+        name = data.get("name", "patch")
+        patch = cls(**given, pressure=pressure, grid=grid, name=name)
+        outline = outlines.outline_from_dict(data.get("outline"))
+        return outlines.with_outline(patch, outline)

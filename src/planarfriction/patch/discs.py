@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planarfriction._support import validation
+from planarfriction.geometry import rotate
 from planarfriction.patch.disc_friction import disc_friction
 from planarfriction.patch.outline import with_outline
 from planarfriction.patch.pressure import PerCell
@@ -92,7 +93,6 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     """Return fewer discs than the patch has cells; those of each kind of friction are chosen by themselves."""
     cells = _own_discs(patch)
     places = np.stack(cells.lever_coordinates(*cells.positions.T), -1)
-    root_scale = _ratio(cells)
     weights = mean_weights(cells)
     squares = 0.5 * cells.lever_radii**2
     groups = _kinds(cells)
@@ -100,10 +100,9 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     for group, count in zip(groups, _counts(places, weights, groups, n), strict=True):
         clusters = _clusters(places[group], weights[group], squares[group], count)
         parts.append(clusters._replace(cells=group[clusters.cells]))
-    first = np.repeat(
-        [group[0] for group in groups], [len(part.places) for part in parts]
-    )
-    start = np.cumsum([0, *(len(part.places) for part in parts)])
+    sizes = [len(part.places) for part in parts]
+    first = np.repeat([group[0] for group in groups], sizes)
+    start = np.cumsum([0, *sizes])
     labels = np.concatenate(
         [part.labels + at for part, at in zip(parts, start[:-1], strict=True)]
     )
@@ -111,36 +110,27 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     members = np.concatenate([part.cells for part in parts])[order]
     parted = np.concatenate([part.parted for part in parts])[order]
     begins = np.searchsorted(labels[order], np.arange(start[-1]))
-    radii = np.concatenate([part.radii for part in parts]) / root_scale[first]
+    root = np.eye(2) if cells.root is None else cells.root
+    # Radius of a disc in the space of its metric over its radius.
+    ratio = np.broadcast_to(np.sqrt(0.5 * (root**2).sum((-2, -1))), cells.cells)
+    radii = np.concatenate([part.radii for part in parts]) / ratio[first]
     shared = SharedPressure(cells, members, parted, begins, radii)
     areas = shared.sums(cells.areas)
-    fields = {
-        "metric": None
-        if cells.metric is None
-        else np.broadcast_to(cells.metric, (cells.cells, 2, 2))[first],
-        "asymmetry": None if cells.asymmetry is None else cells.asymmetries()[first],
-        "radii": radii,
-    }
-    if len(groups) == 1:
-        fields |= {
-            name: None if fields[name] is None else fields[name][0]
-            for name in ("metric", "asymmetry")
-        }
+    fields = {"radii": radii}
+    # One for all discs if they are of one kind.
+    chosen = first if len(groups) > 1 else first[0]
+    if cells.metric is not None:
+        fields["metric"] = np.broadcast_to(cells.metric, (cells.cells, 2, 2))[chosen]
+    if cells.asymmetry is not None:
+        fields["asymmetry"] = cells.asymmetries()[chosen]
     law = shared if cells.depends_on_load else PerCell(shared.relative(cells.positions))
-    positions = _from_lever_coordinates(
-        cells, np.concatenate([part.places for part in parts]), first
-    )
+    joined = np.concatenate([part.places for part in parts])
+    positions = _from_lever_coordinates(cells, joined, first)
     with warnings.catch_warnings(action="ignore"):
         return type(patch)(positions, areas, law, None, patch.name, **fields)
 
 
 # ---------------------------------------------------------------------- friction that depends on the direction
-
-
-def _ratio(patch: ContactPatch) -> np.ndarray:
-    """Return the radius of a disc in the space of its metric over its radius, `[N]`."""
-    root = np.eye(2) if patch.root is None else patch.root
-    return np.broadcast_to(np.sqrt(0.5 * (root**2).sum((-2, -1))), patch.cells)
 
 
 def _from_lever_coordinates(
@@ -159,9 +149,8 @@ def _kinds(patch: ContactPatch) -> list[np.ndarray]:
     """Return the cells of each kind of friction."""
     if patch.metric is None and patch.asymmetry is None:
         return [np.arange(patch.cells)]
-    metric = np.broadcast_to(
-        np.eye(2) if patch.metric is None else patch.metric, (patch.cells, 2, 2)
-    )
+    metric = np.eye(2) if patch.metric is None else patch.metric
+    metric = np.broadcast_to(metric, (patch.cells, 2, 2))
     numbers = np.hstack([metric.reshape(-1, 4), patch.asymmetries()])
     kind = np.unique(numbers, axis=0, return_inverse=True)[1].reshape(-1)
     return [np.flatnonzero(kind == k) for k in range(kind.max() + 1)]
@@ -246,14 +235,10 @@ def _clusters(
     """Return the discs of points with `weights` `[N]` and second moments of their own; fewer where n does not fit."""
     if len(places) <= n:
         each = np.arange(len(places))
-        return _Clusters(
-            places, np.sqrt(2.0 * squares), each, each, np.ones(len(places))
-        )
-    weights = (
-        weights / weights.sum()
-        if weights.any()
-        else np.full(len(places), 1.0 / len(places))
-    )
+        whole = np.ones(len(places))
+        return _Clusters(places, np.sqrt(2.0 * squares), each, each, whole)
+    weights = weights if weights.any() else np.ones(len(places))
+    weights = weights / weights.sum()
     middle, axes, scale = _frame(places, weights)
     points = (places - middle) @ axes / scale
     order = np.argsort(points @ SLANTED, kind="stable")
@@ -283,9 +268,7 @@ def _frame(
     xy = weights @ (x * y)
     yy = weights @ y**2
     angle = 0.0 if abs(xy) < SAME else 0.5 * math.atan2(2.0 * xy, xx - yy)
-    axes = np.array(
-        [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
-    )
+    axes = rotate(np.eye(2), angle).T
     if yy - xx > SAME and angle == 0.0:
         axes = axes[:, ::-1]
     turned = offset @ axes / scale
@@ -293,12 +276,16 @@ def _frame(
     return middle, axes * np.where(lean < -SAME, -1.0, 1.0), scale
 
 
+_FLIPS = ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
+"""Signs of the coordinates of images: mirrored at x = 0, at y = 0, at both."""
+
+
 def _period(points: np.ndarray, weights: np.ndarray, squares: np.ndarray) -> _Period:
     """Return one period of the symmetries of points sorted along `SLANTED`: mirrors on both axes, or `p -> -p`."""
     every = np.arange(len(points))
     near = SAME * float(np.abs(points).max())
     found = {(1.0, 1.0): every}
-    for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
+    for flip in _FLIPS:
         image = np.empty_like(every)
         image[np.argsort(points * flip @ SLANTED, kind="stable")] = every
         alike = all(
@@ -311,7 +298,7 @@ def _period(points: np.ndarray, weights: np.ndarray, squares: np.ndarray) -> _Pe
             found[flip] = image
     signs = np.array(list(found))
     images = np.array(list(found.values()))
-    mirrored = [k for k, flip in enumerate([(-1.0, 1.0), (1.0, -1.0)]) if flip in found]
+    mirrored = [k for k, flip in enumerate(_FLIPS[:2]) if flip in found]
     # without mirrors any one of a point and its image will do
     inside = (
         (points[:, mirrored] >= -near).all(axis=1) if mirrored else every <= images[-1]
@@ -325,13 +312,10 @@ def _period(points: np.ndarray, weights: np.ndarray, squares: np.ndarray) -> _Pe
 def _arrangements(period: _Period, n: int) -> list[tuple[int, int, int, int]]:
     """Return numbers of centres inside, held at x = 0, at y = 0 and at both, whose images are n in all."""
     flips = {tuple(each) for each in period.signs}
-    at_x, at_y, at_both = (
-        flip in flips for flip in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
-    )
+    at_x, at_y, at_both = (flip in flips for flip in _FLIPS)
     pair = max(1, len(flips) // 2)
-    width, height = (
-        np.sqrt(period.weights @ period.points**2 / period.weights.sum()) + SAME
-    )
+    spread = period.weights @ period.points**2 / period.weights.sum()
+    width, height = np.sqrt(spread) + SAME
     most_x = min(n // pair, int(math.sqrt(n * height / width)) + 1) if at_x else 0
     most_y = min(n // pair, int(math.sqrt(n * width / height)) + 1) if at_y else 0
     ways = []
@@ -347,9 +331,7 @@ def _arrangements(period: _Period, n: int) -> list[tuple[int, int, int, int]]:
 def _partitions(period: _Period, n: int) -> list[_Partition]:
     """Return the partitions into n clusters that cost little more than the best, the best first."""
     # Compiled code, which a patch alone does not need.
-    from planarfriction._engine.cells import (
-        clusters,
-    )
+    from planarfriction._engine.cells import clusters
 
     points = period.points
     weights = period.weights
@@ -364,33 +346,27 @@ def _partitions(period: _Period, n: int) -> list[_Partition]:
             centres = np.empty((k, 2))
             on_axes = np.zeros((k, 2), bool)
             clusters.seeds(points, weights, seed * k, centres)
-            order = np.argsort(
-                np.hypot(*centres.T) if period.inverted else centres[:, 0],
-                kind="stable",
-            )
-            on_axes[order[:at_both] if period.inverted else [], :] = True
-            on_axes[order[:at_x], 0] = True
-            rest = order[at_x:] if not period.inverted else order[:0]
-            lowest = rest[np.argsort(centres[rest, 1], kind="stable")[: at_y + at_both]]
-            on_axes[lowest, 1] = True
-            on_axes[
-                lowest[np.argsort(centres[lowest, 0], kind="stable")[:at_both]], 0
-            ] = True
+            if period.inverted:
+                on_axes[_lowest(np.hypot(*centres.T), at_both)] = True
+            else:
+                left = _lowest(centres[:, 0], k)
+                on_axes[left[:at_x], 0] = True
+                rest = left[at_x:]
+                low = rest[_lowest(centres[rest, 1], at_y + at_both)]
+                on_axes[low, 1] = True
+                on_axes[low[_lowest(centres[low, 0], at_both)], 0] = True
             centres[on_axes] = 0.0
-            cost = clusters.lloyd(
-                points,
-                weights,
-                period.inverted,
-                on_axes,
-                STEPS,
-                centres,
-                labels,
-                turned,
-            )
+            held = points, weights, period.inverted, on_axes
+            cost = clusters.lloyd(*held, STEPS, centres, labels, turned)
             if cost < np.inf:
                 found.append((cost, _Partition(centres, on_axes)))
     found.sort(key=lambda each: each[0])
     return _different(found)
+
+
+def _lowest(values: np.ndarray, count: int) -> np.ndarray:
+    """Return the indices of the lowest of some values, in their order."""
+    return np.argsort(values, kind="stable")[:count]
 
 
 def _different(found: list[tuple[float, _Partition]]) -> list[_Partition]:
@@ -424,23 +400,16 @@ def _chosen(
         n -= 1
     if len(good) == 1:
         return good[0]
-    centres = np.concatenate(
-        [period.points[:: max(1, len(period.points) // PLACES)], BESIDE]
-    )
-    heavier = np.where(
-        np.arange(len(centres)) < len(centres) - len(BESIDE), 1.0, HEAVIER
-    )
+    elsewhere = period.points[:: max(1, len(period.points) // PLACES)]
+    centres = np.concatenate([elsewhere, BESIDE])
+    heavier = np.repeat([1.0, HEAVIER], [len(elsewhere), len(BESIDE)])[:, None]
     wanted = weights @ _pulls(points, np.sqrt(2.0 * squares), centres)
 
     def error(partition: _Partition) -> float:
         places, radii, cells, labels, parted = _finished(period, partition)
         shares = np.bincount(labels, weights[cells] * parted)
-        return float(
-            (
-                heavier[:, None]
-                * (shares @ _pulls(places, radii, centres) - wanted) ** 2
-            ).sum()
-        )
+        missing = shares @ _pulls(places, radii, centres) - wanted
+        return float((heavier * missing**2).sum())
 
     return min(good, key=error)
 
@@ -462,11 +431,8 @@ def _finished(period: _Period, chosen: _Partition) -> _Clusters:
     points = np.where(turned[:, None], -points, points)
     share = np.bincount(labels, weights, k)
     for axis in range(2):
-        centres[:, axis] = np.where(
-            on_axes[:, axis],
-            0.0,
-            np.bincount(labels, weights * points[:, axis], k) / share,
-        )
+        mean = np.bincount(labels, weights * points[:, axis], k) / share
+        centres[:, axis] = np.where(on_axes[:, axis], 0.0, mean)
     squares = ((points - centres[labels]) ** 2).sum(axis=1) + period.squares
     radii = np.sqrt(2.0 * np.bincount(labels, weights * squares, k) / share)
     images = np.where(turned, period.images[::-1], period.images)
@@ -475,14 +441,9 @@ def _finished(period: _Period, chosen: _Partition) -> _Clusters:
     numbered = (np.cumsum(number) - 1).reshape(same.shape)
     disc = np.take_along_axis(numbered, same, axis=0)
     places = (period.signs[:, None] * centres).reshape(-1, 2)[number] + 0.0
+    radii = np.tile(radii, len(same))[number]
     parted = np.tile(period.parted, len(same))
-    return _Clusters(
-        places,
-        np.tile(radii, len(same))[number],
-        images.ravel(),
-        disc[:, labels].ravel(),
-        parted,
-    )
+    return _Clusters(places, radii, images.ravel(), disc[:, labels].ravel(), parted)
 
 
 def _pulls(places: np.ndarray, radii: np.ndarray, centres: np.ndarray) -> np.ndarray:

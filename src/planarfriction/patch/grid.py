@@ -37,11 +37,8 @@ def warn_of_the_unit(
         for x, side in zip(positions.T, cell_size or (0.0, 0.0), strict=True)
     )
     if not LEAST_WIDTH <= width <= MOST_WIDTH and width > 0.0:  # 0: a point
-        than = (
-            f"larger than {MOST_WIDTH:g}"
-            if width > MOST_WIDTH
-            else f"smaller than {LEAST_WIDTH:g}"
-        )
+        than = f"smaller than {LEAST_WIDTH:g}"
+        than = f"larger than {MOST_WIDTH:g}" if width > MOST_WIDTH else than
         warnings.warn(
             f"patch {name!r} is {width:.3g} m wide, {than} m: are its lengths in metres?",
             stacklevel=4,
@@ -111,13 +108,11 @@ class Grid(Checked):
     def centres(self) -> np.ndarray:
         """Return the centres of all cells, row by row from the top left, shape `[rows * columns, 2]` [m]."""
         # Counted from the middle, so that a grid around the origin is symmetric to the last digit.
-        x_middle = self.x_min + self.columns * self.cell_width / 2
-        y_middle = self.y_min + self.rows * self.cell_height / 2
-        x = (
-            x_middle
-            + (np.arange(self.columns) - (self.columns - 1) / 2) * self.cell_width
-        )
-        y = y_middle - (np.arange(self.rows) - (self.rows - 1) / 2) * self.cell_height
+        width, height = grid_sides(self)
+        column = np.arange(self.columns) - (self.columns - 1) / 2
+        row = np.arange(self.rows) - (self.rows - 1) / 2
+        x = self.x_min + width / 2 + column * self.cell_width
+        y = self.y_min + height / 2 - row * self.cell_height
         return np.stack([np.tile(x, self.rows), np.repeat(y, self.columns)], -1)
 
     def locate(self, positions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -132,11 +127,14 @@ class Grid(Checked):
         )
         from_top = self.rows - (positions[..., 1] - self.y_min) / self.cell_height
         from_left = (positions[..., 0] - self.x_min) / self.cell_width
-        row, column = (
-            np.floor(np.clip(each, -FARTHEST, FARTHEST)).astype(int)
-            for each in (from_top, from_left)
-        )
+        places = np.clip([from_top, from_left], -FARTHEST, FARTHEST)
+        row, column = np.floor(places).astype(int)
         return row, column
+
+
+def grid_sides(grid: Grid) -> np.ndarray:
+    """Return the width and the height of a whole grid `[2]` [m]."""
+    return np.array([grid.columns * grid.cell_width, grid.rows * grid.cell_height])
 
 
 LEAST_SPREAD = 1e-6
@@ -179,17 +177,17 @@ def point_shares(
     linear = np.column_stack([np.ones(len(w)), rho])
     square = np.column_stack([rho[:, 0] ** 2, rho[:, 0] * rho[:, 1], rho[:, 1] ** 2])
     scale = np.sqrt(w @ square**2)
-    square = square / np.where(scale > 0.0, scale, 1.0)
+    safe = np.where(scale > 0.0, scale, 1.0)
+    square = square / safe
     root = np.sqrt(w)[:, None]
     free = (
         square - linear @ np.linalg.lstsq(root * linear, root * square, rcond=None)[0]
     )
     variances, axes = np.linalg.eigh((w[:, None] * free).T @ free)
-    axes = axes[:, variances > LEAST_SPREAD]
-    missing = np.array([w @ own[:, 0], 0.0, w @ own[:, 1]]) / np.where(
-        scale > 0.0, scale, 1.0
-    )
-    found = axes @ (axes.T @ missing / variances[variances > LEAST_SPREAD])
+    determined = variances > LEAST_SPREAD
+    axes = axes[:, determined]
+    missing = np.array([w @ own[:, 0], 0.0, w @ own[:, 1]]) / safe
+    found = axes @ (axes.T @ missing / variances[determined])
     change = free @ found
     largest = np.abs(change).max()
     return 1.0 + change * min(1.0, LARGEST_CHANGE / largest) if largest > 0.0 else None

@@ -30,31 +30,24 @@ def finer(patch: ContactPatch, parts: int, name: str = "parts") -> ContactPatch:
         patch.cells * parts ** int(extent.any(axis=0).sum()), f"cells (by {name})"
     )
     fine = (np.arange(parts) - (parts - 1) / 2) / parts
-    inside = np.stack(
-        np.meshgrid(*(fine if side else [0.0] for side in extent.max(axis=0))), -1
-    ).reshape(-1, 2)
+    sides = (fine if side else [0.0] for side in extent.max(axis=0))
+    inside = np.stack(np.meshgrid(*sides), -1).reshape(-1, 2)
     times = len(inside)
     (width, height) = patch.cell_size or (0.0, 0.0)
     # What each cell has is repeated.
-    own = {
-        "metric": (patch.metric, 2),
-        "asymmetry": (patch.asymmetry, 1),
-    }
-    fields = {
-        name: value
-        if value is None or value.ndim == axes
-        else np.repeat(value, times, axis=0)
-        for name, (value, axes) in own.items()
-    }
+    fields = {"radii": np.repeat(patch.radii / parts, times)}
+    for name, axes in (("metric", 2), ("asymmetry", 1)):
+        value = getattr(patch, name)
+        per_cell = value is not None and value.ndim > axes
+        fields[name] = np.repeat(value, times, axis=0) if per_cell else value
     positions = patch.positions[:, None] + inside * extent[:, None]
     areas = np.repeat(patch.areas / times, times)
     positions = positions.reshape(-1, 2)
     size = (width / parts, height / parts)
-    shares = (
-        None if patch.point_shares is None else point_shares(positions, areas, size)
-    )
+    shares = patch.point_shares
+    if shares is not None:
+        shares = point_shares(positions, areas, size)
     pressure = patch.pressure.repeated(times)
-    fields["radii"] = np.repeat(patch.radii / parts, times)
     return type(patch)(
         positions, areas, pressure, None, patch.name, size, shares, **fields
     )
@@ -96,16 +89,14 @@ class GridError:
     """The same of `ContactPatch.discs()`, each cell a small disc, where cells are points; else None."""
 
     def __str__(self) -> str:
-        force, torque, breakaway = (
-            f"{100.0 * each:.2g} %"
-            for each in (self.force, self.torque, self.breakaway)
+        errors = ", ".join(
+            f"{name} {100.0 * getattr(self, name):.2g} %"
+            for name in ("force", "torque", "breakaway")
         )
-        discs = (
-            ""
-            if self.as_discs is None
-            else f"; as discs {self.as_discs}".partition(" (")[0]
-        )
-        return f"force {force}, torque {torque}, breakaway {breakaway} ({self.cells} cells){discs}"
+        discs = ""
+        if self.as_discs is not None:
+            discs = f"; as discs {self.as_discs}".partition(" (")[0]
+        return f"{errors} ({self.cells} cells){discs}"
 
 
 def grid_error(
@@ -163,8 +154,7 @@ def _beside_cells(
     order = np.argsort(distance, kind="stable")[:NEAREST]
     near = loaded[order[distance[order] <= max(radius, distance.min())]]
     sides = np.array([(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
-    sides = np.concatenate(
-        [distance * sides for distance in (BESIDE_DISCS if patch.has_discs else BESIDE)]
-    )
+    away = BESIDE_DISCS if patch.has_discs else BESIDE
+    sides = np.concatenate([distance * sides for distance in away])
     points = patch.positions[near, None] + sides * patch.cell_extents()[near, None]
     return points.reshape(-1, 2).T

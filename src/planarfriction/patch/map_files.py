@@ -98,24 +98,14 @@ class MapReading(Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.frame_shape is not None:
-            sides = (
-                self.frame_shape
-                if isinstance(self.frame_shape, Sequence) and len(self.frame_shape) == 2
-                else ()
-            )
-            if not sides:
-                raise InvalidValueError(
-                    "frame_shape", "be (rows, columns)", self.frame_shape
-                )
-            self._set(
-                frame_shape=tuple(
-                    validation.count("frame_shape", side) for side in sides
-                )
-            )
+            sides = self.frame_shape
+            if not isinstance(sides, Sequence) or len(sides) != 2:
+                raise InvalidValueError("frame_shape", "be (rows, columns)", sides)
+            sides = tuple(validation.count("frame_shape", side) for side in sides)
+            self._set(frame_shape=sides)
         if self.threshold is not None and self.threshold >= 1.0:
-            raise InvalidValueError(
-                "threshold", "be < 1, a share of the peak", self.threshold
-            )
+            rule = "be < 1, a share of the peak"
+            raise InvalidValueError("threshold", rule, self.threshold)
 
     def frame_of(self, what: str, values: np.ndarray | list[np.ndarray]) -> np.ndarray:
         """Return the frame `[rows, columns]` of values `[frames, rows, columns]`, or of any that `frame_shape` divides.
@@ -124,11 +114,8 @@ class MapReading(Checked):
         """
         if self.frame_shape is not None and isinstance(values, np.ndarray):
             if values.size == 0 or values.size % math.prod(self.frame_shape):
-                raise InvalidValueError(
-                    "frame_shape",
-                    f"divide the {values.size} values of {what}",
-                    self.frame_shape,
-                )
+                rule = f"divide the {values.size} values of {what}"
+                raise InvalidValueError("frame_shape", rule, self.frame_shape)
             values = values.reshape(-1, *self.frame_shape)
         several = isinstance(values, list) or values.ndim == 3
         place = self.place(what, len(values) if several else 1)
@@ -153,11 +140,8 @@ class MapReading(Checked):
         if self.frame is None and count == 1:
             return 0
         if self.frame is None or self.frame >= count:
-            raise InvalidValueError(
-                "frame",
-                f"be one of the {count} frames of {what}, 0 to {count - 1}",
-                self.frame,
-            )
+            rule = f"be one of the {count} frames of {what}, 0 to {count - 1}"
+            raise InvalidValueError("frame", rule, self.frame)
         return self.frame
 
     def pressures(self, what: str, values: np.ndarray, kind: str = "") -> np.ndarray:
@@ -173,18 +157,15 @@ class MapReading(Checked):
         if self.invert:
             paper = np.median(rim_of(values)) if _is_print(values) else values.max()
             values = np.maximum(paper - values, 0.0)
-        lossy = kind in (".jpg", ".jpeg")
-        share = (
-            self.threshold if self.threshold is not None else RINGING if lossy else 0.0
-        )
+        share = self.threshold
+        if share is None:
+            share = RINGING if kind in (".jpg", ".jpeg") else 0.0
         empty = (values > 0.0) & (values <= share * values.max())
         if self.threshold is None and empty.any():
             text = f"{empty.sum()} of {(values > 0.0).sum()} cells, up to {share:g} of the peak, count as empty"
-            warnings.warn(
-                f"{what}: {text}, as JPEG leaves traces there; threshold sets the share",
-                stacklevel=5,
-            )
-        return np.where(empty, 0.0, values) if empty.any() else values
+            text += ", as JPEG leaves traces there; threshold sets the share"
+            warnings.warn(f"{what}: {text}", stacklevel=5)
+        return np.where(empty, 0.0, values)
 
 
 def map_reading(options: Mapping[str, Any]) -> MapReading:
@@ -224,21 +205,15 @@ def read_pressure_map(path: str | Path, **options: Any) -> np.ndarray:
         # What is no number, or too large for a float, no patch takes.
         with np.errstate(all="ignore"):
             values = readers[kind](path, reading)
-            if (
-                kind in ARRAYS
-                and values.ndim == 2
-                and reading.labelled(values.shape[1], values[:, 0])
-            ):
-                values = values[:, 1:]
-            if (
-                kind not in IMAGE_SUFFIXES
-                and reading.frame_shape is None
-                and getattr(values, "ndim", 0) == 2
-            ):
-                refuse_other_tables(what, values, reading.index)
-            values = (
-                values if kind in IMAGE_SUFFIXES else reading.frame_of(what, values)
-            )
+            if kind not in IMAGE_SUFFIXES:
+                if getattr(values, "ndim", 0) == 2:
+                    if kind in ARRAYS and reading.labelled(
+                        values.shape[1], values[:, 0]
+                    ):
+                        values = values[:, 1:]
+                    if reading.frame_shape is None:
+                        refuse_other_tables(what, values, reading.index)
+                values = reading.frame_of(what, values)
             _check_size(path, values.size)
             values = reading.pressures(what, values, kind)
             if reading.threshold is None and not reading.invert:
@@ -264,18 +239,11 @@ def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
     if names and names[0].startswith("DATA_TYPE"):
         return _read_tekscan(path, reading)
     corner = bool(names) and _is_name(names[0]) and _are_labels(names[1:])
-    header = (
-        (all(map(_is_name, names)) and any(names)) or corner
-        if reading.header is None
-        else reading.header
-    )
-    if (
-        reading.header is None
-        and not header
-        and len(names) >= FEWEST_LABELS
-        and _are_labels(names)
-    ):
-        raise FileError(_ambiguous(what, "row", names, "header"))
+    header = reading.header
+    if header is None:
+        header = corner or (all(map(_is_name, names)) and any(names))
+        if not header and _are_labels(names, FEWEST_LABELS):
+            raise FileError(_ambiguous(what, "row", names, "header"))
     rows = rows if header or not names else itertools.chain([(line, names)], rows)
     first = []
     values = array("d")
@@ -305,30 +273,19 @@ def _read_csv(path: Path, reading: MapReading) -> np.ndarray | list[np.ndarray]:
     table = np.array(values).reshape(len(first), -1)
     labels = [cell for _, cell in first]
     index = reading.labelled(len(names), labels)
-    if reading.frame_shape is None and header and reading.index is None:
-        refuse_named(what, names)
-    if not index and reading.index is None:
-        index = (
-            corner
-            or (header and names[0] in ("", "index", "Unnamed: 0"))
-            or all(map(_is_name, labels))
-        )
-        if (
-            not index
-            and len(names) > 1
-            and len(labels) >= FEWEST_LABELS
-            and _are_labels(labels)
-        ):
+    if reading.index is None:
+        if reading.frame_shape is None and header:
+            refuse_named(what, names)
+        named = header and names[0] in ("", "index", "Unnamed: 0")
+        index = index or corner or named or all(map(_is_name, labels))
+        if not index and len(names) > 1 and _are_labels(labels, FEWEST_LABELS):
             raise FileError(_ambiguous(what, "column", labels, "index"))
     if not index:
         column = [number(what, line, "value 1", cell) for line, cell in first]
         table = np.column_stack([column, table])
-    blocks = [count for count in blocks if count]
-    return (
-        table
-        if reading.frame_shape is not None
-        else _frames(what, table, blocks, reading.frame)
-    )
+    if reading.frame_shape is not None:
+        return table
+    return _frames(what, table, [count for count in blocks if count], reading.frame)
 
 
 def _frames(
@@ -360,15 +317,11 @@ def _is_name(cell: str) -> bool:
     return False
 
 
-def _are_labels(cells: Sequence[str]) -> bool:
-    """Return True if cells are consecutive integers from 0 or 1."""
-    return (
-        any(
-            list(cells) == [str(first + i) for i in range(len(cells))]
-            for first in (0, 1)
-        )
-        and len(cells) > 0
-    )
+def _are_labels(cells: Sequence[str], fewest: int = 1) -> bool:
+    """Return True if cells, at least so many, are consecutive integers from 0 or 1."""
+    first = 0 if "0" in cells[:1] else 1
+    labels = [str(first + i) for i in range(len(cells))]
+    return len(cells) >= fewest and list(cells) == labels
 
 
 def _ascends(cells: Any) -> bool:
@@ -391,12 +344,8 @@ def _read_tekscan(path: Path, _: MapReading) -> np.ndarray:
         if line.lower().startswith("frame") or (line and not frames and line != "@@"):
             frames.append([])
         if line and line != "@@" and not line.lower().startswith("frame"):
-            frames[-1].append(
-                [
-                    0.0 if cell.strip() == "B" else float(cell)
-                    for cell in line.split(",")
-                ]
-            )
+            cells = map(str.strip, line.split(","))
+            frames[-1].append([0.0 if cell == "B" else float(cell) for cell in cells])
     if not any(frames):
         raise FileError(f"pressure map {path}: the file holds no numbers")
     return np.array(frames)
@@ -423,15 +372,14 @@ def _array(path: Path, content: bytes) -> np.ndarray:
 
 
 def _read_npz(path: Path, _: MapReading) -> np.ndarray:
-    with zipfile.ZipFile(
-        io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))
-    ) as archive:
-        _only(path, archive.namelist())
-        if archive.infolist()[0].file_size > MOST_BYTES:
+    content = io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))
+    with zipfile.ZipFile(content) as archive:
+        name = _only(path, archive.namelist())
+        if archive.getinfo(name).file_size > MOST_BYTES:
             raise FileError(
                 f"pressure map {path}: its array is larger than {MOST_BYTES / 1e6:g} MB"
             )
-        return _array(path, archive.read(archive.namelist()[0]))
+        return _array(path, archive.read(name))
 
 
 def _read_mat(path: Path, _: MapReading) -> np.ndarray:
@@ -439,9 +387,9 @@ def _read_mat(path: Path, _: MapReading) -> np.ndarray:
 
     content = io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))
     sizes = {
-        name: math.prod(shape)
+        name: size
         for name, shape, _ in whosmat(content)
-        if math.prod(shape) > 1
+        if (size := math.prod(shape)) > 1
     }
     name = _only(path, list(sizes))
     if sizes[name] > MOST_VALUES:
@@ -487,9 +435,8 @@ def _read_image(path: Path, reading: MapReading) -> np.ndarray:
         _check_size(path, math.prod(image.size))
         if image.mode in GREY_MODES:
             return np.asarray(image, dtype=float)
-        red, green, blue, alpha = np.moveaxis(
-            np.asarray(image.convert("RGBA"), dtype=float), -1, 0
-        )
+        colours = np.asarray(image.convert("RGBA"), dtype=float)
+    red, green, blue, alpha = np.moveaxis(colours, -1, 0)
     if not ((red == green).all() and (red == blue).all()):
         text = "this is a colour image; if its brightness means pressure, save it in grey (in Pillow: convert('L'))"
         raise FileError(f"{what}: {text}")

@@ -12,6 +12,7 @@ import numpy as np
 
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.geometry import rotate
 
 if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
@@ -29,12 +30,10 @@ def friction_metric(angle: float, along: float, across: float) -> np.ndarray:
     Raises InvalidValueError for an angle that is not finite, and for frictions that are not > 0.
     """
     angle = validation.number("angle", angle)
-    squares = [
-        validation.positive("along", along) ** 2,
-        validation.positive("across", across) ** 2,
-    ]
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    return _symmetric((turn * squares) @ turn.T)
+    along = validation.positive("along", along)
+    across = validation.positive("across", across)
+    axes = rotate(np.eye(2), angle)
+    return _symmetric(axes.T @ np.diag([along**2, across**2]) @ axes)
 
 
 def symmetric_root(metric: np.ndarray) -> np.ndarray:
@@ -49,11 +48,8 @@ def refuse_anisotropy(patch: ContactPatch, by: str) -> None:
     """Raise where `by`, which knows only friction that is the same in all directions, is given other friction."""
     # What is no patch at all has its own error.
     if getattr(patch, "anisotropic", False):
-        raise InvalidValueError(
-            "patch",
-            f"have the same friction in all directions for {by}",
-            "a friction metric",
-        )
+        rule = f"have the same friction in all directions for {by}"
+        raise InvalidValueError("patch", rule, "a friction metric")
 
 
 def refuse_cell_metrics(patch: ContactPatch, by: str) -> None:
@@ -63,11 +59,8 @@ def refuse_cell_metrics(patch: ContactPatch, by: str) -> None:
         and (patch.asymmetries() != patch.asymmetries()[0]).any()
     )
     if different or (patch.root is not None and patch.root.ndim == 3):
-        raise InvalidValueError(
-            "patch",
-            f"have one friction metric and asymmetry for all cells for {by}",
-            "one a cell",
-        )
+        rule = f"have one friction metric and asymmetry for all cells for {by}"
+        raise InvalidValueError("patch", rule, "one a cell")
 
 
 def same_metric(one: ContactPatch, other: ContactPatch) -> bool:

@@ -51,11 +51,8 @@ def circle(radius: float) -> np.ndarray:
     """
     step = 2 * math.pi / CIRCLE_SIDES
     angle = (np.arange(CIRCLE_SIDES) + 0.5) * step
-    return (
-        radius
-        * math.sqrt(step / math.sin(step))
-        * np.stack([np.cos(angle), np.sin(angle)], -1)
-    )
+    size = radius * math.sqrt(step / math.sin(step))
+    return size * np.stack([np.cos(angle), np.sin(angle)], -1)
 
 
 def clip(outline: Any, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
@@ -106,14 +103,8 @@ class PolygonOutline(ByValue):
     def triangles(self) -> np.ndarray:
         """Return triangles `[M - 2, 3, 2]` [m] from the first vertex; their signed sum is the polygon."""
         others = self.vertices[1:]
-        return np.stack(
-            [
-                np.broadcast_to(self.vertices[0], others[1:].shape),
-                others[:-1],
-                others[1:],
-            ],
-            1,
-        )
+        first = np.broadcast_to(self.vertices[0], others[1:].shape)
+        return np.stack([first, others[:-1], others[1:]], 1)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the outline as plain data, which `outline_from_dict` reads."""
@@ -191,13 +182,10 @@ def clipped(
         )
     try:
         positions, areas = clip(polygon, grid)
-    except (
-        shapely.errors.GEOSException
-    ) as error:  # rounding of coordinates far apart in size
-        raise InvalidValueError(
-            "vertices", "form a polygon that can be cut into cells", str(error)
-        ) from None
+    # Of coordinates far apart in size.
+    except shapely.errors.GEOSException as error:
+        rule = "form a polygon that can be cut into cells"
+        raise InvalidValueError("vertices", rule, str(error)) from None
     shares = point_shares(positions, areas, (grid.cell_width, grid.cell_height))
-    return with_outline(
-        kind(positions, areas, pressure, grid, name, point_shares=shares), outline
-    )
+    patch = kind(positions, areas, pressure, grid, name, point_shares=shares)
+    return with_outline(patch, outline)

@@ -56,16 +56,14 @@ class Pressure(Checked):
 
     def to_dict(self) -> dict[str, Any] | list[float]:
         """Return the law as plain data: `{"law": name, parameter: value, ...}`, or a list of one pressure per cell."""
-        fields = {
-            field.name: getattr(self, field.name) for field in dataclasses.fields(self)
-        }  # pyright: ignore
-        given = {name: value for name, value in fields.items() if value is not None}
-        lists = {
-            name: np.asarray(v).tolist()
-            for name, v in given.items()
-            if isinstance(v, (tuple, np.ndarray))
-        }
-        return {"law": self.law, **given, **lists}
+        table: dict[str, Any] = {"law": self.law}
+        for field in dataclasses.fields(self):  # pyright: ignore
+            value = getattr(self, field.name)
+            if isinstance(value, (tuple, np.ndarray)):
+                value = np.asarray(value).tolist()
+            if value is not None:
+                table[field.name] = value
+        return table
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Pressure:
@@ -80,15 +78,9 @@ class Pressure(Checked):
         kind = PRESSURES.choose(data["law"])
         given = {name: value for name, value in data.items() if name != "law"}
         fields = dataclasses.fields(kind)
-        required = [
-            field.name for field in fields if field.default is dataclasses.MISSING
-        ]
-        validation.keys(
-            f"{kind.law} pressure",
-            given,
-            required=required,
-            optional=[field.name for field in fields],
-        )
+        needed = [each.name for each in fields if each.default is dataclasses.MISSING]
+        names = [each.name for each in fields]
+        validation.keys(f"{kind.law} pressure", given, needed, names)
         return kind(**given)
 
 
@@ -118,9 +110,8 @@ class LinearGradient(Pressure):
     """(gx, gy): change of the pressure per metre, relative to the pressure at the origin [1/m]."""
 
     def __post_init__(self) -> None:
-        self._set(
-            gradient=tuple(validation.vector("gradient", self.gradient, 2).tolist())
-        )
+        gradient = validation.vector("gradient", self.gradient, 2)
+        self._set(gradient=tuple(gradient.tolist()))
 
     def relative(
         self, positions: np.ndarray, normal_force: np.ndarray | None = None
@@ -162,11 +153,8 @@ class SoftFinger(Pressure):
             )
         super().__post_init__()
         if self.n > 1.0:
-            raise InvalidValueError(
-                "n",
-                "be at most 1: a contact does not grow faster than its load",
-                self.n,
-            )
+            rule = "be at most 1: a contact does not grow faster than its load"
+            raise InvalidValueError("n", rule, self.n)
 
     @property
     def depends_on_load(self) -> bool:
@@ -177,26 +165,23 @@ class SoftFinger(Pressure):
 
         Raises InvalidValueError for a load below zero.
         """
-        return self._radius(
-            validation.non_negative_numbers("normal_force", normal_force)
-        )
+        load = validation.non_negative_numbers("normal_force", normal_force)
+        return self._radius(load)
 
     def _radius(self, load: np.ndarray) -> np.ndarray:
         # A radius of 0 would divide by zero.
         with np.errstate(over="ignore", under="ignore"):
             radius = np.maximum(self.c * load**self.n, validation.SMALLEST)
-        return (
-            radius if self.radius_max is None else np.minimum(radius, self.radius_max)
-        )
+        most = np.inf if self.radius_max is None else self.radius_max
+        return np.minimum(radius, most)
 
     def exponent(self, normal_force: ArrayLike) -> np.ndarray:
         """Return the exponent `k` of the profile [-] at `normal_force` `[...]` [N].
 
         Raises InvalidValueError for a load below zero.
         """
-        return self._exponent(
-            validation.non_negative_numbers("normal_force", normal_force)
-        )
+        load = validation.non_negative_numbers("normal_force", normal_force)
+        return self._exponent(load)
 
     def _exponent(self, load: np.ndarray) -> np.ndarray:
         if self.k_per_newton is None:
@@ -206,21 +191,17 @@ class SoftFinger(Pressure):
     def relative(
         self, positions: np.ndarray, normal_force: np.ndarray | None = None
     ) -> np.ndarray:
-        load = np.asarray(1.0 if normal_force is None else normal_force, dtype=float)[
-            ..., None
-        ]
+        load = np.array([1.0]) if normal_force is None else normal_force[..., None]
         k = self._exponent(load)
-        distance = np.hypot(positions[:, 0], positions[:, 1])
+        distance, nearest = _distances(positions)
         ratio = distance / self._radius(load)
         inside = ratio < 1.0
-        nearest = distance <= distance.min() * (1.0 + SAME_DISTANCE)
         # In logarithms, relative to the largest value: at small k the profile underflows everywhere but at s = 0.
         with np.errstate(divide="ignore"):
             profile = formulas.soft_finger(np, np.where(inside, ratio, 0.5), k)
         profile = np.where(inside, profile, -np.inf)
-        profile = np.where(
-            inside.any(-1, keepdims=True), profile, np.where(nearest, 0.0, -np.inf)
-        )
+        some = inside.any(-1, keepdims=True)
+        profile = np.where(some, profile, np.where(nearest, 0.0, -np.inf))
         return np.exp((profile - profile.max(-1, keepdims=True)) / k)
 
     def ever_loaded(
@@ -228,12 +209,16 @@ class SoftFinger(Pressure):
     ) -> np.ndarray:
         if not self.depends_on_load:
             return super().ever_loaded(positions)
-        distance = np.hypot(positions[:, 0], positions[:, 1])
+        distance, nearest = _distances(positions)
         highest = np.inf if between is None else between[1]
         largest = self._radius(np.array(1.0 if self.n == 0.0 else highest))
-        return (distance < largest) | (
-            distance <= distance.min() * (1.0 + SAME_DISTANCE)
-        )
+        return (distance < largest) | nearest
+
+
+def _distances(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return distances `[N]` [m] from the origin, and which of them are the smallest."""
+    distance = np.hypot(positions[:, 0], positions[:, 1])
+    return distance, distance <= distance.min() * (1.0 + SAME_DISTANCE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,11 +241,8 @@ class PerCell(ByValue, Pressure):
     ) -> np.ndarray:
         """Return the pressures of the cells, `[N]`. Raises InvalidValueError for another number of positions."""
         if len(self.values) != len(positions):
-            raise InvalidValueError(
-                "pressure",
-                f"have shape [{len(positions)}]",
-                f"shape [{len(self.values)}]",
-            )
+            rule = f"have shape [{len(positions)}]"
+            raise InvalidValueError("pressure", rule, f"shape [{len(self.values)}]")
         return self.values
 
     def only(self, kept: np.ndarray) -> PerCell:
@@ -289,11 +271,7 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
 
 def pressure_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
     """Return relative pressures as a new float array; a mask is taken as zeros and ones, and any scale will do."""
-    if (
-        isinstance(value, np.ndarray)
-        and value.dtype.kind == "b"
-        and not isinstance(value, np.ma.MaskedArray)
-    ):
+    if type(value) is np.ndarray and value.dtype.kind == "b":
         value = value.astype(float)
     return validation.array(name, value, shape, largest=np.inf)
 
@@ -305,10 +283,9 @@ def evaluated(
     try:
         return [function(*point) for point in points]
     except Exception as error:
-        wanted = f"be a function of {' and '.join('xy'[: len(points[0])])} [m] that gives a number"
-        raise InvalidValueError(
-            name, wanted, f"{type(error).__name__}: {error}"
-        ) from error
+        rule = f"be a function of {' and '.join('xy'[: len(points[0])])} [m] that gives a number"
+        given = f"{type(error).__name__}: {error}"
+        raise InvalidValueError(name, rule, given) from error
 
 
 def non_negative_array(
@@ -328,8 +305,5 @@ def check_pressure(values: np.ndarray, positions: np.ndarray) -> None:
         if broken.any():
             index = int(broken.argmax())
             x, y = positions[index].tolist()
-            raise InvalidValueError(
-                "pressure",
-                rule,
-                f"{values[index]} at index {index}, position ({x:g}, {y:g}) m",
-            )
+            given = f"{values[index]} at index {index}, position ({x:g}, {y:g}) m"
+            raise InvalidValueError("pressure", rule, given)

@@ -74,16 +74,12 @@ class PressureMaps(ByValue, Pressure):
         """Return the relative pressures of the cells at the loads, `[..., N]`. Raises InvalidValueError for another
         number of positions, and for a load below zero."""
         if self.values.shape[1] != len(positions):
-            raise InvalidValueError(
-                "pressure",
-                f"have shape [L, {len(positions)}]",
-                f"shape {list(self.values.shape)}",
-            )
+            rule = f"have shape [L, {len(positions)}]"
+            given = f"shape {list(self.values.shape)}"
+            raise InvalidValueError("pressure", rule, given)
         if not self.depends_on_load:
             return self._shares[0]
-        load = np.asarray(
-            self.loads[0] if normal_force is None else normal_force, dtype=float
-        )
+        load = self.loads[0] if normal_force is None else normal_force
         place = np.interp(load, self.loads, np.arange(len(self.loads)))
         below = np.minimum(place.astype(int), len(self.loads) - 2)
         share = (place - below)[..., None]
@@ -118,12 +114,11 @@ def read_maps(
     reading = map_reading(options)
     if isinstance(pressure, Mapping):
         if loads is not None:
-            raise InvalidValueError(
-                "loads", "be left out, because the mapping has them", loads
-            )
+            rule = "be left out, because the mapping has them"
+            raise InvalidValueError("loads", rule, loads)
         loads = sorted(
             pressure,
-            key=lambda load: validation.positive("load of a pressure map", load),
+            key=functools.partial(validation.positive, "load of a pressure map"),
         )
         pressure = [pressure[load] for load in loads]
     if loads is None:
@@ -132,24 +127,17 @@ def read_maps(
             raise InvalidValueError(_what(pressure), "have a total > 0", "0")
         return values.ravel(), values.shape, name
     loads = validation.array("loads", loads, (None,))
-    count = (
-        1
-        if isinstance(pressure, (str, Path)) or not hasattr(pressure, "__len__")
-        else len(pressure)
-    )
-    if count != len(loads) or isinstance(pressure, (str, Path)):
-        raise InvalidValueError(
-            "pressure", f"have one map for each of {len(loads)} loads", count
-        )
+    several = hasattr(pressure, "__len__") and not isinstance(pressure, (str, Path))
+    count = len(pressure) if several else 1
+    if not several or count != len(loads):
+        rule = f"have one map for each of {len(loads)} loads"
+        raise InvalidValueError("pressure", rule, count)
     maps = [_one_map(each, reading) for each in pressure]
     shape = maps[0][0].shape if maps else (0, 0)
     for each, (values, _) in zip(pressure, maps, strict=True):
         if values.shape != shape:
-            raise InvalidValueError(
-                _what(each),
-                f"have the shape of the first, {list(shape)}",
-                list(values.shape),
-            )
+            rule = f"have the shape of the first, {list(shape)}"
+            raise InvalidValueError(_what(each), rule, list(values.shape))
     stack = [values.ravel() for values, _ in maps]
     return PressureMaps(loads, stack if stack else np.empty((0, 0))), shape, maps[0][1]
 
@@ -163,9 +151,8 @@ def map_grid(rows: int, columns: int, cell_size: Any, width: Any) -> Grid:
         raise InvalidValueError(
             "cell_size", "be given, or else the width of the whole map", cell_size
         )
-    cell_size = (
-        validation.length("width", width) / columns if cell_size is None else cell_size
-    )
+    if cell_size is None:
+        cell_size = validation.length("width", width) / columns
     size = validation.numbers("cell_size", cell_size)
     size = validation.array("cell_size", size, (2,) if size.ndim else ())
     width, height = np.broadcast_to(
@@ -186,11 +173,9 @@ def _one_map(pressure: Any, reading: MapReading) -> tuple[np.ndarray, str | None
         values = read_pressure_map(pressure, **vars(reading))
         name = title(pressure)
     else:
-        values = (
-            reading.frame_of("pressure", pressure)
-            if isinstance(pressure, np.ndarray)
-            else pressure
-        )
+        values = pressure
+        if isinstance(pressure, np.ndarray):
+            values = reading.frame_of("pressure", pressure)
         name = None
     values = non_negative_array(_what(pressure), values, (None, None))
     return values if name else reading.pressures("pressure", values), name

@@ -58,31 +58,22 @@ def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPat
 
 def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return two square pads (3 x 3 of 21 x 21 cells) at the left and right ends of the middle rows."""
-    return _masked(
-        [(slice(9, 12), slice(0, 3)), (slice(9, 12), slice(18, 21))],
-        cells,
-        width,
-        "NonConvex1",
-    )
+    pads = [(slice(9, 12), slice(0, 3)), (slice(9, 12), slice(18, 21))]
+    return _masked(pads, cells, width, "NonConvex1")
 
 
 def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Return a lying T of two bars: rows 9..11 x columns 0..13, and rows 4..17 x columns 18..20 (of 21 x 21 cells)."""
-    return _masked(
-        [(slice(9, 12), slice(0, 14)), (slice(4, 18), slice(18, 21))],
-        cells,
-        width,
-        "NonConvex2",
-    )
+    bars = [(slice(9, 12), slice(0, 14)), (slice(4, 18), slice(18, 21))]
+    return _masked(bars, cells, width, "NonConvex2")
 
 
 def _even(patch: ContactPatch) -> ContactPatch:
     """Return the patch of points with weights in proportion to pressure and area alone, as published."""
-    with warnings.catch_warnings():  # that the shape itself has given
-        warnings.simplefilter("ignore")
-        return with_outline(
-            dataclasses.replace(patch, point_shares=None, radii=None), patch.outline
-        )
+    # The shape itself has given them.
+    with warnings.catch_warnings(action="ignore"):
+        points = dataclasses.replace(patch, point_shares=None, radii=None)
+    return with_outline(points, patch.outline)
 
 
 def _steps(cells: int) -> np.ndarray:
@@ -117,45 +108,25 @@ def pressure_map(
 
     Raises `InvalidValueError` unless exactly one of `file`, `files` and `values` is given.
     """
-    given = {
-        key: value
-        for key, value in (("file", file), ("files", files), ("values", values))
-        if value is not None
+    options = {key: value for key, value in locals().items() if value is not None}
+    maps = {
+        key: options.pop(key) for key in ("file", "files", "values") if key in options
     }
-    if len(given) != 1:
+    if len(maps) != 1:
         rule = "have either file or values (or files, one for each load)"
-        raise InvalidValueError(
-            "pressure map", rule, " and ".join(given) or "none of them"
-        )
+        given = " and ".join(maps) or "none of them"
+        raise InvalidValueError("pressure map", rule, given)
     if files is not None and loads is None:
         raise InvalidValueError(
             "loads", "be given: the normal force of each of the files", "none"
         )
-    reading = {
-        "header": header,
-        "index": index,
-        "frame_shape": frame_shape,
-        "frame": frame,
-        "threshold": threshold,
-    }
-    options = {
-        "width": width,
-        "loads": loads,
-        "name": name,
-        "invert": invert,
-        **reading,
-    }
-    return ContactPatch.from_pressure(next(iter(given.values())), cell_size, **options)
+    return ContactPatch.from_pressure(*maps.values(), **options)
 
 
 def published(name: str, cells: Any = None, width: Any = None) -> ContactPatch:
     """Return the published patch `name` of so many `cells` along a side, `width` [m] wide."""
-    size = {
-        key: value
-        for key, value in (("cells", cells), ("width", width))
-        if value is not None
-    }
-    return PUBLISHED_PATCHES.choose(name)(**size)
+    size = {key: value for key, value in locals().items() if value is not None}
+    return PUBLISHED_PATCHES.choose(size.pop("name"))(**size)
 
 
 def cells(

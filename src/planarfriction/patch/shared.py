@@ -41,11 +41,8 @@ def mean_weights(patch: ContactPatch) -> np.ndarray:
         return patch.weights()
     loads = loads_of_change(patch)
     sizes = np.sqrt(patch.second_moment(loads))
-    return (
-        sizes @ patch.weights(loads) / sizes.sum()
-        if sizes.any()
-        else patch.weights(loads).mean(axis=0)
-    )
+    sizes = sizes if sizes.any() else np.ones_like(sizes)
+    return sizes @ patch.weights(loads) / sizes.sum()
 
 
 def loads_of_change(patch: ContactPatch) -> np.ndarray:
@@ -84,17 +81,11 @@ class SharedPressure(ByValue, Pressure):
 
     def __post_init__(self) -> None:
         members = len(np.atleast_1d(self.cells))
-        for name in ("cells", "begins"):
-            numbers = validation.array(
-                name, getattr(self, name), (members if name == "cells" else None,)
-            ).astype(int)
-            self._set(**{name: numbers})
-        self._set(
-            parted=validation.non_negative_array("parted", self.parted, (members,))
-        )
-        self._set(
-            radii=validation.non_negative_array("radii", self.radii, self.begins.shape)
-        )
+        cells = validation.array("cells", self.cells, (members,)).astype(int)
+        begins = validation.array("begins", self.begins, (None,)).astype(int)
+        parted = validation.non_negative_array("parted", self.parted, (members,))
+        radii = validation.non_negative_array("radii", self.radii, begins.shape)
+        self._set(cells=cells, begins=begins, parted=parted, radii=radii)
 
     @property
     def depends_on_load(self) -> bool:
@@ -106,7 +97,7 @@ class SharedPressure(ByValue, Pressure):
         areas = self.sums(self.patch.areas)
         if not self.depends_on_load:
             return self.sums(self.patch.weights()) / areas
-        loads = np.asarray(1.0 if normal_force is None else normal_force, dtype=float)
+        loads = np.ones(()) if normal_force is None else normal_force
         different, place = np.unique(loads, return_inverse=True)
         shares = np.array(
             [self._at(positions, weights) for weights in self.patch.weights(different)]
@@ -130,14 +121,10 @@ class SharedPressure(ByValue, Pressure):
         shares = self.sums(weights)
         cells = self.patch.positions
         centre = weights @ cells
-        size = (
-            math.sqrt(
-                weights @ ((cells - centre) ** 2).sum(axis=1)
-                + 0.5 * weights @ self.patch.radii**2
-            )
-            or 1.0
-        )
-        wanted = _moments((cells - centre) / size, self.patch.radii / size) @ weights
+        radii = self.patch.radii
+        squares = ((cells - centre) ** 2).sum(axis=1) + 0.5 * radii**2
+        size = math.sqrt(weights @ squares) or 1.0
+        wanted = _moments((cells - centre) / size, radii / size) @ weights
         moments = _moments((positions - centre) / size, self.radii / size)
         for _ in range(ROUNDS):
             gram = moments * shares @ moments.T

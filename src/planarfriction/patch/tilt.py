@@ -23,19 +23,14 @@ def moments_of(value: Any) -> np.ndarray:
 def centre_of(moments: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
     # Compiled code, which a patch alone does not need.
-    from planarfriction._engine.cells.tilt import (
-        REACH,
-    )
+    from planarfriction._engine.cells.tilt import REACH
 
-    loaded = load > 0.0
+    loaded = (load > 0.0)[..., None]
     with np.errstate(over="ignore"):
-        x, y = (
-            each / np.where(loaded, load, 1.0)
-            for each in (-moments[..., 1], moments[..., 0])
+        centre = (
+            moments[..., ::-1] * [-1.0, 1.0] / np.where(loaded, load[..., None], 1.0)
         )
-    return np.where(
-        loaded[..., None], np.clip(np.stack([x, y], -1), -REACH, REACH), 0.0
-    )
+    return np.where(loaded, np.clip(centre, -REACH, REACH), 0.0)
 
 
 def weights_under(patch: Any, normal_force: Any, moments: Any) -> np.ndarray:
@@ -53,10 +48,13 @@ def weights_under(patch: Any, normal_force: Any, moments: Any) -> np.ndarray:
     if math.prod(batch) * patch.cells > validation.MOST_NUMBERS:
         rule = f"be at most {validation.MOST_NUMBERS // patch.cells} pairs for {patch.cells} cells"
         raise InvalidValueError("moments", rule, math.prod(batch))
-    weights = np.broadcast_to(patch.weights(load), (*batch, patch.cells)).reshape(
-        -1, patch.cells
+    weights, centre, loaded = (
+        np.broadcast_to(each, (*batch, each.shape[-1])).reshape(-1, each.shape[-1])
+        for each in (
+            patch.weights(load),
+            centre_of(moments, load),
+            load[..., None] > 0.0,
+        )
     )
-    centre = np.broadcast_to(centre_of(moments, load), (*batch, 2)).reshape(-1, 2)
-    loaded = np.broadcast_to(load, batch).reshape(-1, 1) > 0.0
     found = np.where(loaded, tilted(patch.positions, weights, centre), weights)
     return found.reshape(*batch, patch.cells)

@@ -14,7 +14,6 @@ from matplotlib.patches import FancyArrowPatch, Patch
 from matplotlib.patheffects import withStroke
 
 import planarfriction as pf
-from planarfriction import geometry
 from planarfriction._support import validation
 from planarfriction._support.shown import unit_for
 from planarfriction._support.writing import replacing
@@ -76,9 +75,7 @@ def animate_solution(
     )
     path = validation.path("path", path)
     check_kind(path)
-    times, pace = frame_times(
-        np.asarray(solution.histories["time"].values, dtype=float), slow, fps
-    )
+    times, pace = frame_times(solution.histories["time"].values, slow, fps)
     validation.instance("follow", follow, bool, "True or False")
     dpi = validation.positive("dpi", dpi)
     if not 20.0 <= dpi <= 400.0:
@@ -106,10 +103,9 @@ def frame_times(
 ) -> tuple[np.ndarray, str]:
     """Return the times of the frames [s] of a solution with samples at `sampled` [s], and their pace in words."""
     fps = validation.positive("fps", fps)
-    if fps > FASTEST:
-        raise InvalidValueError("fps", f"be at most {FASTEST:g}", fps)
-    if fps < SLOWEST:
-        raise InvalidValueError("fps", f"be at least {SLOWEST:g}", fps)
+    if not SLOWEST <= fps <= FASTEST:
+        limit = f"most {FASTEST:g}" if fps > FASTEST else f"least {SLOWEST:g}"
+        raise InvalidValueError("fps", f"be at {limit}", fps)
     span = float(sampled[-1] - sampled[0])
     frames = span * fps
     if slow is not None:
@@ -123,12 +119,8 @@ def frame_times(
         rule = f"be at most {MOST_FRAMES / frames:.3g} here, for at most {MOST_FRAMES} frames"
         raise InvalidValueError("slow", rule, slow)
     count = max(round(wanted) + 1, 2) if span > 0.0 else LEAST_FRAMES
-    if slow == 1.0 or span == 0.0:
-        words = ""
-    else:
-        words = (
-            f"   ({slow:g} x slower)" if slow > 1.0 else f"   ({1.0 / slow:g} x faster)"
-        )
+    words = f"   ({slow:g} x slower)" if slow > 1.0 else f"   ({1.0 / slow:g} x faster)"
+    words = "" if slow == 1.0 or span == 0.0 else words
     return np.linspace(sampled[0], sampled[-1], count), words
 
 
@@ -179,10 +171,8 @@ class Film:
             figsize=(WIDTH, HEIGHT), dpi=dpi, facecolor="white"
         )
         self.canvas = FigureCanvasAgg(self.figure)
-        hardest = sorted(
-            track.contacts,
-            key=lambda each: -each.contact.count * float(each.loads.max()),
-        )
+        pressed = lambda each: -each.contact.count * float(each.loads.max())
+        hardest = sorted(track.contacts, key=pressed)
         chosen = sorted(hardest[:MOST_PANELS], key=lambda each: each.index)
         world, places = _places(len(chosen))
         self.axes = self.figure.add_axes(world)
@@ -194,10 +184,9 @@ class Film:
                 axes = self.figure.add_axes(surface, projection="3d")
                 self.panels.append(SurfacePanel(axes, each, beside=len(chosen) - 1))
         self._draw_body(solution)
-        self.views = _filling(
-            _views(solution, track, follow),
-            self.axes.bbox.width / self.axes.bbox.height,
-        )
+        box = self.axes.bbox
+        views = _views(solution, track, follow)
+        self.views = _filling(views, box.width / box.height)
         far = float(np.abs(self.views).max())
         side = float(np.diff(self.views[0], axis=-1).max())
         style.show_lengths(self.axes, 1e-3 * max(0.1 * far, side))
@@ -251,26 +240,25 @@ class Film:
     def _draw_body(self, solution: pf.Solution) -> None:
         axes = self.axes
         track = self.track
-        lines = [
-            Line2D(*(1e3 * each.T), color="0.25", linewidth=1.5, zorder=5)
+        self.body = [
+            axes.add_artist(Line2D(*(1e3 * each.T), color="0.25", lw=1.5, zorder=5))
             for each in body_lines(solution)
         ]
-        self.body = [axes.add_artist(each) for each in lines]
         (self.path,) = axes.plot([], [], color="0.45", linewidth=0.9, zorder=5)
         self.contacts = []
         for each in track.contacts:
-            cells = axes.add_collection(
-                panels.cells_of(each, edge="face"), autolim=False
-            )
+            cells = panels.cells_of(each, edge="face")
             cells.set_zorder(4)
-            look = {
-                "arrowstyle": "-|>,head_length=5,head_width=2.5",
-                "linewidth": 2.2,
-                "shrinkA": 0,
-                "shrinkB": 0,
-            }
+            axes.add_collection(cells, autolim=False)
             arrow = FancyArrowPatch(
-                (0, 0), (1, 1), color=style.PALETTE[2], zorder=7, **look
+                (0, 0),
+                (1, 1),
+                arrowstyle="-|>,head_length=5,head_width=2.5",
+                color=style.PALETTE[2],
+                linewidth=2.2,
+                shrinkA=0,
+                shrinkB=0,
+                zorder=7,
             )
             arrow.set_path_effects([withStroke(linewidth=4.2, foreground="white")])
             self.contacts.append((each, cells, axes.add_patch(arrow)))
@@ -280,24 +268,13 @@ class Film:
         self.digits = (
             int(np.clip(2 - math.floor(math.log10(span)), 2, 9)) if span > 0.0 else 3
         )
-        self.clock = axes.text(
-            0.0, 1.06, "", transform=axes.transAxes, va="bottom", fontsize="medium"
-        )
-        self.words = axes.text(
-            0.0,
-            1.01,
-            "",
-            transform=axes.transAxes,
-            va="bottom",
-            fontsize="small",
-            color="0.3",
-        )
+        above = {"transform": axes.transAxes, "va": "bottom"}
+        self.clock = axes.text(0.0, 1.06, "", **above, fontsize="medium")
+        self.words = axes.text(0.0, 1.01, "", **above, fontsize="small", color="0.3")
 
     def _legend(self) -> None:
-        forces = np.concatenate(
-            [np.hypot(*each.forces.T)[:, None] for each in self.track.contacts], axis=1
-        )
-        largest = float(forces.max())
+        contacts = self.track.contacts
+        largest = max(float(np.hypot(*each.forces.T).max()) for each in contacts)
         side = float(np.diff(self.views[0], axis=-1).min())
         self.millimetres_per_newton = ARROW * side / largest if largest > 0.0 else 0.0
         unit = unit_for("force", largest)
@@ -308,23 +285,20 @@ class Film:
             Line2D([], [], color=style.PALETTE[2], linewidth=2.2, label=words),
             self.centre,
         ]
-        if len(self.track.contacts) > 1:  # one has its colours beside its cells
+        if len(contacts) > 1:  # one has its colours beside its cells
             handles += [
                 Patch(color=panels.STICK, label="sticks"),
                 Patch(color=panels.SLIP, label="slips"),
             ]
-        look = {
-            "frameon": False,
-            "fontsize": "small",
-            "columnspacing": 1.2,
-            "handlelength": 1.4,
-        }
         self.figure.legend(
             handles=handles,
             loc="lower left",
             bbox_to_anchor=(0.03, 0.0),
             ncols=len(handles),
-            **look,
+            frameon=False,
+            fontsize="small",
+            columnspacing=1.2,
+            handlelength=1.4,
         )
 
     def _moved(self, frame: int) -> str:
@@ -338,23 +312,17 @@ class Film:
         ):
             unit = unit_for(kind, moved[:, column])
             # No -0.00.
-            parts.append(
-                f"{words} {round(unit.factor * moved[frame, column], 2) + 0.0:.2f} {unit.label}"
-            )
+            way = round(unit.factor * moved[frame, column], 2) + 0.0
+            parts.append(f"{words} {way:.2f} {unit.label}")
         return ", ".join(parts)
 
 
 def _places(contacts: int) -> tuple[tuple, list[tuple]]:
     """Return the places of the world and, for each contact, of its cells, their colours (or None) and its surface."""
     if contacts == 1:
-        world = (0.072, 0.145, 0.5, 0.745)
-        return world, [
-            (
-                (0.665, 0.6, 0.2, 0.355),
-                (0.88, 0.6, 0.014, 0.355),
-                (0.605, 0.03, 0.35, 0.48),
-            )
-        ]
+        cells = (0.665, 0.6, 0.2, 0.355)
+        bar = (0.88, 0.6, 0.014, 0.355)
+        return (0.072, 0.145, 0.5, 0.745), [(cells, bar, (0.605, 0.03, 0.35, 0.48))]
     height = 1.0 / contacts
     places: list[tuple] = []
     for number in range(contacts):
@@ -370,48 +338,40 @@ def _views(solution: pf.Solution, track: Track, follow: bool) -> np.ndarray:
 
     A window follows where the motion is much longer than the body; it stays within the limits of the whole.
     """
-    own = np.concatenate(body_lines(solution))
-    of_body = [own]
+    of_body = body_lines(solution)
     of_world = []
     for each in track.contacts:
-        points = _rim(panels.cell_polygons(each.contact.model.patch).reshape(-1, 2))
-        if each.contact.mounted_on == "body":
-            of_body.append(
-                placed(points, np.array([*each.contact.position, each.contact.angle]))
-            )
+        contact = each.contact
+        points = _rim(panels.cell_polygons(contact.model.patch).reshape(-1, 2))
+        if contact.mounted_on == "body":
+            frame = np.array([*contact.position, contact.angle])
+            of_body.append(placed(points, frame))
         else:
             of_world += [placed(points, pose) for pose in np.unique(each.poses, axis=0)]
     carried = np.concatenate(of_body)
     radius = float(np.hypot(*carried.T).max()) or 1e-3
-    turned = (
-        geometry.rotate(carried[None], track.poses[:, None, 2])
-        + track.poses[:, None, :2]
-    )
+    turned = placed(carried, track.poses[:, None])
     everything = np.concatenate([turned.reshape(-1, 2), *of_world])
     low = everything.min(axis=0)
     high = everything.max(axis=0)
-    margin = 0.05 * max(float((high - low).max()), radius)
-    low = low - margin
-    high = high + margin
-    side = VIEW * radius
-    if not follow or (high - low).max() <= ROAM * side:
-        return np.broadcast_to(
-            1e3 * np.stack([low, high], -1), (len(track.times), 2, 2)
-        )
-    half = np.minimum(0.5 * side, 0.5 * (high - low).max())
-    # How far the middle may go from that of the whole.
-    room = np.maximum(0.5 * (high - low) - half, 0.0)
     whole = 0.5 * (low + high)
-    middle = np.clip(track.poses[:, :2], whole - room, whole + room)
+    reach = 0.5 * (high - low) + 0.05 * max(float((high - low).max()), radius)
+    side = VIEW * radius
+    half = reach
+    middle = np.broadcast_to(whole, (len(track.times), 2))
+    if follow and 2.0 * reach.max() > ROAM * side:
+        half = min(0.5 * side, reach.max())
+        # How far the middle may go from that of the whole.
+        room = np.maximum(reach - half, 0.0)
+        middle = np.clip(track.poses[:, :2], whole - room, whole + room)
     return 1e3 * np.stack([middle - half, middle + half], -1)
 
 
 def _rim(points: np.ndarray) -> np.ndarray:
     """Return the points that reach farthest in each of 16 directions: enough of them to see the limits of a drawing."""
     angles = 2.0 * np.pi * np.arange(16) / 16
-    return points[
-        np.unique((points @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0))
-    ]
+    along = points @ np.stack([np.cos(angles), np.sin(angles)])
+    return points[np.unique(along.argmax(axis=0))]
 
 
 def _filling(views: np.ndarray, ratio: float) -> np.ndarray:

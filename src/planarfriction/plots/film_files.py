@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planarfriction.errors import FileError
+from planarfriction.plots.style import evenly
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -69,11 +70,8 @@ def write_frames(
             for number in range(count):
                 figure.picture = frame(number)
                 writer.grab_frame()
-        file.write(
-            _self_contained(drawn.read_bytes())
-            if kind == ".html"
-            else drawn.read_bytes()
-        )
+        content = drawn.read_bytes()
+        file.write(_self_contained(content) if kind == ".html" else content)
 
 
 def check_kind(path: Path) -> None:
@@ -103,8 +101,8 @@ def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
     """Return the 256 colours of all frames: with one choice they do not flicker, and what is still costs little."""
     from PIL import Image
 
-    chosen = np.unique(np.linspace(0, count - 1, PALETTE_FRAMES).round().astype(int))
-    pixels = np.concatenate([frame(int(each)).reshape(-1, 3) for each in chosen])
+    chosen = evenly(count, PALETTE_FRAMES).tolist()
+    pixels = np.concatenate([frame(each).reshape(-1, 3) for each in chosen])
     colours, counts = np.unique(
         pixels @ np.array([1 << 16, 1 << 8, 1]), return_counts=True
     )
@@ -117,12 +115,11 @@ def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
     table = np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)
     order = np.argsort(counts)
     each = _colours(colours[order])
-    nearest = np.asarray(
-        Image.fromarray(each[None]).quantize(palette=found, dither=Image.Dither.NONE)
-    )[0]
-    table[nearest] = (
-        each  # the most frequent of those that it stands for comes last: means are colours of nothing
+    nearest = Image.fromarray(each[None]).quantize(
+        palette=found, dither=Image.Dither.NONE
     )
+    # The most frequent of those that it stands for comes last: means are colours of nothing.
+    table[np.asarray(nearest)[0]] = each
     table[table.min(axis=1) >= WHITE] = 255  # Pillow looks for the nearest coarsely
     found.putpalette(table.tobytes())
     return found
@@ -145,18 +142,14 @@ def _write_gif(
     ends = np.round(100.0 * np.arange(1, count + 1) / fps)
     durations = 10.0 * np.diff(ends, prepend=0.0)
     durations[-1] += 1e3 * LAST
-    pictures = (Image.fromarray(frame(number)) for number in range(count))
     first, *others = (
-        each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures
+        Image.fromarray(frame(number)).quantize(
+            palette=palette, dither=Image.Dither.NONE
+        )
+        for number in range(count)
     )
-    first.save(
-        file,
-        format="GIF",
-        save_all=True,
-        append_images=others,
-        duration=durations.tolist(),
-        loop=0,
-    )
+    options: Any = {"save_all": True, "append_images": others, "loop": 0}
+    first.save(file, format="GIF", duration=durations.tolist(), **options)
 
 
 class _Shown(Figure):
@@ -224,10 +217,8 @@ def _ffmpeg(path: Path) -> str:
         except (ImportError, RuntimeError):
             what = "ffmpeg is not installed: run pip install 'planarfriction[ffmpeg]', or write a .gif or an .html"
             raise FileError(f"cannot write {path}: {what}") from None
-        if not Path(
-            found
-        ).is_file():  # the variable IMAGEIO_FFMPEG_EXE is not checked by imageio-ffmpeg
-            raise FileError(
-                f"cannot write {path}: there is no ffmpeg at {found}, which imageio-ffmpeg names"
-            )
+        # The variable IMAGEIO_FFMPEG_EXE is not checked by imageio-ffmpeg.
+        if not Path(found).is_file():
+            what = f"there is no ffmpeg at {found}, which imageio-ffmpeg names"
+            raise FileError(f"cannot write {path}: {what}")
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -53,23 +53,17 @@ class _Panel(NamedTuple):
     kind: str
     """Kind of unit."""
     of_contacts: bool
-    get: Callable
-    """Values from the dataset of a solution."""
 
 
 _PANELS = {
-    "x": _Panel("x", "length", False, lambda data: data["x"]),
-    "y": _Panel("y", "length", False, lambda data: data["y"]),
-    "theta": _Panel("θ", "angle", False, lambda data: data["theta"]),
-    "speed": _Panel(
-        "speed", "speed", False, lambda data: np.hypot(data["vx"], data["vy"])
-    ),
-    "fx": _Panel("fx", "force", True, lambda data: data["fx"]),
-    "fy": _Panel("fy", "force", True, lambda data: data["fy"]),
-    "tau": _Panel("τ", "torque", True, lambda data: data["tau"]),
-    "normal_force": _Panel(
-        "normal force", "force", True, lambda data: data["normal_force"]
-    ),
+    "x": _Panel("x", "length", False),
+    "y": _Panel("y", "length", False),
+    "theta": _Panel("θ", "angle", False),
+    "speed": _Panel("speed", "speed", False),
+    "fx": _Panel("fx", "force", True),
+    "fy": _Panel("fy", "force", True),
+    "tau": _Panel("τ", "torque", True),
+    "normal_force": _Panel("normal force", "force", True),
 }
 
 
@@ -98,17 +92,15 @@ def plot_histories(
         "panels", [*_PANELS] if panels is None else panels, _PANELS
     )
     if not chosen:
-        raise InvalidValueError(
-            "panels", f"name at least one of {', '.join(_PANELS)}", panels
-        )
+        rule = f"name at least one of {', '.join(_PANELS)}"
+        raise InvalidValueError("panels", rule, panels)
     if axes is not None:
         drawn = list(np.ravel(np.asarray(axes, dtype=object)))
         for each in drawn:
             style.check_axes("axes", each, size)
         if len(drawn) != len(chosen):
-            raise InvalidValueError(
-                "axes", f"be one for each of {len(chosen)} panels", f"{len(drawn)}"
-            )
+            rule = f"be one for each of {len(chosen)} panels"
+            raise InvalidValueError("axes", rule, f"{len(drawn)}")
         _draw_panels(drawn, chosen, known)
         return drawn[0].figure
     if panels is None:
@@ -147,7 +139,7 @@ def _draw_panels(
     colours = _colours(list(known.values()))
     panels = [_PANELS[name] for name in chosen]
     clock = unit_for("time", *(data["time"] for data in runs.values()))
-    lines = [_lines(runs, panel.get) for panel in panels]
+    lines = [_lines(runs, name) for name in chosen]
     for place, panel, own in zip(axes, panels, lines, strict=True):
         sides = zip(panels, lines, strict=True)
         alike = [
@@ -173,14 +165,8 @@ def _finish(
     figure.align_ylabels(axes)
     for above in axes[:-1] if len(chosen) < len(_PANELS) else ():
         above.set_xlabel("")
-    named = next(
-        (
-            each
-            for each, name in zip(axes, chosen, strict=True)
-            if _PANELS[name].of_contacts
-        ),
-        None,
-    )
+    of_contacts = [_PANELS[name].of_contacts for name in chosen]
+    named = axes[of_contacts.index(True)] if any(of_contacts) else None
     runs = {
         label: each.data if named else each.data.isel(contact=[0])
         for label, each in known.items()
@@ -218,21 +204,20 @@ class _Line(NamedTuple):
 
         Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`), for microseconds.
         """
+        first, *_ = self.values
         rest = self.values[1:]
-        return (
-            rest
-            if len(rest) > 1 and abs(self.values[0]) > KICK * np.abs(rest).max() > 0.0
-            else self.values
-        )
+        kicks = len(rest) > 1 and abs(first) > KICK * np.abs(rest).max() > 0.0
+        return rest if kicks else self.values
 
 
-def _lines(runs: Mapping[str, xr.Dataset], get: Callable) -> list[_Line]:
-    """Draw one line for each run, or for each contact of each run."""
+def _lines(runs: Mapping[str, xr.Dataset], name: str) -> list[_Line]:
+    """Return one line of a panel for each run, or for each contact of each run."""
     lines = []
     for run, data in enumerate(runs.values()):
-        values = np.asarray(get(data), dtype=float).reshape(data.sizes["time"], -1)
+        found = np.hypot(data["vx"], data["vy"]) if name == "speed" else data[name]
+        values = found.values.reshape(data.sizes["time"], -1)
         lines += [
-            _Line(run, contact, np.asarray(data["time"]), each)
+            _Line(run, contact, data["time"].values, each)
             for contact, each in enumerate(values.T)
         ]
     return lines
@@ -250,9 +235,9 @@ def _draw_panel(
     """Draw one panel; `alike` are the values of all panels of its kind in this column, which share their unit."""
     unit = unit_for(kind, *alike)
     for line in lines:
-        look = _look(line.run, line.contact, colours) | (
-            {"marker": "o"} if len(line.time) == 1 else {}
-        )
+        look = _look(line.run, line.contact, colours)
+        if len(line.time) == 1:
+            look["marker"] = "o"
         axes.plot(clock.factor * line.time, unit.factor * line.values, **look)
     low = unit.factor * min(line.shown.min() for line in lines)
     high = unit.factor * max(line.shown.max() for line in lines)
@@ -273,24 +258,17 @@ def _colours(solutions: Sequence[pf.Solution]) -> list[Any]:
         each.scene and style.model_colour(each.scene.contacts[0].model)
         for each in solutions
     ]
-    return (
-        own
-        if None not in own and len(set(own)) == len(own)
-        else list(style.PALETTE[: len(solutions)])
-    )
+    different = None not in own and len(set(own)) == len(own)
+    return own if different else list(style.PALETTE[: len(solutions)])
 
 
 def _look(run: int, contact: int, colours: list[Any]) -> dict[str, Any]:
     # Later runs are drawn dashed over the earlier ones, so that curves that coincide are both seen.
     many = len(colours) > len(style.PALETTE)
-    line_style = style.LINE_STYLES[
-        (contact if many else run + contact) % len(style.LINE_STYLES)
-    ]
-    return {
-        "color": colours[run],
-        "linestyle": line_style,
-        **({"linewidth": 0.9} if many else {}),
-    }
+    which = contact if many else run + contact
+    line = style.LINE_STYLES[which % len(style.LINE_STYLES)]
+    width = 0.9 if many else None
+    return {"color": colours[run], "linestyle": line, "linewidth": width}
 
 
 def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
@@ -305,29 +283,21 @@ def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
     ]
     title = None
     if len(table) > len(style.PALETTE):
-        some = np.unique(np.linspace(0, len(table) - 1, NAMED).round().astype(int))
-        table, title = (
-            [table[each] for each in some],
-            f"{len(some)} of {len(table)} runs, coloured in their order",
-        )
+        some = style.evenly(len(table), NAMED)
+        title = f"{len(some)} of {len(table)} runs, coloured in their order"
+        table = [table[each] for each in some]
     columns = max(len(row) for row in table)
-    if columns == 1:
-        entries = [row[0] for row in table]
-    else:  # matplotlib fills a legend column by column: runs of the same contact stand below each other
-        entries = [
-            row[column]
-            for column in range(columns)
-            for row in table
-            if column < len(row)
-        ]
+    # Matplotlib fills a legend column by column: runs of the same contact stand below each other.
+    entries = [
+        row[column] for column in range(columns) for row in table if column < len(row)
+    ]
     if len(entries) == 1:
         return
     entries = [(line, style.wrapped(words, LONGEST)) for line, words in entries]
     longest = max(len(line) for _, words in entries for line in words.splitlines())
     size = FontProperties(size=rcParams["legend.fontsize"]).get_size_in_points() / 10.0
-    room = int(
-        72.0 * figure.bbox.width / figure.dpi / (LETTER * longest + HANDLE) / size
-    )
+    width = 72.0 * figure.bbox.width / figure.dpi
+    room = int(width / (LETTER * longest + HANDLE) / size)
     ncols = max(1, min(4, room, len(entries) if columns == 1 else columns))
     figure.legend(
         *zip(*entries, strict=True), loc="outside upper center", ncols=ncols, frameon=False, title=title,

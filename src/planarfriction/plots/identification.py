@@ -8,7 +8,7 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction import formulas
-from planarfriction._support.shown import unit_for
+from planarfriction._support.shown import Unit, unit_for
 from planarfriction.plots import style
 
 KINDS = {"N": "force", "N m": "torque", "m": "length", "rad": "angle"}
@@ -99,6 +99,12 @@ def _places(result: pf.identify.Identification) -> list[np.ndarray]:
     return places
 
 
+def _unit_of(result: pf.identify.Identification, i: int) -> Unit:
+    """Return the unit in which a measured channel reads well."""
+    measured = (np.nan_to_num(each["measured"][:, i]) for each in result.histories)
+    return unit_for(KINDS[result.channels[i][1]], *measured)
+
+
 def _draw_channel(
     left: Any,
     right: Any,
@@ -106,24 +112,16 @@ def _draw_channel(
     i: int,
     places: list[np.ndarray],
 ) -> None:
-    name, unit = result.channels[i]
-    shown = unit_for(
-        KINDS[unit],
-        *(np.nan_to_num(each["measured"][:, i]) for each in result.histories),
-    )
+    name, _ = result.channels[i]
+    shown = _unit_of(result, i)
     for number, (each, time) in enumerate(zip(result.histories, places, strict=True)):
         for key, words, colour, width in (
             ("measured", "measured", "0.6", 2.2),
             ("predicted", "fitted", style.PALETTE[0], 0.9),
         ):
+            values = shown.factor * each[key][:, i]
             label = words if number == 0 else None
-            left.plot(
-                time,
-                shown.factor * each[key][:, i],
-                color=colour,
-                linewidth=width,
-                label=label,
-            )
+            left.plot(time, values, color=colour, linewidth=width, label=label)
         off = (each["measured"][:, i] - each["predicted"][:, i]) / result.noise[i]
         every = max(1, len(time) // MOST_POINTS)
         right.plot(
@@ -136,8 +134,7 @@ def _draw_channel(
             right.plot(there, rim, marker, color=style.PALETTE[1], markersize=2.5)
     right.axhspan(-2.0, 2.0, color="0.92", zorder=0)
     left.set_ylabel(f"{name} [{shown.label}]")
-    for axes in (left, right):
-        style.tidy(axes)
+    style.tidy(left, right)
     right.set_ylim(-MOST_NOISE, MOST_NOISE)
 
 
@@ -151,14 +148,8 @@ def _draw_speeds(axes: Any, result: pf.identify.Identification) -> None:
     if not len(speed):
         return
     every = max(1, len(speed) // MOST_POINTS)
-    axes.plot(
-        1e3 * speed[::every],
-        coefficient[::every],
-        ".",
-        color="0.6",
-        markersize=2.0,
-        label="measured",
-    )
+    slides = 1e3 * speed[::every]
+    axes.plot(slides, coefficient[::every], ".", color="0.6", ms=2.0, label="measured")
     law = result.law
     grid = np.geomspace(max(speed.min(), 1e-4 * speed.max()), speed.max(), 200)
     steady = formulas.stribeck(np, grid, law) + law.sigma_2 * grid
@@ -176,17 +167,12 @@ def _draw_correlations(axes: Any, result: pf.identify.Identification) -> None:
     values = result.residual_correlations()
     samples = sum(len(each["time"]) for each in result.histories)
     step = float(np.median(np.diff(result.histories[0]["time"])))
-    axes.axhspan(
-        -2.0 / np.sqrt(samples), 2.0 / np.sqrt(samples), color="0.92", zorder=0
-    )
+    band = 2.0 / np.sqrt(samples)
+    axes.axhspan(-band, band, color="0.92", zorder=0)
+    lags = 1e3 * step * np.arange(len(values))
     for i, (name, _) in enumerate(result.channels):
         if values[:, i].any():
-            axes.plot(
-                1e3 * step * np.arange(len(values)),
-                values[:, i],
-                color=style.PALETTE[i],
-                label=name,
-            )
+            axes.plot(lags, values[:, i], color=style.PALETTE[i], label=name)
     axes.set(xlabel="lag [ms]", ylabel="correlation of residuals [-]")
     axes.legend(frameon=False, fontsize="small")
     style.tidy(axes)
@@ -195,24 +181,19 @@ def _draw_correlations(axes: Any, result: pf.identify.Identification) -> None:
 def _draw_held_out(axes: Any, result: pf.identify.Identification, i: int) -> None:
     """Draw predictions of samples that fits did not see over their measurements; a good fit keeps to the diagonal."""
     name, unit = result.channels[i]
-    both = (
-        [each[key][:, i] for each in result.histories]
-        for key in ("measured", "held_out")
+    pairs = np.concatenate(
+        [
+            np.stack([each["measured"][:, i], each["held_out"][:, i]])
+            for each in result.histories
+        ],
+        axis=1,
     )
-    measured, held_out = map(np.concatenate, both)
-    seen = np.isfinite(measured) & np.isfinite(held_out)
-    measured = measured[seen]
-    held_out = held_out[seen]
-    shown = unit_for(KINDS[unit], measured)
-    every = max(1, len(measured) // MOST_POINTS)
-    axes.plot(
-        shown.factor * measured[::every],
-        shown.factor * held_out[::every],
-        ".",
-        color="0.6",
-        markersize=2.0,
-    )
-    edges = shown.factor * np.array([measured.min(), measured.max()])
+    pairs = pairs[:, np.isfinite(pairs).all(axis=0)]
+    shown = unit_for(KINDS[unit], pairs[0])
+    pairs = shown.factor * pairs
+    every = max(1, pairs.shape[1] // MOST_POINTS)
+    axes.plot(*pairs[:, ::every], ".", color="0.6", markersize=2.0)
+    edges = [pairs[0].min(), pairs[0].max()]
     axes.plot(edges, edges, color=style.PALETTE[1], linewidth=0.9, zorder=1)
     axes.set(
         xlabel=f"measured {name} [{shown.label}]",
@@ -227,14 +208,11 @@ def _draw_loops(
     """Draw a channel over the velocity along it, and over the displacement since the last reversal."""
     name, unit = result.channels[i]
     turning = unit == "N m"
-    force = unit_for(
-        KINDS[unit],
-        *(np.nan_to_num(each["measured"][:, i]) for each in result.histories),
-    )
+    force = _unit_of(result, i)
     size = float(result.model.patch.contact_radius()) if turning else 1.0
     longest = LOADED * result.law.mu_s / result.law.sigma_0 / size
     way = unit_for("angle" if turning else "length", np.array([longest]))
-    for number, each in enumerate(result.histories):
+    for each in result.histories:
         speed = each["twist"][:, i]
         time = each["time"]
         step = np.concatenate([[0.0], 0.5 * (speed[1:] + speed[:-1]) * np.diff(time)])
@@ -243,35 +221,18 @@ def _draw_loops(
         last = np.maximum.accumulate(np.where(turned, np.arange(len(time)), 0))
         since = since - since[np.maximum(last - 1, 0)]
         near = np.where(np.abs(since) <= longest, since, np.nan)
-        for key, colour, style_of in (
-            ("measured", "0.6", "."),
-            ("predicted", style.PALETTE[0], "-"),
+        for key, look in (
+            ("measured", {"color": "0.6", "ls": "none", "marker": ".", "ms": 2.0}),
+            ("predicted", {"color": style.PALETTE[0], "lw": 0.8}),
         ):
-            for axes, place in ((over_speed, speed), (over_way, way.factor * near)):
-                label = (
-                    {"measured": "measured", "predicted": "fitted"}[key]
-                    if number == 0
-                    else None
-                )
-                axes.plot(
-                    place,
-                    force.factor * each[key][:, i],
-                    style_of,
-                    color=colour,
-                    ms=2.0,
-                    lw=0.8,
-                    label=label,
-                )
-    over_speed.set(
-        xlabel="velocity [rad/s]" if turning else "velocity [m/s]",
-        ylabel=f"{name} [{force.label}]",
-    )
-    over_way.set(
-        xlabel=f"displacement since reversal [{way.label}]",
-        ylabel=f"{name} [{force.label}]",
-    )
+            values = force.factor * each[key][:, i]
+            over_speed.plot(speed, values, **look)
+            over_way.plot(way.factor * near, values, **look)
+    over_speed.set_xlabel("velocity [rad/s]" if turning else "velocity [m/s]")
+    over_way.set_xlabel(f"displacement since reversal [{way.label}]")
     for axes in (over_speed, over_way):
-        style.tidy(axes)
+        axes.set_ylabel(f"{name} [{force.label}]")
+    style.tidy(over_speed, over_way)
 
 
 SHARES = (0.0, 0.5, 1.0)
@@ -293,13 +254,8 @@ def plot_joint(fit: Any) -> style.PlotFigure:
     upper = figure.add_subplot(grid[0, 0])
     lower = figure.add_subplot(grid[1, 0], sharex=upper)
     side = figure.add_subplot(grid[:, 1])
-    upper.plot(
-        series.time,
-        series.measured,
-        color=style.EXACT,
-        lw=1.0,
-        label=f"measured, {series.name}",
-    )
+    words = f"measured, {series.name}"
+    upper.plot(series.time, series.measured, color=style.EXACT, lw=1.0, label=words)
     runs = (
         (series.baseline, style.MEASURED, "Coulomb + viscous"),
         (series.fitted, style.DISTRIBUTED, "fit"),
@@ -321,8 +277,7 @@ def plot_joint(fit: Any) -> style.PlotFigure:
         side.text(0.5, 0.5, words, ha="center", va="center", transform=side.transAxes)
     else:
         _plot_levels(fit, side)
-    for axes in (upper, lower, side):
-        style.tidy(axes)
+    style.tidy(upper, lower, side)
     return figure
 
 
@@ -342,11 +297,7 @@ def _plot_levels(fit: Any, axes: Any) -> None:
         shares, style.PALETTE, style.LINE_STYLES, strict=False
     ):
         load = friction.load(share * pushed, -share * pushed)
-        look = {
-            "color": colour,
-            "ls": line,
-            "label": f"held load {share * pushed:.2g} N m",
-        }
-        axes.semilogx(speed, level + load, **look)
+        label = f"held load {share * pushed:.2g} N m"
+        axes.semilogx(speed, level + load, color=colour, ls=line, label=label)
     axes.set_ylim(0.0, None)
     axes.legend(frameon=False)

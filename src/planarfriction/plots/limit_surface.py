@@ -66,17 +66,15 @@ def plot_limit_surface(
         style.check_axes("ax", ax, size, three=True)
         beside = None
     names, scaled, limit = _sampled(surface, beside)
-    figure = (
-        ax.figure if ax is not None else style.new_figure(4.4 * len(names), 4.3, size)
-    )
-    for column, (name, (directions, mesh)) in enumerate(
-        zip(names, scaled, strict=True)
-    ):
-        axes = (
-            ax
-            if ax is not None
-            else figure.add_subplot(1, len(names), column + 1, projection="3d")
-        )
+    if ax is None:
+        figure = style.new_figure(4.4 * len(names), 4.3, size)
+        drawn = figure.subplots(
+            1, len(names), squeeze=False, subplot_kw={"projection": "3d"}
+        )[0]
+    else:
+        figure = ax.figure
+        drawn = [ax]
+    for axes, name, (directions, mesh) in zip(drawn, names, scaled, strict=True):
         draw_surface(axes, mesh, directions, limit)
         axes.set_title(style.wrapped(name, 30), fontsize="medium")
     return figure
@@ -99,17 +97,17 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
     )
     for column, (directions, mesh) in enumerate(scaled):
         points = dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True))
-        points["customdata"] = np.round(
-            directions, 6
-        ).tolist()  # the page reads arrays of two dimensions alone
-        look = {
-            "hovertemplate": _UNDER_THE_POINTER,
-            "colorscale": "Cividis",
-            "showscale": False,
-        }
-        figure.add_trace(
-            go.Surface(**points, **look, cmin=-limit, cmax=limit), row=1, col=column + 1
+        # The page reads arrays of two dimensions alone.
+        points["customdata"] = np.round(directions, 6).tolist()
+        drawn = go.Surface(
+            **points,
+            hovertemplate=_UNDER_THE_POINTER,
+            colorscale="Cividis",
+            showscale=False,
+            cmin=-limit,
+            cmax=limit,
         )
+        figure.add_trace(drawn, row=1, col=column + 1)
     scene: dict[str, Any] = {
         "aspectmode": "cube",
         "camera": {"eye": {"x": 1.5, "y": -2.2, "z": 1.0}},
@@ -135,12 +133,8 @@ def _sampled(
             beside = pf.LimitSurfaceEllipsoid(
                 surface.patch, normal_force=surface.normal_force
             )
-        validation.instance(
-            "beside",
-            beside,
-            pf.limit_surface.LimitSurface,
-            'a limit surface, "ellipsoid" or None',
-        )
+        words = 'a limit surface, "ellipsoid" or None'
+        validation.instance("beside", beside, pf.limit_surface.LimitSurface, words)
         shown[_kind(beside)] = beside
     scaled = [scaled_samples(each, *even_mesh(each)) for each in shown.values()]
     return [*shown], scaled, 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
@@ -155,23 +149,19 @@ def even_mesh(surface: Any) -> tuple[np.ndarray, np.ndarray]:
     azimuth = np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)
     for _ in range(2):  # the second time with what lay between the points of the first
         _, points = scaled_samples(surface, polar[:, None], azimuth[None, :])
-        polar = _evened(
-            polar, np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=1)
+        down, around = (
+            np.linalg.norm(np.diff(points, axis=axis), axis=-1).max(axis=1 - axis)
+            for axis in (0, 1)
         )
-        azimuth = _evened(
-            azimuth, np.linalg.norm(np.diff(points, axis=1), axis=-1).max(axis=0)
-        )
+        polar = _evened(polar, down)
+        azimuth = _evened(azimuth, around)
     return polar[:, None], azimuth[None, :]
 
 
 def _evened(angles: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return as many angles, by half spread evenly along the `steps` between them and by half as they are."""
-    place = np.concatenate(
-        [
-            [0.0],
-            np.cumsum(steps / steps.sum() + np.diff(angles) / (angles[-1] - angles[0])),
-        ]
-    )
+    way = steps / steps.sum() + np.diff(angles) / (angles[-1] - angles[0])
+    place = np.append(0.0, np.cumsum(way))
     return np.interp(np.linspace(0.0, place[-1], len(angles)), place, angles)
 
 
@@ -195,6 +185,12 @@ def _kind(surface: Any) -> str:
     return (name and SURFACES.words(name)) or type(surface).__name__
 
 
+def _of_facets(values: np.ndarray) -> np.ndarray:
+    """Return the mean of `values` `[P, A, ...]` over the four corners of each facet."""
+    pairs = values[:-1] + values[1:]
+    return 0.25 * (pairs[:, :-1] + pairs[:, 1:])
+
+
 def draw_surface(
     axes: Any,
     mesh: np.ndarray,
@@ -208,43 +204,30 @@ def draw_surface(
     `paler` is the share of white in its colours: facets that let light through would show every seam.
     """
     # The outward normal of a limit surface is the twist itself: shading needs no differences of the mesh.
-    normal = -0.25 * (
-        directions[:-1, :-1]
-        + directions[1:, :-1]
-        + directions[:-1, 1:]
-        + directions[1:, 1:]
-    )
-    lightness = 0.62 + 0.38 * np.clip(
-        normal @ (_LIGHT / np.linalg.norm(_LIGHT)), -0.6, 1.0
-    )
-    height = 0.25 * (
-        mesh[:-1, :-1, 2] + mesh[1:, :-1, 2] + mesh[:-1, 1:, 2] + mesh[1:, 1:, 2]
-    )
+    light = _LIGHT / np.linalg.norm(_LIGHT)
+    lightness = 0.62 + 0.38 * np.clip(-_of_facets(directions) @ light, -0.6, 1.0)
+    height = _of_facets(mesh[..., 2])
     colours = colormaps["cividis"](0.6 + 0.4 * height / limit)
     colours[..., :3] *= lightness[..., None]
     colours[..., :3] += paler * (1.0 - colours[..., :3])
-    plain: dict[str, Any] = {
-        "rstride": 1,
-        "cstride": 1,
-        "linewidth": 0,
-        "antialiased": False,
-        "shade": False,
-    }
-    drawn = axes.plot_surface(*np.moveaxis(mesh, -1, 0), facecolors=colours, **plain)
+    drawn = axes.plot_surface(
+        *np.moveaxis(mesh, -1, 0),
+        facecolors=colours,
+        rstride=1,
+        cstride=1,
+        linewidth=0,
+        antialiased=False,
+        shade=False,
+    )
     narrow = style.axes_width(axes) < 0.5 * style.NARROW
     ticks = [-1.0, 0.0, 1.0] if narrow else [-1.0, -0.5, 0.0, 0.5, 1.0]
     for name, label in (("x", "$f_x$"), ("y", "$f_y$"), ("z", "$\\tau/r$")):
-        axes.set(
-            **{
-                f"{name}lim": (-limit, limit),
-                f"{name}ticks": ticks,
-                f"{name}label": f"{label} [-]",
-            }
-        )
+        look = {"lim": (-limit, limit), "ticks": ticks, "label": f"{label} [-]"}
+        axes.set(**{f"{name}{key}": value for key, value in look.items()})
         getattr(axes, f"{name}axis").labelpad = -6.0 if narrow else 4.0
-    axes.tick_params(
-        labelsize="x-small" if narrow else "small", **({"pad": 0} if narrow else {})
-    )
+    axes.tick_params(labelsize="x-small" if narrow else "small")
+    if narrow:
+        axes.tick_params(pad=0)
     axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.75 if narrow else 0.9)
     axes.view_init(elev=22, azim=-55)
     return drawn

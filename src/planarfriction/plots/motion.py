@@ -19,7 +19,8 @@ from planarfriction._support.shown import unit_for
 from planarfriction.plots import style
 from planarfriction.plots.histories import draw_histories
 from planarfriction.plots.patch import cell_boxes
-from planarfriction.plots.track import body_poses, contact_poses
+from planarfriction.plots.track import body_poses
+from planarfriction.scenes.contact import contact_poses
 
 INSTANTS = 12
 """Number of outlines in a strobe."""
@@ -58,9 +59,8 @@ def plot_motion(
     """
     strobe = _strobe(solution)
     width, height = np.diff(strobe.limits, axis=-1)[:, 0]
-    figure, axes = style.place(
-        ax, 6.4, float(np.clip(1.0 + 4.6 * height / width, 2.6, 5.6)), size
-    )
+    tall = float(np.clip(1.0 + 4.6 * height / width, 2.6, 5.6))
+    figure, axes = style.place(ax, 6.4, tall, size)
     _draw(axes, strobe)
     figure.draw_without_rendering()  # the aspect sets the ticks, which the layout has to know
     return figure
@@ -103,11 +103,9 @@ class _Strobe(NamedTuple):
 
 def _strobe(solution: pf.Solution) -> _Strobe:
     validation.instance("solution", solution, pf.Solution, "a Solution")
-    time = np.asarray(solution.data["time"], dtype=float)
+    time = solution.histories["time"].values
     poses = body_poses(solution)
-    chosen = np.unique(
-        np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int)
-    )
+    chosen = style.evenly(len(time), INSTANTS)
     limits = _limits(solution, time[chosen], poses[chosen], 1.0)
     side = 1e-3 * float(np.diff(limits, axis=-1).max())
     size = 2.0 * _reach(solution)
@@ -125,22 +123,16 @@ def _draw(axes: Any, strobe: _Strobe) -> None:
     scale = Normalize(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
     for time, pose in zip(times, strobe.poses, strict=True):
         colour = style.TIME_COLOURS(scale(time))
-        shapes = [
-            _on_mount(each)
+        body = [
+            _draw_shape(axes, _on_mount(each), colour)
             for each in solution.scene.contacts
             if each.mounted_on == "body"
         ]
-        lines = [
-            Line2D(*(1e3 * line.T), color=colour, linewidth=1.3, zorder=3)
+        body += [
+            axes.add_artist(Line2D(*(1e3 * line.T), color=colour, lw=1.3, zorder=3))
             for line in body_lines(solution)
         ]
-        move(
-            [_draw_shape(axes, each, colour) for each in shapes],
-            axes,
-            pose,
-            strobe.larger,
-        )
-        move([axes.add_artist(line) for line in lines], axes, pose, strobe.larger)
+        move(body, axes, pose, strobe.larger)
         for contact in (each for each in pads if each.support_velocity is not None):
             at = contact_poses(contact, np.array([time]), pose)[0]
             move([_draw_shape(axes, _pad_shape(contact), colour)], axes, at)
@@ -154,9 +146,8 @@ def _draw(axes: Any, strobe: _Strobe) -> None:
     style.tidy(axes)
     axes.plot(*(1e3 * strobe.path[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
     dots = {"s": 14, "edgecolor": "white", "linewidth": 0.5, "zorder": 5}
-    axes.scatter(
-        *(1e3 * strobe.poses[:, :2].T), color=style.TIME_COLOURS(scale(times)), **dots
-    )
+    colours = style.TIME_COLOURS(scale(times))
+    axes.scatter(*(1e3 * strobe.poses[:, :2].T), color=colours, **dots)
     axes.set_title(_remark(strobe), fontsize="small", loc="left")
     if times[-1] > times[0]:
         style.show_times(axes, times)
@@ -186,7 +177,7 @@ def _reach(solution: pf.Solution) -> float:
 
 def placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """Return the points `[..., 2]` [m] of a frame at `pose` (x, y, angle), seen from the frame that the pose is in."""
-    return pose[:2] + geometry.rotate(points, pose[2])
+    return pose[..., :2] + geometry.rotate(points, pose[..., 2])
 
 
 def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> Artist:
@@ -195,38 +186,22 @@ def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> Artist:
     # All boxes are one path, so that no seams show between neighbours.
     if shape.ndim == 3:
         closed = np.concatenate([shape, shape[:, :1]], axis=1)
-        codes = [
-            Outline.MOVETO,
-            Outline.LINETO,
-            Outline.LINETO,
-            Outline.LINETO,
-            Outline.CLOSEPOLY,
-        ]
+        codes = [Outline.MOVETO, *3 * [Outline.LINETO], Outline.CLOSEPOLY]
         path = Outline(closed.reshape(-1, 2), np.tile(codes, len(shape)))
-        return axes.add_artist(
-            PathPatch(
-                path, facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2
-            )
-        )
-    look = {
-        "marker": "o",
-        "markersize": 4.5,
-        "markeredgewidth": 0.0,
-        "linestyle": "none",
-    }
-    return axes.add_artist(Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2))
+        drawn = PathPatch(path, fc=colour, ec="none", alpha=PAD_OPACITY, zorder=2)
+    else:
+        look = {"marker": "o", "ms": 4.5, "mew": 0.0, "ls": "none", "alpha": 0.8}
+        drawn = Line2D(*shape.T, **look, color=colour, zorder=2)
+    return axes.add_artist(drawn)
 
 
 def move(
     artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0
 ) -> None:
     """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes, `larger` times."""
-    transform = (
-        Affine2D().scale(larger).rotate(pose[2]).translate(*(1e3 * pose[:2]))
-        + axes.transData
-    )
+    frame = Affine2D().scale(larger).rotate(pose[2]).translate(*(1e3 * pose[:2]))
     for artist in artists:
-        artist.set_transform(transform)
+        artist.set_transform(frame + axes.transData)
 
 
 def body_lines(solution: pf.Solution) -> list[np.ndarray]:
@@ -235,21 +210,19 @@ def body_lines(solution: pf.Solution) -> list[np.ndarray]:
     Where its turn would not show, on a round outline and without any, also a line along its x axis.
     """
     outline = solution.scene.body.outline
+    contacts = solution.scene.contacts
     if outline is not None:
-        outline = np.asarray(outline, dtype=float)
         radii = np.hypot(*outline.T)
-        round_one = len(outline) >= CORNERS and np.ptp(radii) <= ROUND * radii.max()
-        arm = [np.array([(0.0, 0.0), (radii.max(), 0.0)])] if round_one else []
-        return [np.concatenate([outline, outline[:1]]), *arm]
-    arm = max(
-        float(np.abs(_pad_shape(contact)).max()) for contact in solution.scene.contacts
-    )
-    on_body = [
-        _on_mount(each).reshape(-1, 2)
-        for each in solution.scene.contacts
-        if each.mounted_on == "body"
-    ]
-    return [*_rim(on_body), np.array([(0.0, 0.0), (arm, 0.0)])]
+        arm = radii.max()
+        lines = [np.concatenate([outline, outline[:1]])]
+        if len(outline) < CORNERS or np.ptp(radii) > ROUND * arm:
+            return lines
+    else:
+        arm = max(float(np.abs(_pad_shape(each)).max()) for each in contacts)
+        lines = _rim(
+            [_on_mount(each) for each in contacts if each.mounted_on == "body"]
+        )
+    return [*lines, np.array([(0.0, 0.0), (arm, 0.0)])]
 
 
 def _rim(shapes: list[np.ndarray]) -> list[np.ndarray]:
@@ -257,7 +230,7 @@ def _rim(shapes: list[np.ndarray]) -> list[np.ndarray]:
     from scipy.spatial import ConvexHull, QhullError
 
     try:
-        points = np.concatenate(shapes)
+        points = np.concatenate([shape.reshape(-1, 2) for shape in shapes])
         corners = points[ConvexHull(points).vertices]
     except (ValueError, QhullError):
         return []
@@ -272,9 +245,7 @@ def _pad_shape(contact: pf.Contact) -> np.ndarray:
 
 def _on_mount(contact: pf.Contact) -> np.ndarray:
     """Return the patch of a contact in the frame that it is mounted on (world or body) [m]."""
-    return placed(
-        _pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float)
-    )
+    return placed(_pad_shape(contact), np.array([*contact.position, contact.angle]))
 
 
 def _limits(
@@ -285,16 +256,12 @@ def _limits(
         placed(larger * line, pose) for pose in poses for line in body_lines(solution)
     ]
     for contact in solution.scene.contacts:
+        shape = _pad_shape(contact)
+        seen = contact_poses(contact, times, poses)
         if contact.mounted_on == "body":
-            points += [
-                placed(larger * _on_mount(contact).reshape(-1, 2), pose)
-                for pose in poses
-            ]
-        else:
-            shape = _pad_shape(contact).reshape(-1, 2)
-            points += [
-                placed(shape, pose) for pose in contact_poses(contact, times, poses)
-            ]
+            shape = larger * _on_mount(contact)
+            seen = poses
+        points += [placed(shape.reshape(-1, 2), pose) for pose in seen]
     everything = 1e3 * np.concatenate(points)
     low = everything.min(axis=0)
     high = everything.max(axis=0)

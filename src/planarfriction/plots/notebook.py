@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 import planarfriction as pf
-from planarfriction import geometry
 from planarfriction._support.shown import unit_for
 from planarfriction.errors import FrictionError
 from planarfriction.identify.parameters import LAW
+from planarfriction.patch.grid import grid_sides
 from planarfriction.plots import style
+from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction.plots.motion import draw_motion
+from planarfriction.scenes.solution import columns_of
 
 _LOAD = 1.0
 """Load [N] at which a patch is shown whose shape depends on it."""
@@ -56,11 +58,11 @@ def surface_html(surface: pf.limit_surface.LimitSurface) -> str:
 
 def law_html(law: Any) -> str:
     """Return the friction of steady sliding over the speed, with the parameters of a law."""
-    given = {each.name: getattr(law, each.name) for each in dataclasses.fields(law)}
+    names = [each.name for each in dataclasses.fields(law)]
     rows = {
         name: _parameter(name, value)
-        for name, value in given.items()
-        if value is not None
+        for name in names
+        if (value := getattr(law, name)) is not None
     }
     figure = style.new_figure(1.8, 1.2)
     axes = figure.add_subplot()
@@ -100,11 +102,8 @@ def scene_html(scene: pf.Scene) -> str:
 
 def solution_html(solution: pf.Solution) -> str:
     """Return a drawing of the motion of the body, with the end and the cost of the run."""
-    time = np.asarray(solution.histories["time"].values)
-    x, y, theta = (
-        float(np.asarray(solution.histories[name].values)[-1])
-        for name in ("x", "y", "theta")
-    )
+    time = solution.histories["time"].values
+    x, y, theta = columns_of(solution, "x", "y", "theta")[-1]
     cost = solution.statistics
     rows = {
         "status": f"{solution.status}: {solution.message}",
@@ -141,14 +140,12 @@ def _pressure(patch: pf.ContactPatch, load: float | None) -> style.PlotFigure | 
         pixels = np.full((grid.rows, grid.columns), np.nan)
         shares = 1.0 if patch.point_shares is None else patch.point_shares
         pixels[grid.locate(patch.positions)] = weights / (patch.areas * shares)
-        box = np.array(
-            [0.0, grid.columns * grid.cell_width, 0.0, grid.rows * grid.cell_height]
-        )
+        width, height = grid_sides(grid)
         axes.imshow(
             pixels,
             cmap=style.PRESSURE_MAP,
             vmin=0.0,
-            extent=tuple(box),
+            extent=(0.0, width, 0.0, height),
             interpolation="nearest",
         )
     axes.set(aspect="equal")
@@ -157,22 +154,14 @@ def _pressure(patch: pf.ContactPatch, load: float | None) -> style.PlotFigure | 
 
 
 def _section(surface: pf.limit_surface.LimitSurface) -> style.PlotFigure:
-    angle = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1)
-    radius = surface.contact_radius
-    centre = surface.centre_of_pressure
-    about_centre = np.stack(
-        [np.cos(angle), np.zeros_like(angle), np.sin(angle) / radius], -1
-    )
-    wrenches = geometry.wrench_at(
-        surface.wrench(geometry.twist_at(about_centre, -centre)), centre
-    )
+    # From a slide along x on to a spin.
+    around = np.linspace(0.5 * np.pi, -1.5 * np.pi, _DIRECTIONS + 1)
+    fx, _, torque = scaled_samples(surface, around, np.zeros(1))[1].T
     figure = style.new_figure(1.5, 1.5)
     axes = figure.add_subplot()
-    axes.plot(
-        wrenches[:, 0], wrenches[:, 2] / radius, color=style.PALETTE[0], linewidth=1.5
-    )
-    axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)
-    axes.axvline(0.0, color="0.8", linewidth=0.6, zorder=0)
+    axes.plot(fx, torque, color=style.PALETTE[0], linewidth=1.5)
+    for line in (axes.axhline, axes.axvline):
+        line(0.0, color="0.8", linewidth=0.6, zorder=0)
     axes.set(aspect="equal")
     axes.set_axis_off()
     return figure
@@ -180,13 +169,11 @@ def _section(surface: pf.limit_surface.LimitSurface) -> style.PlotFigure:
 
 def _size(patch: pf.ContactPatch) -> str:
     # Points, lines.
-    if patch.grid is None or patch.cell_size is None or min(patch.cell_size) == 0.0:
-        width, height = np.ptp(patch.positions, axis=0) + (
-            0.0 if patch.cell_size is None else patch.cell_size
-        )
+    cell = patch.cell_size or (0.0, 0.0)
+    if patch.grid is None or min(cell) == 0.0:
+        width, height = np.ptp(patch.positions, axis=0) + cell
     else:
-        width = patch.grid.columns * patch.grid.cell_width
-        height = patch.grid.rows * patch.grid.cell_height
+        width, height = grid_sides(patch.grid)
     unit = unit_for("length", max(width, height))
     return f"{unit.factor * width:.3g} x {unit.factor * height:.3g} {unit.label}"
 

@@ -110,39 +110,25 @@ class CellPanel:
         low = points.min(axis=0)
         high = points.max(axis=0)
         half = 0.56 * float((high - low).max())
-        for set_limits, middle in zip(
-            (axes.set_xlim, axes.set_ylim), 0.5 * (low + high), strict=True
-        ):
-            set_limits(middle - half, middle + half)
+        middle = 0.5 * (low + high)
+        limits = np.stack([middle - half, middle + half], -1)
+        axes.set(xlim=limits[0], ylim=limits[1])
         axes.set_xlabel("", fontsize="small", labelpad=1)
         axes.set_ylabel("", fontsize="small", labelpad=1)
-        style.show_lengths(
-            axes, 1e-3 * float(np.abs([axes.get_xlim(), axes.get_ylim()]).max())
-        )
+        style.show_lengths(axes, 1e-3 * float(np.abs(limits).max()))
         axes.set_aspect("equal")
         axes.tick_params(labelsize="small")
         axes.locator_params(nbins=4)
         style.tidy(axes)
         self.cells = axes.add_collection(cells_of(track, edge="white"))
         self.centre = centre_mark(axes)
-        self.words = axes.text(
-            0.5,
-            1.02,
-            "",
-            transform=axes.transAxes,
-            ha="center",
-            va="bottom",
-            fontsize="small",
-        )
+        above = {"transform": axes.transAxes, "ha": "center", "va": "bottom"}
+        self.words = axes.text(0.5, 1.02, "", **above, fontsize="small")
         if bar is not None:
-            shown = axes.figure.colorbar(
-                ScalarMappable(Normalize(0.0, 1.0), CELLS), cax=bar
-            )
-            shown.set_ticks(
-                [0.0, 0.45, 0.95],
-                labels=["unbent", "sticks", "slips"],
-                fontsize="small",
-            )
+            colours = ScalarMappable(Normalize(0.0, 1.0), CELLS)
+            shown = axes.figure.colorbar(colours, cax=bar)
+            labels = ["unbent", "sticks", "slips"]
+            shown.set_ticks([0.0, 0.45, 0.95], labels=labels, fontsize="small")
             shown.ax.tick_params(length=0)
         for artist in self.artists():
             artist.set_animated(True)
@@ -155,12 +141,8 @@ class CellPanel:
         """Show a frame."""
         track = self.track
         colour_cells(self.cells, track, frame)
-        put_centre(
-            self.centre,
-            track.twists[frame],
-            np.zeros(2),
-            still=still_speed(track.twists),
-        )
+        still = still_speed(track.twists)
+        put_centre(self.centre, track.twists[frame], np.zeros(2), still=still)
         name = textwrap.shorten(str(track.contact.name), LONGEST, placeholder="...")
         if track.slip is not None:
             weights, _ = track.shape(frame)
@@ -203,21 +185,15 @@ class SurfacePanel:
                 axis.label.set_fontsize("x-small")
         axes.set_title("limit surface, $\\mu_c f_N = 1$", fontsize="small", y=0.98)
         self.floor = -limit
-        (self.shadow,) = axes.plot(
-            [], [], [], color="0.45", linewidth=1.2, marker="o", markersize=3
-        )
-        (self.tail,) = axes.plot(
-            [], [], [], color=style.PALETTE[1], linewidth=1.0, alpha=0.6
-        )
-        (self.arm,) = axes.plot([], [], [], color="black", linewidth=1.6)
-        (self.head,) = axes.plot(
-            [],
-            [],
-            [],
-            color=style.PALETTE[1],
-            marker="o",
-            markersize=6,
-            markeredgecolor="white",
+        colour = style.PALETTE[1]
+        self.shadow, self.tail, self.arm, self.head = (
+            axes.plot([], [], [], **look)[0]
+            for look in (
+                {"color": "0.45", "lw": 1.2, "marker": "o", "ms": 3},
+                {"color": colour, "lw": 1.0, "alpha": 0.6},
+                {"color": "black", "lw": 1.6},
+                {"color": colour, "marker": "o", "ms": 6, "mec": "white"},
+            )
         )
         for artist in self.artists():
             artist.set_animated(True)
@@ -250,22 +226,18 @@ class SurfacePanel:
         points = np.zeros((len(track.loads), 3))
         for frame, load in enumerate(track.loads):
             if load > 0.0:
-                surface = self.surfaces[level_of(track, frame)]
-                wrench = geometry.wrench_at(
-                    track.wrenches[frame], track.shape(frame)[1]
-                )
-                points[frame] = (
-                    wrench / np.array([1.0, 1.0, surface.contact_radius]) / (mu * load)
-                )
+                radius = self.surfaces[level_of(track, frame)].contact_radius
+                _, centre = track.shape(frame)
+                wrench = geometry.wrench_at(track.wrenches[frame], centre)
+                points[frame] = wrench / np.array([1.0, 1.0, radius]) / (mu * load)
         return points
 
 
 def surface_at(patch: Any, load: float | None) -> Any:
     """Return the exact limit surface of a patch at a load; a table of it where the cells differ in their friction."""
     each_its_own = patch.root is not None and patch.root.ndim == 3
-    return (pf.LimitSurfaceTable if each_its_own else pf.LimitSurfaceExact)(
-        patch, normal_force=load
-    )
+    make = pf.LimitSurfaceTable if each_its_own else pf.LimitSurfaceExact
+    return make(patch, normal_force=load)
 
 
 def has_surface(track: ContactTrack) -> bool:
@@ -303,16 +275,8 @@ def level_of(track: ContactTrack, frame: int) -> Any:
 
 def centre_mark(axes: Any) -> Any:
     """Return the mark of a centre of rotation."""
-    look = {
-        "marker": "o",
-        "markersize": 8,
-        "markerfacecolor": "none",
-        "markeredgewidth": 1.8,
-        "linestyle": "none",
-    }
-    return axes.plot(
-        [], [], color="#111111", zorder=8, label="centre of rotation", **look
-    )[0]
+    look = {"ms": 8, "mfc": "none", "mew": 1.8, "color": "#111111", "zorder": 8}
+    return axes.plot([], [], "o", label="centre of rotation", **look)[0]
 
 
 def put_centre(mark: Any, twist: np.ndarray, at: np.ndarray, *, still: float) -> None:

@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 import planarfriction as pf
 from planarfriction._support import validation
 from planarfriction._support.shown import Unit, unit_for
+from planarfriction.patch.grid import grid_sides
 from planarfriction.plots import style
 
 MOST_EDGES = 5000
@@ -40,11 +41,8 @@ def plot_patch(
     wrong size or axes.
     """
     validation.instance("patch", patch, pf.ContactPatch, "a ContactPatch")
-    load = (
-        1.0
-        if normal_force is None
-        else validation.non_negative("normal_force", normal_force)
-    )
+    load = 1.0 if normal_force is None else normal_force
+    load = validation.non_negative("normal_force", load)
     weights = patch.weights(normal_force)
     centre = 1e3 * patch.centre_of_pressure(normal_force)
     figure, axes = style.place(ax, 5.6, _height(patch), size)
@@ -54,24 +52,15 @@ def plot_patch(
         pressure = patch.tile_weights(normal_force) * load / patch.areas
         drawn, label = _draw_cells(axes, patch, patch.grid, pressure, normal_force)
     figure.colorbar(drawn, ax=axes, label=label)
-    mark = {"marker": "+", "markersize": 13, "linestyle": "none"}
-    axes.plot(*centre, **mark, markeredgewidth=4.0, color="white")
-    axes.plot(
-        *centre,
-        **mark,
-        markeredgewidth=1.8,
-        color=style.PAD_COLOUR,
-        label="centre of pressure",
-    )
+    axes.plot(*centre, "+", ms=13, mew=4.0, color="white")
+    label = "centre of pressure"
+    axes.plot(*centre, "+", ms=13, mew=1.8, color=style.PAD_COLOUR, label=label)
     axes.set_aspect("equal")
     limits = 1e-3 * np.array([axes.get_xlim(), axes.get_ylim()])
     sides = np.diff(limits, axis=-1)[:, 0]
     for axis, share in zip((axes.xaxis, axes.yaxis), sides / sides.max(), strict=True):
-        axis.set_major_locator(
-            MaxNLocator(
-                max(2, round(style.ticks(axes, 6) * share)), steps=[1, 2, 2.5, 5, 10]
-            )
-        )
+        number = max(2, round(style.ticks(axes, 6) * share))
+        axis.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10]))
     style.show_lengths(axes, float(np.abs(limits).max()))
     if ax is not None:
         axes.set_title(style.wrapped(patch.name, 24), fontsize="medium")
@@ -103,12 +92,8 @@ def _height(patch: pf.ContactPatch) -> float:
     """Return the height of the figure [inch] that fits the proportions of the patch."""
     if patch.grid is None:
         return 4.6
-    ratio = (
-        patch.grid.rows
-        * patch.grid.cell_height
-        / (patch.grid.columns * patch.grid.cell_width)
-    )
-    return float(np.clip(1.2 + 3.4 * ratio, 2.6, 5.6))
+    width, height = grid_sides(patch.grid)
+    return float(np.clip(1.2 + 3.4 * height / width, 2.6, 5.6))
 
 
 def _draw_cells(
@@ -130,22 +115,14 @@ def _draw_cells(
     cells.set_array(unit.factor * pressure)
     cells.set_clim(0.0, unit.factor * float(pressure.max()) or 1.0)
     axes.add_collection(cells)
-    width = 1e3 * grid.columns * grid.cell_width
-    height = 1e3 * grid.rows * grid.cell_height
-    for set_limits, low, side in (
-        (axes.set_xlim, grid.x_min, width),
-        (axes.set_ylim, grid.y_min, height),
-    ):
-        half = 0.5 * max(side, NARROWEST * max(width, height)) + 0.03 * max(
-            width, height
-        )
-        set_limits(1e3 * low + 0.5 * side - half, 1e3 * low + 0.5 * side + half)
-    return (
-        cells,
-        f"pressure [{unit.label}]"
-        if normal_force is not None
-        else f"pressure per load [{unit.label}/N]",
-    )
+    sides = 1e3 * grid_sides(grid)
+    middle = 1e3 * np.array([grid.x_min, grid.y_min]) + 0.5 * sides
+    half = 0.5 * np.maximum(sides, NARROWEST * sides.max()) + 0.03 * sides.max()
+    limits = np.stack([middle - half, middle + half], -1)
+    axes.set(xlim=limits[0], ylim=limits[1])
+    if normal_force is None:
+        return cells, f"pressure per load [{unit.label}/N]"
+    return cells, f"pressure [{unit.label}]"
 
 
 def _draw_points(
@@ -163,21 +140,13 @@ def _draw_points(
         points.set_sizes(np.where(patch.radii > 0.0, 0.0, points.get_sizes()))
         wide = 2e3 * patch.radii
         options = {"units": "xy", "offsets": places, "offset_transform": axes.transData}
-        discs = EllipseCollection(
-            wide,
-            wide,
-            np.zeros(len(wide)),
-            array=unit.factor * force,
-            **options,
-            **look,
-        )
+        round_ones = wide, wide, np.zeros(len(wide))
+        values = unit.factor * force
+        discs = EllipseCollection(*round_ones, array=values, **options, **look)
         discs.set_clim(0.0, unit.factor * float(force.max()) or 1.0)
         axes.add_collection(discs)
-        axes.update_datalim(
-            np.concatenate(
-                [places + side * 1e3 * patch.radii[:, None] for side in (-1.0, 1.0)]
-            )
-        )
+        radii = 1e3 * patch.radii[:, None]
+        axes.update_datalim(np.concatenate([places - radii, places + radii]))
         axes.margins(0.08)
     name = "share of the normal force" if normal_force is None else "normal force"
     return points, f"{name} [{unit.label}]"
@@ -187,14 +156,14 @@ def _title(
     patch: pf.ContactPatch, weights: np.ndarray, normal_force: float | None, width: int
 ) -> str:
     loaded = int((weights > 0.0).sum())
-    radius = unit_for("length", patch.contact_radius(normal_force))
-    what = (
-        "disc" if patch.has_discs else "point" if patch.grid is None else "cell"
-    ) + "s" * (loaded != 1)
-    parts = [f"{patch.name}: {loaded} loaded {what}"]
-    parts.append(
-        f"r = {radius.factor * patch.contact_radius(normal_force):.3g} {radius.label}"
-    )
+    size = patch.contact_radius(normal_force)
+    radius = unit_for("length", size)
+    what = "point" if patch.grid is None else "cell"
+    what = ("disc" if patch.has_discs else what) + "s" * (loaded != 1)
+    parts = [
+        f"{patch.name}: {loaded} loaded {what}",
+        f"r = {radius.factor * size:.3g} {radius.label}",
+    ]
     if normal_force is not None:
         force = unit_for("force", normal_force)
         parts.append(f"load {force.factor * normal_force:.6g} {force.label}")

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.colors import Normalize
 
 import planarfriction as pf
-from planarfriction import geometry
 from planarfriction._support.shown import unit_for
 from planarfriction.planning.motions import slide_of
 from planarfriction.plots import style
+from planarfriction.plots.motion import placed
 from planarfriction.plots.track import body_poses
 from planarfriction.scenes import simulate
 
@@ -28,20 +28,12 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     end = plan.scene.t_end
     times = np.append(plan.signal.times, end)
     force = unit_for("force", plan.signal.values)
-    grip.plot(
-        times,
-        force.factor * plan.signal(times),
-        "o-",
-        color=style.PALETTE[0],
-        markersize=3,
-    )
-    grip.axhline(
-        force.factor * plan.report.holding,
-        color="0.4",
-        linewidth=0.9,
-        linestyle=style.LINE_STYLES[2],
-    )
-    grip.annotate("holds the body at the end", (end, force.factor * plan.report.holding), color="0.3",
+    values = force.factor * plan.signal(times)
+    grip.plot(times, values, "o-", color=style.PALETTE[0], markersize=3)
+    holding = force.factor * plan.report.holding
+    dotted = {"color": "0.4", "linewidth": 0.9, "linestyle": style.LINE_STYLES[2]}
+    grip.axhline(holding, **dotted)
+    grip.annotate("holds the body at the end", (end, holding), color="0.3",
                   fontsize="small", ha="right", va="bottom")  # fmt: skip
     grip.set_ylabel(f"grip [{force.label}]")
     solutions = [simulate(scene, save_every=end / 400.0) for scene in plan.frictions]
@@ -52,56 +44,30 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     # Of the place that was under the grip.
     slides = [np.hypot(*each.T) for each in place]
     angles = [
-        np.asarray(each.histories["theta"].values) - plan.scene.body.angle
-        for each in solutions
+        each.histories["theta"].values - plan.scene.body.angle for each in solutions
     ]
     angle = unit_for("angle", *angles)
     length = unit_for("length", *slides)
-    factors = [
-        1.0,
-        *(
-            each
-            for each in (plan.report.frictions[0], plan.report.frictions[-1])
-            if len(solutions) > 1
-        ),
-    ]
+    labels = ["friction of the scene"]
+    if len(solutions) > 1:
+        least, *_, most = plan.report.frictions
+        labels += [f"friction {100.0 * (f - 1.0):+.3g} %" for f in (least, most)]
     # First as it is, then the others.
-    for i, (solution, factor) in enumerate(zip(solutions, factors, strict=True)):
-        time = np.asarray(solution.histories["time"].values)
-        label = (
-            "friction of the scene"
-            if i == 0
-            else f"friction {100.0 * (factor - 1.0):+.3g} %"
-        )
-        line = {
-            "color": style.PALETTE[i],
-            "linestyle": style.LINE_STYLES[i],
-            "label": label,
-        }
+    for i, (solution, label) in enumerate(zip(solutions, labels, strict=True)):
+        time = solution.histories["time"].values
+        line = {"color": style.PALETTE[i], "ls": style.LINE_STYLES[i], "label": label}
         turn.plot(time, angle.factor * angles[i], **line)
         slide.plot(time, length.factor * slides[i], **line)
     wanted = plan.report.goal
     if "angle" in wanted:
-        turn.axhline(
-            angle.factor * wanted["angle"],
-            color="0.4",
-            linewidth=0.9,
-            linestyle=style.LINE_STYLES[2],
-        )
+        turn.axhline(angle.factor * wanted["angle"], **dotted)
     else:
-        size = float(np.hypot(*wanted["slide"]))
-        slide.axhline(
-            length.factor * size,
-            color="0.4",
-            linewidth=0.9,
-            linestyle=style.LINE_STYLES[2],
-        )
+        slide.axhline(length.factor * np.hypot(*wanted["slide"]), **dotted)
     turn.set_ylabel(f"turn [{angle.label}]")
     slide.set_ylabel(f"slide [{length.label}]")
     slide.set_xlabel("time [s]")
     turn.legend(frameon=False, fontsize="small")
-    for axes in (grip, turn, slide):
-        style.tidy(axes)
+    style.tidy(grip, turn, slide)
     return figure
 
 
@@ -116,33 +82,22 @@ def plot_push(push: pf.planning.Push) -> style.PlotFigure:
 def draw_push(axes: Any, push: pf.planning.Push) -> None:
     """Draw `plot_push` into axes."""
     scale = Normalize(push.time[0], push.time[-1])
-    chosen = np.unique(np.linspace(0, len(push.time) - 1, INSTANTS).round().astype(int))
     closed = np.concatenate([push.slider.outline, push.slider.outline[:1]])
-    for k in chosen:
-        corners = push.pose[k, :2] + geometry.rotate(closed, push.pose[k, 2])
-        axes.plot(
-            *(1e3 * corners.T),
-            color=style.TIME_COLOURS(scale(push.time[k])),
-            linewidth=1.3,
-            zorder=3,
-        )
+    for k in style.evenly(len(push.time), INSTANTS):
+        corners = placed(closed, push.pose[k])
+        colour = style.TIME_COLOURS(scale(push.time[k]))
+        axes.plot(*(1e3 * corners.T), color=colour, linewidth=1.3, zorder=3)
         if push.pusher.width > 0.0:
-            face = push.pusher_pose[k, :2] + geometry.rotate(
-                push.pusher.ends, push.pusher_pose[k, 2]
-            )
+            face = placed(push.pusher.ends, push.pusher_pose[k])
             axes.plot(*(1e3 * face.T), color="0.3", linewidth=2.0, zorder=4)
     axes.plot(*(1e3 * push.pose[:, :2].T), color="0.5", linewidth=0.8, zorder=2)
     for i, mode in enumerate(MODES):
         here = push.mode == mode
         if here.any():
-            dots = {
-                "s": 9,
-                "zorder": 5,
-                "color": "0.75" if mode == "free" else style.PALETTE[i],
-            }
-            axes.scatter(
-                *(1e3 * push.pusher_pose[here, :2].T), label=f"pusher: {mode}", **dots
-            )
+            places = 1e3 * push.pusher_pose[here, :2].T
+            colour = "0.75" if mode == "free" else style.PALETTE[i]
+            label = f"pusher: {mode}"
+            axes.scatter(*places, s=9, zorder=5, color=colour, label=label)
     style.show_times(axes, push.time)
     style.show_lengths(axes, float(np.abs(push.pose[:, :2]).max()))
     axes.set_aspect("equal", adjustable="datalim")

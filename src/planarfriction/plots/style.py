@@ -84,10 +84,8 @@ class PlotFigure(Figure):
 
         if pyplot.get_backend().lower() in WITHOUT_WINDOW:
             if warn:
-                warnings.warn(
-                    f"no window can open here ({pyplot.get_backend()}): use savefig",
-                    stacklevel=2,
-                )
+                words = f"no window can open here ({pyplot.get_backend()}): use savefig"
+                warnings.warn(words, stacklevel=2)
             return
         manager = self.canvas.manager
         if manager is None or not pyplot.fignum_exists(manager.num):
@@ -113,15 +111,14 @@ def new_figure(width: float, height: float, size: Any = None) -> PlotFigure:
     Raises InvalidValueError unless `size` is two numbers > 0 and at most `LARGEST_SIDE`.
     """
     if size is None:
-        width, height = (
-            max(1.0, rcParams["font.size"] / 10.0) * each for each in (width, height)
-        )
+        larger = max(1.0, rcParams["font.size"] / 10.0)
+        width = larger * width
+        height = larger * height
     else:
         width, height = validation.positive_array("size", size, (2,))
         if max(width, height) > LARGEST_SIDE:
-            raise InvalidValueError(
-                "size", f"be in inches, each side at most {LARGEST_SIDE:g}", size
-            )
+            rule = f"be in inches, each side at most {LARGEST_SIDE:g}"
+            raise InvalidValueError("size", rule, size)
     return PlotFigure(figsize=(width, height), layout="constrained", dpi=120)
 
 
@@ -145,16 +142,11 @@ def check_axes(name: str, ax: Any, size: Any, *, three: bool = False) -> None:
     if not isinstance(ax, Axes):
         raise InvalidValueError(name, "be axes of matplotlib", ax)
     if (ax.name == "3d") != three:
-        rule = (
-            'have three dimensions (projection="3d")'
-            if three
-            else "be those of a plane"
-        )
-        raise InvalidValueError(name, rule, ax)
+        of_three = 'have three dimensions (projection="3d")'
+        raise InvalidValueError(name, of_three if three else "be those of a plane", ax)
     if size is not None:
-        raise InvalidValueError(
-            "size", f"be left out with {name}: the figure has a size", size
-        )
+        rule = f"be left out with {name}: the figure has a size"
+        raise InvalidValueError("size", rule, size)
 
 
 def axes_width(axes: Any) -> float:
@@ -199,8 +191,14 @@ def wrapped(text: str, width: int) -> str:
     return "\n".join(textwrap.wrap(text, width)) or text
 
 
-def tidy(axes) -> None:
-    """Draw a light grid below the data, and no box around it."""
-    axes.grid(True, color="0.88", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+def tidy(*axes: Any) -> None:
+    """Draw a light grid below the data of all `axes`, and no box around it."""
+    for each in axes:
+        each.grid(True, color="0.88", linewidth=0.6)
+        each.set_axisbelow(True)
+        each.spines[["top", "right"]].set_visible(False)
+
+
+def evenly(count: int, most: int) -> np.ndarray:
+    """Return at most so many indices of `count` things, evenly spaced, with the first and the last."""
+    return np.unique(np.linspace(0, count - 1, most).round().astype(int))

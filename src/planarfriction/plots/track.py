@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.plots.histories import KICK
+from planarfriction.plots.style import evenly
+from planarfriction.scenes.contact import contact_poses, support_displacement
 from planarfriction.scenes.slip import SlipField, bristles_of, slip_field
+from planarfriction.scenes.solution import columns_of
 
 MOST_STEPS = 5000
 """Most steps in which bristles follow a motion; of more samples, evenly chosen ones."""
@@ -66,18 +69,12 @@ class Track(NamedTuple):
 
 def track_of(solution: pf.Solution, times: np.ndarray) -> Track:
     """Return the solution at `times` `[F]` [s]: poses without overshoot, all else along straight lines."""
-    sampled = np.asarray(solution.histories["time"].values, dtype=float)
-    every = np.unique(
-        np.linspace(0, len(sampled) - 1, min(len(sampled), MOST_STEPS))
-        .round()
-        .astype(int)
-    )
+    sampled = solution.histories["time"].values
+    every = evenly(len(sampled), MOST_STEPS)
     steps = np.unique(np.concatenate([sampled[every], times]))
     frames = np.searchsorted(steps, times)
     poses = _poses(solution, sampled, steps)
-    twists = np.stack(
-        [_values(solution, name, sampled, times) for name in ("vx", "vy", "omega")], -1
-    )
+    twists = _between(times, sampled, columns_of(solution, "vx", "vy", "omega"))
     if solution.scene.velocity is not None:  # in axes of the body
         twists = geometry.rotate(twists, poses[frames, 2])
     contacts = []
@@ -85,7 +82,8 @@ def track_of(solution: pf.Solution, times: np.ndarray) -> Track:
         zip(solution.scene.contacts, _first(solution), strict=True)
     ):
         at = contact_poses(contact, steps, poses)
-        loads = _values(solution, "normal_force", sampled, steps, index)
+        load = solution.histories["normal_force"].values[:, index]
+        loads = np.interp(steps, sampled, load)
         against = _between(times, sampled, solution.contact_twist(contact.name))
         slip = first and slip_field(
             *first,
@@ -119,27 +117,9 @@ def _first(
         replace(each, model=model)
         for each, model in zip(scene.contacts, known, strict=True)
     ]
-    loads = np.asarray(solution.histories["normal_force"].values, dtype=float)[0]
+    loads = solution.histories["normal_force"].values[0]
     states = first_states(replace(scene, contacts=contacts), loads)
     return list(zip(known, states, strict=True))
-
-
-def contact_poses(
-    contact: pf.Contact, times: np.ndarray, poses: np.ndarray
-) -> np.ndarray:
-    """Return the poses `[T, 3]` [m, m, rad] of a contact's frame at `times`, where the body has `poses` `[T, 3]`."""
-    fixed = np.array([*contact.position, contact.angle], dtype=float)
-    if contact.mounted_on == "body":
-        return poses + geometry.rotate(fixed, poses[:, 2])
-    return fixed + _carried(contact, times)
-
-
-def _carried(contact: pf.Contact, times: np.ndarray) -> np.ndarray:
-    """Return the prescribed displacement of the world's side of a contact `[T, 3]` [m, m, rad]."""
-    from planarfriction.scenes.signal import displacement
-
-    moves = contact.support_velocity
-    return np.zeros((len(times), 3)) if moves is None else displacement(moves, times)
 
 
 def _displacements(
@@ -155,24 +135,15 @@ def _displacements(
         body, middle[:, :2] - 0.5 * (poses[1:, :2] + poses[:-1, :2])
     )
     # Of a pad at its frame, of the ground at the world's origin.
-    ground = np.diff(_carried(contact, times), axis=0)
-    moved = moved - (
-        geometry.twist_at(ground, middle[:, :2])
-        if contact.mounted_on == "body"
-        else ground
-    )
-    return geometry.rotate(moved, -middle[:, 2])
+    ground = np.diff(support_displacement(contact, times), axis=0)
+    if contact.mounted_on == "body":
+        ground = geometry.twist_at(ground, middle[:, :2])
+    return geometry.rotate(moved - ground, -middle[:, 2])
 
 
 def body_poses(solution: pf.Solution) -> np.ndarray:
     """Return the pose (x, y, theta) of the body at all samples, `[T, 3]` [m, m, rad]."""
-    return np.stack(
-        [
-            np.asarray(solution.histories[name].values, dtype=float)
-            for name in ("x", "y", "theta")
-        ],
-        -1,
-    )
+    return columns_of(solution, "x", "y", "theta")
 
 
 def _poses(solution: pf.Solution, sampled: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -186,30 +157,12 @@ def _poses(solution: pf.Solution, sampled: np.ndarray, times: np.ndarray) -> np.
     )
 
 
-def _values(
-    run: pf.Solution,
-    name: str,
-    sampled: np.ndarray,
-    times: np.ndarray,
-    contact: Any = None,
-) -> np.ndarray:
-    values = np.asarray(run.histories[name].values, dtype=float)
-    return np.interp(times, sampled, values if contact is None else values[:, contact])
-
-
 def _without_kick(solution: pf.Solution, contact: int) -> np.ndarray:
     """Return the wrenches of a contact `[T, 3]`; a first one that dwarfs the others gives way to the next.
 
     Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`).
     """
-    names = ("fx", "fy", "tau")
-    wrenches = np.stack(
-        [
-            np.asarray(solution.histories[name].values, dtype=float)[:, contact]
-            for name in names
-        ],
-        -1,
-    )
+    wrenches = columns_of(solution, "fx", "fy", "tau")[:, contact]
     for column in wrenches.T:
         if len(column) > 1 and abs(column[0]) > KICK * np.abs(column[1:]).max():
             column[0] = column[1]

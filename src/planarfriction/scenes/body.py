@@ -17,11 +17,6 @@ from planarfriction.scenes.signal import Signal, as_signal
 
 def floats(name: str, value: Any, size: int) -> tuple[float, ...]:
     """Return `value` as a tuple of `size` finite numbers, or raise."""
-    fits = type(value) is tuple and len(value) == size
-    if fits and all(
-        type(each) is float and abs(each) <= validation.LARGEST for each in value
-    ):
-        return value
     return tuple(validation.vector(name, value, size).tolist())
 
 
@@ -115,11 +110,8 @@ class Spring(ByValue):
             rule = f"have the shape (..., 3) with one for each of {time.shape} times"
             raise InvalidValueError("pose", rule, pose.shape)
         arm = rotate(self.at, pose[..., 2])
-        stretch = (
-            self.anchor(time)
-            - pose
-            - np.concatenate([arm, np.zeros_like(arm[..., :1])], -1)
-        )
+        stretch = self.anchor(time) - pose
+        stretch[..., :2] -= arm
         wrench = stretch * [self.stiffness, self.stiffness, self.torsion]
         wrench[..., 2] += arm[..., 0] * wrench[..., 1] - arm[..., 1] * wrench[..., 0]
         return wrench
@@ -127,20 +119,15 @@ class Spring(ByValue):
     @property
     def numbers(self) -> tuple[float, ...]:
         """Constants in the order of `body.springs`."""
-        return (
-            self.stiffness,
-            self.damping,
-            self.torsion,
-            self.torsion_damping,
-            *self.at,
-        )
+        turning = self.torsion, self.torsion_damping
+        return self.stiffness, self.damping, *turning, *self.at
 
 
 def pull_on(scene: Any, body: Any, time: float) -> np.ndarray:
     """Return the load `[3]` [N, N, N m] on a body of a scene at rest: applied force, weight, and pull of springs."""
-    pull = np.array([*body.gravity, 0.0]) * body.mass + (
-        0.0 if scene.force is None else scene.force(time)
-    )
+    pull = np.array([*body.gravity, 0.0]) * body.mass
+    if scene.force is not None:
+        pull = pull + scene.force(time)
     for spring in scene.springs:
         pull = pull + spring.pull(time, [*body.position, body.angle])
     return pull

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction._support import validation
-from planarfriction._support.equality import ByValue, Kept
+from planarfriction._support.equality import ByValue, Kept, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
+from planarfriction.geometry import rotate
 from planarfriction.scenes.body import floats
-from planarfriction.scenes.signal import Signal, as_signal
+from planarfriction.scenes.signal import Signal, as_signal, displacement
 
 MOST_CONTACTS = 1_000_000
 """Identical contacts that share one state."""
@@ -38,6 +40,13 @@ def checked_model(name: str, value: Any) -> Any:
     return value
 
 
+def _load(name: str, value: Any) -> Signal:
+    """Return `value` as a scalar signal that is never below zero, or raise."""
+    load = as_signal(name, value, None)
+    load.check_non_negative(name)
+    return load
+
+
 @dataclass(frozen=True, eq=False)
 class Contact(ByValue):
     """A contact between body and world: a friction model, its position, and its normal force.
@@ -49,36 +58,44 @@ class Contact(ByValue):
     break their rule.
     """
 
-    model: Any = field(repr=False)
+    model: Any = checked(checked_model, repr=False)
     """Friction model, for example one of `planarfriction.models`."""
-    normal_force: Kept[Signal | ArrayLike, Signal]
+    normal_force: Kept[Signal | ArrayLike, Signal] = checked(_load)
     """Normal force [N], >= 0: a signal, or a number for a constant force."""
-    mounted_on: Literal["world", "body"] = "world"
+    mounted_on: Literal["world", "body"] = checked(
+        validation.choice, ("world", "body"), default="world"
+    )
     """Part that the contact frame is fixed to: "world" or "body"."""
-    position: Kept[ArrayLike, tuple[float, float]] = (0.0, 0.0)  # pyright: ignore[reportAssignmentType]
+    position: Kept[ArrayLike, tuple[float, float]] = checked(
+        floats, 2, default=(0.0, 0.0)
+    )
     """Origin of the contact frame [m], in the world or, on the body, in its axes from its centre of mass."""
-    angle: float = 0.0
+    angle: float = checked(validation.number, default=0.0)
     """Angle of the contact frame's axes in the world or in the body [rad]."""
-    count: int = 1
+    count: int = checked(validation.count, 1, MOST_CONTACTS, default=1)
     """Number of identical contacts (same position, same load) that share this one's state."""
     name: str = "contact"
     """Name in the results; unique within its scene."""
-    support_velocity: Kept[Signal | ArrayLike | None, Signal | None] = None  # pyright: ignore[reportAssignmentType]
+    support_velocity: Kept[Signal | ArrayLike | None, Signal | None] = checked(
+        as_signal, 3, default=None
+    )
     """Prescribed twist `(vx, vy, omega)` of the world's side, world axes, `[T, 3]` [m/s, m/s, rad/s]; None: at rest.
 
     For a pad fixed to the world it is the twist at the origin of the contact frame, which moves with the pad. Under a
     patch fixed to the body it is the twist of the ground (a belt, a turntable) at the origin of the world.
     """
-    pressure: Literal["fixed", "follows"] = "fixed"
+    pressure: Literal["fixed", "follows"] = checked(
+        validation.choice, ("fixed", "follows"), default="fixed"
+    )
     """Pressure that is "fixed" to the patch, or "follows" the load (docs/physics.md, "Pressure that follows the load").
 
     It follows weight, applied forces and inertia, which act at the centre of mass, and friction, which acts below it,
     with a lag of 1 ms. The patch is fixed to the body, which has no other contact, and its model has bristles on cells.
     A body that would tip slides on the edge of its patch.
     """
-    height: float = 0.0
+    height: float = checked(validation.non_negative, default=0.0)
     """Height of the body's centre of mass above the contact [m], >= 0, where the pressure follows the load."""
-    edge: bool = False
+    edge: bool = checked(validation.instance, bool, "True or False", default=False)
     """True if only cells on the body, within its `outline`, carry load, the others carry it for them.
 
     A cell that lies on the edge carries by the part of its area that is on the body, at the centroid of this part. The
@@ -87,65 +104,36 @@ class Contact(ByValue):
 
     def __post_init__(self) -> None:
         validation.text("name of a contact", self.name)
-        checked_model(f"model of contact {self.name!r}", self.model)
-        of_contact = f"of contact {self.name!r}"
-        load = as_signal(f"normal_force {of_contact}", self.normal_force, None)
-        load.check_non_negative(f"normal_force {of_contact}")
-        self._set(normal_force=load)
-        validation.choice(
-            f"mounted_on {of_contact}", self.mounted_on, ("world", "body")
-        )
-        position = floats(f"position {of_contact}", self.position, 2)
-        angle = f"angle {of_contact}"
-        count = validation.count(
-            f"count {of_contact}", self.count, at_most=MOST_CONTACTS
-        )
-        self._set(
-            position=position, angle=validation.number(angle, self.angle), count=count
-        )
-        if self.support_velocity is not None:
-            self._set(
-                support_velocity=as_signal(
-                    f"support_velocity {of_contact}", self.support_velocity, 3
-                )
-            )
-        validation.choice(f"pressure {of_contact}", self.pressure, ("fixed", "follows"))
-        self._set(height=validation.non_negative(f"height {of_contact}", self.height))
-        if self.pressure == "follows":
-            rule = "'fixed' on the world: only a patch of the body follows its load"
-            self._check_cells(of_contact, "pressure", "body", rule)
-        elif self.height > 0.0:
-            raise InvalidValueError(
-                f"height {of_contact}",
-                "be 0 where the pressure is 'fixed'",
-                self.height,
-            )
-        if validation.instance(f"edge {of_contact}", self.edge, bool, "True or False"):
-            self._check_cells(
-                of_contact,
-                "edge",
-                "world",
-                "False on the body: only a pad of the world leaves the body",
-            )
+        try:
+            super().__post_init__()
+            self._check_parts()
+        except InvalidValueError as error:
+            name = f"{error.name} of contact {self.name!r}"
+            raise InvalidValueError(name, error.rule, error.value) from None
 
-    def _check_cells(
-        self, of_contact: str, name: str, mount: str, otherwise: str
-    ) -> None:
+    def _check_parts(self) -> None:
+        """Check that mount and model suit a pressure that follows the load, and an edge."""
+        if self.pressure == "follows":
+            rule = "be 'fixed' on the world: only a patch of the body follows its load"
+            self._check_cells("pressure", "body", rule, "the pressure follows")
+        elif self.height > 0.0:
+            rule = "be 0 where the pressure is 'fixed'"
+            raise InvalidValueError("height", rule, self.height)
+        if self.edge:
+            rule = "be False on the body: only a pad of the world leaves the body"
+            self._check_cells("edge", "world", rule, "the body has an edge")
+
+    def _check_cells(self, name: str, mount: str, rule: str, where: str) -> None:
         """Check that the contact is fixed to its mount, and that its model has bristles on cells."""
         from planarfriction.models import DistributedModel
 
         if self.mounted_on != mount:
-            raise InvalidValueError(
-                f"{name} {of_contact}", f"be {otherwise}", getattr(self, name)
-            )
+            raise InvalidValueError(name, rule, getattr(self, name))
         if not isinstance(getattr(self.model, "reduction", None), DistributedModel):
-            where = (
-                "the pressure follows" if name == "pressure" else "the body has an edge"
-            )
             rule = (
                 f"have bristles on cells where {where} (DistributedModel, ReducedModel)"
             )
-            raise InvalidValueError(f"model {of_contact}", rule, self.model)
+            raise InvalidValueError("model", rule, self.model)
 
     @property
     def centre_of_mass(self) -> tuple[float, float]:
@@ -162,10 +150,24 @@ class Contact(ByValue):
         return f"Contact({self.name!r}: {count}{self.model!r} on the {self.mounted_on}{moved}, {load} N)"
 
 
+def support_displacement(contact: Contact, times: np.ndarray) -> np.ndarray:
+    """Return the prescribed displacement of the world's side of a contact `[T, 3]` [m, m, rad]."""
+    moves = contact.support_velocity
+    return np.zeros((len(times), 3)) if moves is None else displacement(moves, times)
+
+
+def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """Return the poses `[T, 3]` [m, m, rad] of a contact's frame at `times`, where the body has `poses` `[T, 3]`."""
+    fixed = np.array([*contact.position, contact.angle])
+    if contact.mounted_on == "body":
+        return poses + rotate(fixed, poses[..., 2])
+    return fixed + support_displacement(contact, times)
+
+
 def with_friction(contact: Contact, factor: float) -> Contact:
     """Return the contact with `factor` times the friction coefficients mu_c and mu_s that its law has."""
-    law = contact.model.law
     model = contact.model
+    law = model.law
     scaled = {
         name: factor * getattr(law, name)
         for name in ("mu_c", "mu_s")
@@ -174,9 +176,8 @@ def with_friction(contact: Contact, factor: float) -> Contact:
     if factor == 1.0 or not scaled:
         return contact
     law = dataclasses.replace(law, **scaled)
-    changed = (
-        model.with_law(law)
-        if hasattr(model, "with_law")
-        else dataclasses.replace(model, law=law)
-    )
-    return dataclasses.replace(contact, model=changed)
+    if hasattr(model, "with_law"):
+        model = model.with_law(law)
+    else:
+        model = dataclasses.replace(model, law=law)
+    return dataclasses.replace(contact, model=model)

@@ -6,6 +6,7 @@ sampled one, a shape and its size for a patch, a rectangle's `size` for the iner
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -25,10 +26,8 @@ from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.model_files import model_from_dict, model_to_dict
 from planarfriction.scenes.signal import Signal, read_signal
 
-SCENE_KEYS = (
-    "name", "t_end", "save_every", "stop_speed", "rtol", "atol", "start",
-    "body", "force", "velocity", "spring", "contact",
-)  # fmt: skip
+_OPTIONS = ("name", "t_end", "save_every", "rtol", "atol", "stop_speed", "start")
+SCENE_KEYS = (*_OPTIONS, "body", "force", "velocity", "spring", "contact")
 _MOST_NAMES = 100
 """Names of a dotted key that are read: the time of the reader grows with their square."""
 
@@ -37,17 +36,7 @@ _LONG_KEY = re.compile(
     rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_MOST_NAMES}}}"""
 )
 
-_OPTIONS = ("save_every", "stop_speed", "rtol", "atol", "name", "start")
-BODY_KEYS = (
-    "mass",
-    "inertia",
-    "position",
-    "angle",
-    "velocity",
-    "gravity",
-    "outline",
-    "size",
-)
+BODY_KEYS = (*(field.name for field in dataclasses.fields(Body)), "size")
 CONTACT_KEYS = (
     *("name", "mounted_on", "position", "angle", "count", "pressure", "height", "edge"),
     *("normal_force", "support_velocity", "model", "patch", "law"),
@@ -57,18 +46,13 @@ SPRING_KEYS = ("stiffness", "damping", "at", "torsion", "torsion_damping", "anch
 
 def rectangle_outline(size: Sequence[float]) -> np.ndarray:
     """Return the corners `[4, 2]` [m] of a rectangle of `size` (width, height) about the origin."""
-    half = [
-        0.5 * validation.positive("size", side)
-        for side in validation.vector("size", size, 2)
-    ]
-    return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    return 0.5 * corners * validation.positive_array("size", size, (2,))
 
 
 def rectangle_inertia(mass: float, size: Sequence[float]) -> float:
     """Return the moment of inertia of a uniform rectangle about its centre, `m (w^2 + h^2) / 12` [kg m^2]."""
-    width, height = (
-        validation.positive("size", side) for side in validation.vector("size", size, 2)
-    )
+    width, height = validation.positive_array("size", size, (2,)).tolist()
     return validation.positive("mass", mass) / 12.0 * (width**2 + height**2)
 
 
@@ -85,52 +69,33 @@ def scene_to_dict(
     `of_part` makes the tables of signals and the entries of a contact's model.
     """
 
-    def table(record: Any, *keys: str) -> dict[str, Any]:
+    def table(record: Any, keys: Sequence[str], left_out: Any = ()) -> dict[str, Any]:
         """Return the values of a record that are not None."""
-        found = {key: getattr(record, key) for key in keys}
+        found = {key: getattr(record, key) for key in keys if key not in left_out}
         return {
-            key: _plain(value, of_part)
+            key: of_part(value) if isinstance(value, Signal) else _plain(value)
             for key, value in found.items()
             if value is not None
         }
 
-    start = ("start",) if scene.start != "rest" else ()
-    data = table(
-        scene, "name", "t_end", "save_every", "rtol", "atol", "stop_speed", *start
-    )
-    data["body"] = table(scene.body, *BODY_KEYS[:-1])
-    data |= table(scene, "force", "velocity")
-    data |= (
-        {"spring": [table(each, *SPRING_KEYS) for each in scene.springs]}
-        if scene.springs
-        else {}
-    )
-    data["contact"] = [
-        {**table(each, *_keys_of(each)), **of_part(each.model)}
-        for each in scene.contacts
-    ]
+    data = table(scene, _OPTIONS, ["start"] if scene.start == "rest" else ())
+    data["body"] = table(scene.body, BODY_KEYS[:-1])
+    data |= table(scene, ("force", "velocity"))
+    if scene.springs:
+        data["spring"] = [table(each, SPRING_KEYS) for each in scene.springs]
+    data["contact"] = []
+    for each in scene.contacts:
+        # A fixed pressure and no edge go without saying.
+        left_out = ["pressure", "height"] if each.pressure == "fixed" else []
+        left_out += [] if each.edge else ["edge"]
+        entries = table(each, CONTACT_KEYS[:10], left_out)
+        data["contact"].append(entries | of_part(each.model))
     return data
 
 
-def _keys_of(contact: Contact) -> tuple[str, ...]:
-    """Return the keys of a contact but for its model; a fixed pressure and no edge go without saying."""
-    left_out = ("pressure", "height") if contact.pressure == "fixed" else ()
-    return tuple(
-        each
-        for each in CONTACT_KEYS[:10]
-        if each not in (*left_out, *([] if contact.edge else ["edge"]))
-    )
-
-
-def _plain(value: Any, of_part: Callable[[Any], dict[str, Any]]) -> Any:
-    if isinstance(value, Signal):
-        return of_part(value)
+def _plain(value: Any) -> Any:
     return (
-        value.tolist()
-        if isinstance(value, np.ndarray)
-        else list(value)
-        if isinstance(value, tuple)
-        else value
+        np.asarray(value).tolist() if isinstance(value, np.ndarray | tuple) else value
     )
 
 
@@ -144,21 +109,16 @@ def parts_of_scene(
     place = None if folder is None else validation.path("folder", folder)
     table = Section(data, "", source, place).only(SCENE_KEYS)
     contacts = _contacts(table)
+    table.get("t_end")
     options = {key: table.get(key) for key in _OPTIONS if key in table}
-    signals = {
+    options |= {
         key: read_signal(table, key) for key in ("force", "velocity") if key in table
     }
     if "spring" in table:
         options["springs"] = [_spring(each) for each in _tables(table, "spring")]
     prescribed = "velocity" in table and "body" not in table
     body = None if prescribed else _body(table.section("body"))
-    return table, {
-        "body": body,
-        "contacts": contacts,
-        "t_end": table.get("t_end"),
-        **signals,
-        **options,
-    }
+    return table, {"body": body, "contacts": contacts, **options}
 
 
 def _body(table: Section) -> Body:
@@ -183,24 +143,17 @@ def _tables(scene: Section, name: str) -> list[Section]:
         tables = [tables]
     if not isinstance(tables, list) or not tables:
         scene.fail(f"{name} must be one or more tables [[{name}]]")
-    names = (
-        [name]
-        if len(tables) == 1
-        else [f"{name}.{number}" for number in range(1, len(tables) + 1)]
-    )
+    several = len(tables) > 1
     return [
-        Section(data, each, scene.source, scene.folder)
-        for data, each in zip(tables, names, strict=True)
+        scene.section(f"{name}.{number}" if several else name, data)
+        for number, data in enumerate(tables, 1)
     ]
 
 
 def _spring(table: Section) -> Spring:
     """Return the spring of a table."""
-    given: dict[str, Any] = {
-        key: table.only(SPRING_KEYS).get(key)
-        for key in SPRING_KEYS
-        if key == "stiffness" or key in table
-    }
+    given = dict(table.only(SPRING_KEYS).data)
+    table.get("stiffness")
     with table.located():
         if "anchor" in table:
             given["anchor"] = read_signal(table, "anchor")
@@ -241,10 +194,8 @@ def read_table(path: Path) -> dict[str, Any]:
             if kind == ".toml"
             else json.loads(text, object_pairs_hook=_table)
         )
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # ValueError: also a number of more digits than Python converts
+    # ValueError: also a number of more digits than Python converts.
+    except (ValueError, RecursionError) as error:
         raise FileError(
             f"{path}: not valid {kind[1:].upper()}: {shown(str(error).partition(';')[0])}"
         ) from None
@@ -299,11 +250,8 @@ def _lines(table: dict[str, Any], path: tuple[str, ...]) -> list[str]:
 
 
 def _is_table(value: Any) -> bool:
-    return isinstance(value, dict) or (
-        isinstance(value, list)
-        and bool(value)
-        and all(isinstance(item, dict) for item in value)
-    )
+    items = value if isinstance(value, list) else [value]
+    return bool(items) and all(isinstance(item, dict) for item in items)
 
 
 def _key(key: str) -> str:
@@ -321,11 +269,8 @@ def _value(value: Any) -> str:
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, dict):
-        return (
-            "{"
-            + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
-            + "}"
-        )
+        items = (f"{_key(key)} = {_value(item)}" for key, item in value.items())
+        return f"{{{', '.join(items)}}}"
     if isinstance(value, list):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
+        return f"[{', '.join(map(_value, value))}]"
     return repr(value)

@@ -76,25 +76,22 @@ def patch_from_dict(table: Section) -> Any:
     Every shape takes `metric` and `asymmetry` as `ContactPatch.with_friction_metric` does; `metric` may also be a table
     with the parameters of `friction_metric`: `along`, `across` and `angle` [rad], 0 if left out.
     """
-    directions = {
-        key: table.get(key) for key in ("metric", "asymmetry") if key in table
-    }
-    rest = {key: value for key, value in table.data.items() if key not in directions}
+    rest = dict(table.data)
+    given_metric = rest.pop("metric", None)
+    asymmetry = rest.pop("asymmetry", None)
     patch = _shape_from_dict(Section(rest, table.where, table.source, table.folder))
-    if not directions:
+    if given_metric is None and asymmetry is None:
         return patch
-    if isinstance(directions.get("metric"), dict):
+    if isinstance(given_metric, dict):
         from planarfriction.patch import friction_metric
 
         metric = table.section("metric").only(["angle", "along", "across"])
         with metric.located():
-            directions["metric"] = friction_metric(
+            given_metric = friction_metric(
                 metric.get("angle", 0.0), metric.get("along"), metric.get("across")
             )
     with table.located():
-        return patch.with_friction_metric(
-            directions.get("metric"), directions.get("asymmetry")
-        )
+        return patch.with_friction_metric(given_metric, asymmetry)
 
 
 def _shape_from_dict(table: Section) -> Any:
@@ -143,10 +140,8 @@ def _described(family: Family, member: Any) -> dict[str, Any]:
         )
         raise InvalidValueError(family.what, rule, type(member).__name__)
     values = {name: _plain(member, name) for name in _parameters(family[kind])}
-    return {
-        "kind": kind,
-        **{name: value for name, value in values.items() if value is not None},
-    }
+    known = {name: value for name, value in values.items() if value is not None}
+    return {"kind": kind, **known}
 
 
 def _plain(member: Any, name: str) -> Any:
@@ -155,23 +150,19 @@ def _plain(member: Any, name: str) -> Any:
         return dataclasses.asdict(value)
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    if (
-        name == "surface"
-        or value is None
-        or isinstance(value, bool | int | float | str | list | tuple | dict)
-    ):
+    plain = bool | int | float | str | list | tuple | dict | None
+    if name == "surface" or isinstance(value, plain):
         return value
     rule = f"be an attribute of {type(member).__name__} and plain data to be written to a file"
-    raise InvalidValueError(
-        name, rule, "no attribute" if value is _MISSING else type(value).__name__
-    )
+    given = "no attribute" if value is _MISSING else type(value).__name__
+    raise InvalidValueError(name, rule, given)
 
 
 def _member(
-    family: Family, parent: Section, key: str, default: Any = None
+    family: Family, parent: Section, key: str, *default: str
 ) -> tuple[Section, Callable[..., Any]]:
     """Return the table of a member under `key`, where its name alone will do too, and what makes it."""
-    value = parent.get(key) if default is None else parent.get(key, default)
+    value = parent.get(key, *default)
     table = parent.section(key, {"kind": value} if isinstance(value, str) else value)
     return table, family[table.choice("kind", family)]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Iterator, Sequence
 
@@ -82,28 +81,19 @@ class Segments:
 
     def __init__(self, scene, t_end: float, marks=()) -> None:
         own = scene.breaks(t_end)
-        self._breaks = (
-            breaks_between(np.concatenate([own[1:-1], marks]), t_end)
-            if len(marks)
-            else own
-        )
+        self._breaks = breaks_between(np.concatenate([own[1:-1], marks]), t_end)
         """Breaks of the signals and `marks` [s], [S + 1]."""
         self._load = [
             contact.normal_force.pieces(self._breaks) for contact in scene.contacts
         ]
-        self._force = None if scene.force is None else scene.force.pieces(self._breaks)
-        self._velocity = (
-            None if scene.velocity is None else scene.velocity.pieces(self._breaks)
-        )
-        moves = any(contact.support_velocity is not None for contact in scene.contacts)
-        movers = [
-            _mover(contact.support_velocity, self._breaks)
-            for contact in scene.contacts
-            if moves
-        ]
-        self._mover = (
-            np.stack(movers, axis=1) if moves else np.empty((0, len(scene.contacts), 9))
-        )
+        self._force = scene.force and scene.force.pieces(self._breaks)
+        self._velocity = scene.velocity and scene.velocity.pieces(self._breaks)
+        movers = [contact.support_velocity for contact in scene.contacts]
+        moves = any(each is not None for each in movers)
+        self._mover = np.empty((0, len(movers), 9))
+        if moves:
+            each = [_mover(velocity, self._breaks) for velocity in movers]
+            self._mover = np.stack(each, axis=1)
         self._anchors = [spring.anchor.pieces(self._breaks) for spring in scene.springs]
         lengths = np.diff(self._breaks)
         parts = np.ones(len(self._breaks) - 1)
@@ -180,11 +170,10 @@ class Segments:
 
     def anchors(self, pieces: np.ndarray) -> np.ndarray:
         """Return pose and velocity of the anchor of each spring as pieces begin, [S, K, 6]."""
-        each = [
-            np.concatenate(self._linear(anchor, pieces), axis=1)
-            for anchor in self._anchors
-        ]
-        return np.stack(each, axis=1) if each else np.empty((len(pieces), 0, 6))
+        found = np.empty((len(pieces), len(self._anchors), 6))
+        for k, anchor in enumerate(self._anchors):
+            found[:, k] = np.hstack(self._linear(anchor, pieces))
+        return found
 
     def _behind(self, pieces: np.ndarray) -> np.ndarray:
         """Return the break of the signals that pieces lie behind."""
@@ -227,29 +216,24 @@ class SegmentBatches:
         self._pieces = Segments(scene, t_end, marks)
         self._done = 0
         contacts = scene.contacts
-        follows = [contact.model.patch.depends_on_load for contact in contacts]
         self._between = [
-            self._pieces.between(c) if follows[c] else None
-            for c in range(len(contacts))
+            self._pieces.between(c) if contact.model.patch.depends_on_load else None
+            for c, contact in enumerate(contacts)
         ]
         self.models: list[PackedModel] = []
         """The model of each contact, as packed last."""
         records, row, pieces = self._pack()
         begin = time.perf_counter()
-        calls = np.array(
-            [calls_of(model.functions, change=sensitivities) for model in self.models]
-        )
+        calls = [calls_of(each.functions, change=sensitivities) for each in self.models]
         self.loading = time.perf_counter() - begin
         """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
-        mounts = [
-            WORLD if contact.mounted_on == "world" else BODY for contact in contacts
-        ]
+        mounts = [WORLD if each.mounted_on == "world" else BODY for each in contacts]
+        if scene.velocity is not None:
+            mounts = [BODY_AXES] * len(mounts)
         self._contacts = Contacts(
-            calls=calls,
+            calls=np.array(calls),
             record=records,
-            mount=np.array(
-                mounts if scene.velocity is None else [BODY_AXES] * len(mounts)
-            ),
+            mount=np.array(mounts),
             place=np.array(
                 [[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in contacts],
                 dtype=float,
@@ -260,25 +244,19 @@ class SegmentBatches:
             reference=np.array([model.reference for model in self.models]),
             bristle=np.array([model.bristle for model in self.models]),
         )
-        peaks = [max(self._pieces.largest(c), 0.0) for c in range(len(contacts))]
-        factors = [
-            float(each.model.law.stiffness_factor(f))
-            for each, f in zip(contacts, peaks, strict=True)
+        laws = [contact.model.law for contact in contacts]
+        peaks = [self._pieces.largest(c) for c in range(len(contacts))]
+        bends = [
+            1.0 / float(law.stiffness_factor(peak)) if peak > 0.0 else 1.0
+            for law, peak in zip(laws, peaks, strict=True)
         ]
-        self._bends = [
-            1.0 / factor if f > 0.0 else 1.0
-            for factor, f in zip(factors, peaks, strict=True)
-        ]
-        """Deflections at the largest loads, as multiples of those that the laws name: 1 but for a fixed stiffness."""
-        self._length = min(
-            b * each.model.law.largest_deflection
-            for b, each in zip(self._bends, contacts, strict=True)
+        # Deflections at the largest loads, as multiples of those that the laws name: 1 but for a fixed stiffness.
+        bent = list(zip(bends, self.models, laws, strict=True))
+        self._length = min(bend * law.largest_deflection for bend, _, law in bent)
+        self._stop_time = max(
+            bend * law.numbers.sigma_1 / law.numbers.sigma_0 for bend, _, law in bent
         )
-        self._laws = [contact.model.law.numbers for contact in contacts]
-        speed = min(
-            model.velocity_scale * law.v_s
-            for model, law in zip(self.models, self._laws, strict=True)
-        )
+        speed = min(model.velocity_scale * law.numbers.v_s for _, model, law in bent)
         # a single point has no lever arm: its spin is measured in rad/s
         self._radius = max(model.radius for model in self.models) or 1.0
         arm = np.array([1.0, 1.0, 1.0 / self._radius])
@@ -289,10 +267,7 @@ class SegmentBatches:
         """Bristles as the scene starts, body velocity, pose."""
         self.state_scale = np.concatenate(
             [
-                *(
-                    b * m.state_scale
-                    for b, m in zip(self._bends, self.models, strict=True)
-                ),
+                *(bend * model.state_scale for bend, model, _ in bent),
                 speed * arm,
                 self._length * arm,
             ]
@@ -313,9 +288,8 @@ class SegmentBatches:
         """Return the bristles with which the scene starts, those that the solver has."""
         if self._scene.start == "rest":
             return np.zeros(self._contacts.state[-1])
-        return self._flat(
-            [state[None] for state in first_states(self._scene, self._shaped)]
-        )[0]
+        states = first_states(self._scene, self._shaped)
+        return self._flat([state[None] for state in states])[0]
 
     def first_slopes(self, d_loads: np.ndarray, d_pull: np.ndarray) -> np.ndarray:
         """Return changes `[K, n]` of the bristles of an equilibrium (see `start.first_slopes`)."""
@@ -324,27 +298,20 @@ class SegmentBatches:
     @property
     def _shaped(self) -> np.ndarray:
         """Loads whose shapes the contacts have at first [N]."""
-        return np.array(
-            [
-                self._pieces.held(c, np.zeros(1, np.int64))[0]
-                for c in range(len(self.models))
-            ]
+        first = np.zeros(1, np.int64)
+        return np.concatenate(
+            [self._pieces.held(c, first) for c in range(len(self.models))]
         )
 
     def _flat(self, states: list[np.ndarray]) -> np.ndarray:
         """Return states `[K, *state_shape]` of the contacts as the solver has them, `[K, n]`."""
-        chosen = [
-            each if m.cells is None else each[..., m.cells]
-            for each, m in zip(states, self.models, strict=True)
-        ]
-        flat = [each.reshape(len(each), -1) for each in chosen]
-        more = [
-            np.zeros((len(each), m.states - each.shape[1]))
-            for each, m in zip(flat, self.models, strict=True)
-        ]
-        return np.hstack(
-            [part for pair in zip(flat, more, strict=True) for part in pair]
-        )
+        parts = []
+        for state, model in zip(states, self.models, strict=True):
+            some = state if model.cells is None else state[..., model.cells]
+            flat = some.reshape(len(some), -1)
+            # Behind the bristles, the place of a pressure that follows the load.
+            parts.append(np.pad(flat, ((0, 0), (0, model.states - flat.shape[1]))))
+        return np.hstack(parts)
 
     def __iter__(self) -> Iterator[System]:
         while self._ready is not None or self._done < self._pieces.count:
@@ -365,10 +332,10 @@ class SegmentBatches:
         pieces = np.arange(
             self._done, min(self._done + self._ahead, self._pieces.count)
         )
+        # Models that follow the load are packed anew, and not kept meanwhile.
         old = [
-            model
+            None if between else model
             for model, between in zip(self.models, self._between, strict=False)
-            if between is None
         ]
         rows = []
         count = len(pieces)
@@ -378,9 +345,7 @@ class SegmentBatches:
             between = self._between[c]
             if between is None:
                 self.models.append(
-                    old.pop(0)
-                    if old
-                    else packed_contact(contact, [None], None, outline)
+                    old[c] if old else packed_contact(contact, [None], None, outline)
                 )
                 rows.append(np.zeros(len(pieces), np.int64))
                 continue
@@ -405,25 +370,18 @@ class SegmentBatches:
         inputs = self._pieces
         models = self.models
         breaks = inputs.breaks(np.append(pieces, pieces[-1] + 1))
-        load = (
-            np.array([inputs.load(c, pieces) for c in range(len(models))])
-            .transpose(2, 1, 0)
-            .copy()
-        )
+        load = np.array([inputs.load(c, pieces) for c in range(len(models))])
         driven = inputs.velocity(pieces)
         body = scene.body
         if driven is None:
             driven = np.empty((0, 3)), np.full((len(pieces), 3), [*body.gravity, 0.0])
         free = scene.velocity is None
+        inertias = np.array([body.mass, body.mass, body.inertia])
         motion = Motion(
-            inverse_mass=np.array(
-                [1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia]
-            )
-            if free
-            else np.zeros(3),
+            inverse_mass=1.0 / inertias if free else np.zeros(3),
             body_axes=not free,
             breaks=breaks,
-            load=load,
+            load=load.transpose(2, 1, 0).copy(),
             force=inputs.force(pieces),
             velocity=driven[0],
             acceleration=driven[1],
@@ -435,10 +393,7 @@ class SegmentBatches:
             anchor=inputs.anchors(pieces),
             stop_speed=float(scene.stop_speed or 0.0),
             stop_radius=self._radius,
-            stop_time=max(
-                b * law.sigma_1 / law.sigma_0
-                for b, law in zip(self._bends, self._laws, strict=True)
-            ),
+            stop_time=self._stop_time,
             stop_length=self._length,
             settled=inputs.settled,
         )
@@ -447,9 +402,8 @@ class SegmentBatches:
         kept = tuple(
             array for model in models for array in (model.records, *model.keepalive)
         )
-        pressures = sum(
-            STATES for contact in scene.contacts if contact.pressure == "follows"
-        )
+        follow = [contact.pressure == "follows" for contact in scene.contacts]
+        pressures = STATES * sum(follow)
         return System(self._contacts, motion, kept, pressures)
 
 
@@ -475,7 +429,7 @@ def _meet(times: np.ndarray, breaks: np.ndarray) -> None:
 
 
 def _starts(sizes: list[int]) -> np.ndarray:
-    return np.array([0, *itertools.accumulate(sizes)], np.int64)
+    return np.cumsum([0, *sizes], dtype=np.int64)
 
 
 def _mover(velocity: Signal | None, breaks: np.ndarray) -> np.ndarray:

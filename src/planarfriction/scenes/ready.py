@@ -60,6 +60,12 @@ def in_hand_load(
     )
 
 
+def _plate(mass: float, size: Sequence[float], **options: Any) -> Body:
+    """Make the body of a uniform rectangular plate of `size` (width, height) [m] and `mass` [kg]."""
+    inertia = rectangle_inertia(mass, size)
+    return Body(mass, inertia, outline=rectangle_outline(size), **options)
+
+
 def in_hand(
     model: Any,
     *,
@@ -82,35 +88,24 @@ def in_hand(
 
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
-    inertia = rectangle_inertia(mass, size)
     centre = validation.vector("centre_of_mass", centre_of_mass, 2)
-    body = Body(
-        mass, inertia, centre, gravity=(0.0, -GRAVITY), outline=rectangle_outline(size)
-    )
+    body = _plate(mass, size, position=centre)
     load = in_hand_load(1, t_end=t_end) if normal_force is None else normal_force
-    return Scene(
-        body,
-        [Contact(model, load, count=fingers, name="fingers", edge=edge)],
-        t_end,
-        name="in-hand",
-    )
+    pads = Contact(model, load, count=fingers, name="fingers", edge=edge)
+    return Scene(body, pads, t_end, name="in-hand")
 
 
 def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) -> Signal:
     """Return the applied wrench `(fx, fy, tau)` of the published drift runs [N, N, N m], held over every 0.01 s."""
     t = sample_times(t_end, SAMPLE_TIME)
     wave = np.sin(6.0 * np.pi * t)
-    force = np.zeros((len(t), 3))
+    force = np.minimum(t / 0.2, 1.0)
+    torque = 0.03 * force
     if load == "tangential":
-        force[:, 0] = np.where(t > 1.0, 1.0 + 0.4 * wave, np.minimum(t / 0.2, 1.0))
-        force[:, 2] = np.where(
-            t > 3.0, 0.03 + 0.01 * wave, 0.03 * np.clip((t - 2.8) / 0.2, 0.0, 1.0)
-        )
-    else:
-        ramp = np.minimum(t / 0.2, 1.0)
-        force[:, 0] = ramp
-        force[:, 2] = 0.03 * ramp
-    return Signal.sampled(t, force)
+        force = np.where(t > 1.0, 1.0 + 0.4 * wave, force)
+        ramp = 0.03 * np.clip((t - 2.8) / 0.2, 0.0, 1.0)
+        torque = np.where(t > 3.0, 0.03 + 0.01 * wave, ramp)
+    return Signal.sampled(t, np.stack([force, np.zeros_like(t), torque], axis=1))
 
 
 def drift(
@@ -132,22 +127,15 @@ def drift(
     normal_force: Any = GRAVITY
     if load == "normal":
         t = sample_times(t_end, SAMPLE_TIME)
-        normal_force = Signal.sampled(
-            t, GRAVITY + np.where(t > 1.0, np.sin(6.0 * np.pi * t), 0.0)
-        )
+        wave = np.where(t > 1.0, np.sin(6.0 * np.pi * t), 0.0)
+        normal_force = Signal.sampled(t, GRAVITY + wave)
     around = 2.0 * np.pi * np.arange(64) / 64
     outline = 0.05 * np.stack([np.cos(around), np.sin(around)], axis=1)
     # Inertia of a disc, m R^2 / 2.
     body = Body(1.0, 1.25e-3, gravity=(0.0, 0.0), outline=outline)
-    contact = Contact(model, normal_force, name="table")
-    return Scene(
-        body,
-        [contact],
-        t_end,
-        force=drift_force(load, t_end=t_end),
-        **FINE,
-        name=f"drift, {load}",
-    )
+    table = Contact(model, normal_force, name="table")
+    force = drift_force(load, t_end=t_end)
+    return Scene(body, table, t_end, force, **FINE, name=f"drift, {load}")
 
 
 def free_slide(
@@ -181,15 +169,9 @@ def free_slide(
         mass, inertia, position, angle, velocity, gravity=(0.0, 0.0), outline=outline
     )
     load: Any = GRAVITY * body.mass if normal_force is None else normal_force
-    contact = Contact(model, load, mounted_on="body", name="table")
-    return Scene(
-        body,
-        [contact],
-        t_end,
-        stop_speed=STOP_SPEED,
-        save_every=save_every,
-        name="free slide",
-    )
+    table = Contact(model, load, mounted_on="body", name="table")
+    stop = None, None, STOP_SPEED, save_every
+    return Scene(body, table, t_end, *stop, name="free slide")
 
 
 def published_velocity(*, speed: float = 0.015, spin: float = 1.0) -> Signal:
@@ -230,14 +212,13 @@ def driven(
     validation.choice("at", at, ("origin", "centre_of_pressure"))
     contact = Contact(model, normal_force, mounted_on="body", name="patch")
     if at == "centre_of_pressure":
-        centre = np.asarray(
-            model.patch.centre_of_pressure(float(contact.normal_force(0.0)))
-        )
+        load = float(contact.normal_force(0.0))
+        centre = np.asarray(model.patch.centre_of_pressure(load))
         contact = dataclasses.replace(contact, position=-centre)
     # Moved as prescribed: mass and inertia play no part.
     body = Body(1.0, 1.0, gravity=(0.0, 0.0))
     velocity = published_velocity() if twist is None else as_signal("twist", twist, 3)
-    return Scene(body, [contact], t_end, velocity=velocity, **FINE, name="driven")
+    return Scene(body, contact, t_end, None, velocity, **FINE, name="driven")
 
 
 def pushed(
@@ -267,29 +248,20 @@ def pushed(
     t_end = validation.positive("t_end", t_end)
     if velocity is None:
         times = t_end * np.array([0.0, 0.1, 0.9, 1.0])
-        velocity = Signal.sampled(
-            times, [[0.0] * 3, [0.05, 0.0, 0.0], [0.05, 0.0, 0.0], [0.0] * 3], "linear"
-        )
-    body = Body(
-        mass,
-        rectangle_inertia(mass, size),
-        gravity=(0.0, 0.0),
-        outline=rectangle_outline(size),
-    )
+        values = np.outer([0.0, 1.0, 1.0, 0.0], [0.05, 0.0, 0.0])
+        velocity = Signal.sampled(times, values, "linear")
+    body = _plate(mass, size, gravity=(0.0, 0.0))
     weight: Any = GRAVITY * body.mass
     table = Contact(model, weight, mounted_on="body", name="table")
-    pad = model if pad is None else pad
-    moved: dict[str, Any] = {
-        "position": position,
-        "count": fingers,
-        "support_velocity": velocity,
-    }
-    return Scene(
-        body,
-        [table, Contact(pad, normal_force, name="fingers", **moved)],
-        t_end,
-        name="pushed",
+    pads = Contact(
+        model if pad is None else pad,
+        normal_force,
+        position=position,
+        count=fingers,
+        name="fingers",
+        support_velocity=velocity,
     )
+    return Scene(body, [table, pads], t_end, name="pushed")
 
 
 GRIP = ([0.0, 0.2, 0.24, 0.36, 0.4], [4.0, 4.0, 1.0, 1.0, 6.0])
@@ -330,21 +302,11 @@ def pivot(
     Raises InvalidValueError for a parameter that breaks its rule.
     """
     arm = validation.positive("arm", arm)
-    inertia = rectangle_inertia(mass, size)
-    outline = rectangle_outline(size)
-    body = Body(mass, inertia, (arm, 0.0), gravity=(0.0, -GRAVITY), outline=outline)
-    load = (
-        Signal.sampled(*GRIP, hold="linear").held(SAMPLE_TIME)
-        if normal_force is None
-        else normal_force
-    )
-    return Scene(
-        body,
-        [Contact(model, load, count=fingers, name="fingers")],
-        t_end,
-        start=start,
-        name="pivot",
-    )
+    body = _plate(mass, size, position=(arm, 0.0))
+    if normal_force is None:
+        normal_force = Signal.sampled(*GRIP, hold="linear").held(SAMPLE_TIME)
+    pads = Contact(model, normal_force, count=fingers, name="fingers")
+    return Scene(body, pads, t_end, start=start, name="pivot")
 
 
 def foot(
@@ -368,24 +330,18 @@ def foot(
     Raises InvalidValueError for a parameter that breaks its rule.
     """
     half = 0.5 * validation.positive("length", length)
-    ahead = (
-        Signal.sampled(*SWAY, hold="linear")
-        if share is None
-        else as_signal("share", share, None)
-    )
-    if ahead.values.min() < 0.0 or ahead.values.max() > 1.0:
-        raise InvalidValueError(
-            "share", "be in [0, 1]", f"{ahead.values.min():g} to {ahead.values.max():g}"
-        )
-    turning = (
-        Signal.sampled(*TURNS) if torque is None else as_signal("torque", torque, None)
-    )
-    wrench = Signal.sampled(
-        turning.times, turning.values[:, None] * [0.0, 0.0, 1.0], turning.hold
-    )
-    body = Body(
-        mass, inertia, gravity=(0.0, 0.0), outline=_around(half, 0.5 * SOLE_WIDTH)
-    )
+    share = Signal.sampled(*SWAY, hold="linear") if share is None else share
+    ahead = as_signal("share", share, None)
+    least = ahead.values.min()
+    most = ahead.values.max()
+    if least < 0.0 or most > 1.0:
+        raise InvalidValueError("share", "be in [0, 1]", f"{least:g} to {most:g}")
+    torque = Signal.sampled(*TURNS) if torque is None else torque
+    turning = as_signal("torque", torque, None)
+    turns = turning.values[:, None] * [0.0, 0.0, 1.0]
+    wrench = Signal.sampled(turning.times, turns, turning.hold)
+    outline = _around(half, 0.5 * SOLE_WIDTH)
+    body = Body(mass, inertia, gravity=(0.0, 0.0), outline=outline)
     contacts = []
     for name, patch, part, x in (
         ("heel", model, 1.0 - ahead.values, -half),
@@ -395,7 +351,7 @@ def foot(
         contacts.append(
             Contact(patch, load, mounted_on="body", position=(x, 0.0), name=name)
         )
-    return Scene(body, contacts, t_end, force=wrench, name="foot")
+    return Scene(body, contacts, t_end, wrench, name="foot")
 
 
 def curling(
@@ -420,26 +376,12 @@ def curling(
     if inertia is None:
         inertia = 0.5 * validation.positive("mass", mass) * STONE_RADIUS**2
     velocity = validation.vector("twist", twist, 3)
-    body = Body(
-        mass,
-        inertia,
-        velocity=velocity,
-        gravity=(0.0, 0.0),
-        outline=_around(0.0, STONE_RADIUS),
-    )
+    outline = _around(0.0, STONE_RADIUS)
+    body = Body(mass, inertia, velocity=velocity, gravity=(0.0, 0.0), outline=outline)
     weight: Any = GRAVITY * body.mass
     ice = Contact(model, weight, mounted_on="body", name="ice")
-    return Scene(
-        body,
-        [ice],
-        t_end,
-        None,
-        None,
-        STOP_SPEED,
-        save_every,
-        start=start,
-        name="curling",
-    )
+    stop = None, None, STOP_SPEED, save_every
+    return Scene(body, ice, t_end, *stop, start=start, name="curling")
 
 
 def _around(half: float, radius: float) -> np.ndarray:

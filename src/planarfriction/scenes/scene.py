@@ -113,23 +113,16 @@ class Scene(ByValue):
         super().__post_init__()
         if self.velocity is not None:
             if self.springs:
-                raise InvalidValueError(
-                    "springs",
-                    "be none if the velocity is prescribed",
-                    f"{len(self.springs)}",
-                )
-            for name in ("force", "stop_speed"):
-                if getattr(self, name) is not None:
-                    raise InvalidValueError(
-                        name,
-                        "be None if the velocity is prescribed",
-                        getattr(self, name),
-                    )
+                rule = "be none if the velocity is prescribed"
+                raise InvalidValueError("springs", rule, f"{len(self.springs)}")
+            others = {"force": self.force, "stop_speed": self.stop_speed}
             for contact in self.contacts:
-                if contact.support_velocity is not None:
-                    name = f"support_velocity of contact {contact.name!r}"
-                    rule = "be None if the body's velocity is prescribed"
-                    raise InvalidValueError(name, rule, contact.support_velocity)
+                name = f"support_velocity of contact {contact.name!r}"
+                others[name] = contact.support_velocity
+            for name, given in others.items():
+                if given is not None:
+                    rule = "be None if the velocity is prescribed"
+                    raise InvalidValueError(name, rule, given)
         for contact in self.contacts:
             if contact.pressure == "follows" and len(self.contacts) > 1:
                 rule = "be 'fixed' beside other contacts, which share the load in a way that statics leaves open"
@@ -147,61 +140,42 @@ class Scene(ByValue):
 
     def _check_start(self) -> None:
         validation.choice("start", self.start, STARTS)
-        driven = {
-            "the body": self.body.velocity
-            if self.velocity is None
-            else self.velocity(0.0).tolist()
-        }
+        velocity = self.body.velocity
+        if self.velocity is not None:
+            velocity = self.velocity(0.0).tolist()
+        driven = {"velocity of the body": velocity}
         for contact in self.contacts:
             if contact.support_velocity is not None:
-                driven[f"contact {contact.name!r}"] = contact.support_velocity(
-                    0.0
-                ).tolist()
-        moves = [name for name, velocity in driven.items() if any(velocity)]
-        if self.start == "equilibrium" and any(
-            contact.pressure == "follows" for contact in self.contacts
-        ):
-            raise InvalidValueError(
-                "start",
-                "be 'rest' or 'sliding' if the pressure follows the load",
-                self.start,
-            )
-        if self.start == "equilibrium" and any(
-            contact.edge for contact in self.contacts
-        ):
-            raise InvalidValueError(
-                "start", "be 'rest' or 'sliding' if a contact has an edge", self.start
-            )
-        if self.start == "equilibrium" and self.velocity is not None:
-            raise InvalidValueError(
-                "start",
-                "be 'rest' or 'sliding' if the velocity is prescribed",
-                self.start,
-            )
-        if self.start == "equilibrium" and moves:
-            rule = "start at zero if start is 'equilibrium'"
-            what = "velocity" if moves[0] == "the body" else "support_velocity"
-            raise InvalidValueError(f"{what} of {moves[0]}", rule, driven[moves[0]])
+                name = f"support_velocity of contact {contact.name!r}"
+                driven[name] = contact.support_velocity(0.0).tolist()
+        moves = [name for name, each in driven.items() if any(each)]
         if self.start == "sliding" and not moves:
-            raise InvalidValueError(
-                "initial velocity",
-                "not be zero if start is 'sliding'",
-                driven["the body"],
-            )
+            rule = "not be zero if start is 'sliding'"
+            raise InvalidValueError("initial velocity", rule, velocity)
+        if self.start != "equilibrium":
+            return
+        for words, holds in (
+            (
+                "the pressure follows the load",
+                any(each.pressure == "follows" for each in self.contacts),
+            ),
+            ("a contact has an edge", any(each.edge for each in self.contacts)),
+            ("the velocity is prescribed", self.velocity is not None),
+        ):
+            if holds:
+                rule = f"be 'rest' or 'sliding' if {words}"
+                raise InvalidValueError("start", rule, self.start)
+        if moves:
+            rule = "start at zero if start is 'equilibrium'"
+            raise InvalidValueError(moves[0], rule, driven[moves[0]])
 
     def __repr__(self) -> str:
         contacts = "; ".join(repr(contact) for contact in self.contacts[:2])
         more = f"; {len(self.contacts) - 2} more" if len(self.contacts) > 2 else ""
-        driven = (
-            ", force given"
-            if self.force is not None
-            else ", velocity given"
-            if self.velocity is not None
-            else ""
-        )
-        tied = {0: "", 1: ", on a spring"}.get(
-            len(self.springs), f", on {len(self.springs)} springs"
-        )
+        driven = "" if self.velocity is None else ", velocity given"
+        driven = driven if self.force is None else ", force given"
+        several = f", on {len(self.springs)} springs"
+        tied = {0: "", 1: ", on a spring"}.get(len(self.springs), several)
         body = f"{self.body.mass:g} kg, {self.body.inertia:.3g} kg m^2"
         return f"Scene({self.name!r}: {self.t_end:g} s, body of {body}{driven}{tied}; {contacts}{more})"
 
@@ -216,19 +190,12 @@ class Scene(ByValue):
         Raises InvalidValueError for an end that is not > 0.
         """
         t_end = self.t_end if t_end is None else validation.positive("t_end", t_end)
-        signals = [contact.normal_force for contact in self.contacts]
-        signals += [
-            contact.support_velocity
-            for contact in self.contacts
-            if contact.support_velocity is not None
-        ]
+        signals = [self.force, self.velocity]
         signals += [spring.anchor for spring in self.springs]
-        signals += [
-            signal for signal in (self.force, self.velocity) if signal is not None
-        ]
-        return breaks_between(
-            np.concatenate([signal.breaks for signal in signals]), t_end
-        )
+        for contact in self.contacts:
+            signals += [contact.normal_force, contact.support_velocity]
+        breaks = [signal.breaks for signal in signals if signal is not None]
+        return breaks_between(np.concatenate(breaks), t_end)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the scene as plain numbers, texts, lists and tables; `from_dict` restores it to the last bit."""

@@ -78,15 +78,11 @@ class Signal(ByValue):
             "values", values, (None,) * (2 if values.ndim == 2 else 1), largest=np.inf
         )
         if times.size == 0:
-            raise InvalidValueError(
-                "times", "have at least one sample", "an empty array"
-            )
+            rule = "have at least one sample"
+            raise InvalidValueError("times", rule, "an empty array")
         if len(values) != len(times):
-            raise InvalidValueError(
-                "values",
-                f"have one row per time ({len(times)})",
-                f"shape {list(values.shape)}",
-            )
+            rule = f"have one row per time ({len(times)})"
+            raise InvalidValueError("values", rule, f"shape {list(values.shape)}")
         steps = np.diff(times)
         if (steps <= 0.0).any():
             i = int(np.argmax(steps <= 0.0))
@@ -160,18 +156,16 @@ class Signal(ByValue):
         """
         validation.path("path", path)
         validation.text("time", time)
-        if not isinstance(value, str) and not _is_texts(value):
+        names = [value] if isinstance(value, str) else value
+        texts = isinstance(names, (list, tuple)) and len(names) > 0
+        if not texts or not all(isinstance(name, str) for name in names):
             raise InvalidValueError(
                 "value", "be the name of a column, or a list of names", value
             )
-        names = [value] if isinstance(value, str) else list(value)
         table = Table(path).numbers([time, *names])
+        values = table[:, 1] if isinstance(value, str) else table[:, 1:]
         try:
-            return cls(
-                table[:, 0],
-                table[:, 1] if isinstance(value, str) else table[:, 1:],
-                hold,
-            )
+            return cls(table[:, 0], values, hold)
         except InvalidValueError as error:
             raise InvalidValueError(
                 f"{path}: {error.name}", error.rule, error.value
@@ -246,10 +240,7 @@ class Signal(ByValue):
             np.searchsorted(self.times, 0.5 * (breaks[:-1] + breaks[1:]), side="right")
             - 1
         )
-        begun = i >= 0
-        i = np.maximum(i, 0)
-        slope = np.where(self._spread(begun), self._slopes[i], 0.0)
-        return self.values[i] + slope * self._spread(breaks[:-1] - self.times[i]), slope
+        return self._linear(i, breaks[:-1])
 
     def check_non_negative(self, name: str) -> None:
         """Check that the signal is never below zero. Raises InvalidValueError with `name`, time and value otherwise."""
@@ -315,10 +306,14 @@ class Signal(ByValue):
         if self.hold == "linear":
             side = "right"
         i = np.searchsorted(self.times, t, side=side) - 1
-        begun = i >= 0
+        return self._linear(i, t)[0]
+
+    def _linear(self, i: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return values at `t` on the intervals that begin at samples i, -1 before the first, and slopes."""
+        # Slope -1 is that after the last sample, 0 as before the first.
+        slope = self._slopes[i]
         i = np.maximum(i, 0)
-        slope = np.where(self._spread(begun), self._slopes[i], 0.0)
-        return self.values[i] + slope * self._spread(t - self.times[i])
+        return self.values[i] + slope * self._spread(t - self.times[i]), slope
 
 
 def as_signal(name: str, value: Any, columns: int | None) -> Signal:
@@ -362,23 +357,16 @@ def read_signal(parent: Section, key: str) -> Signal:
         if "sine" in here:
             needed = ("offset", "amplitude", "frequency", "t_end")
             sine = here.only(["sine"]).section("sine").only([*needed, "dt", "phase"])
-            required = {name: sine.get(name) for name in needed}
+            for name in needed:
+                sine.get(name)
             with sine.located():
-                return Signal.sine(**{**sine.data, **required})
+                return Signal.sine(**sine.data)
         if "csv" in here:
             here.only(["csv", "time", "value", "hold", "dt"])
-            time = here.get("time", "time")
-            value = here.get("value", "value")
-            if not isinstance(time, str) or not (
-                isinstance(value, str) or _is_texts(value)
-            ):
-                here.fail(
-                    "time must be the name of a column, value a name or a list of names"
-                )
             signal = Signal.from_csv(
                 here.path("csv"),
-                time=time,
-                value=value,
+                time=here.get("time", "time"),
+                value=here.get("value", "value"),
                 hold=here.get("hold", "previous"),
             )
         else:
@@ -388,14 +376,6 @@ def read_signal(parent: Section, key: str) -> Signal:
                 here.get("times"), here.get("values"), here.get("hold", "previous")
             )
         return signal.held(here.get("dt")) if "dt" in here else signal
-
-
-def _is_texts(value: Any) -> bool:
-    return (
-        isinstance(value, (list, tuple))
-        and bool(value)
-        and all(isinstance(item, str) for item in value)
-    )
 
 
 def displacement(velocity: Signal, times) -> np.ndarray:

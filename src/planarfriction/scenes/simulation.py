@@ -125,12 +125,9 @@ def _output(
     contacts = len(batches.models)
     states = int(batches.bristles[-1])
     if bristles == "all" and count * states > MOST_NUMBERS:
-        shown = f"{count} samples of {states} numbers"
-        raise InvalidValueError(
-            "bristles",
-            f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)",
-            shown,
-        )
+        given = f"{count} samples of {states} numbers"
+        rule = f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)"
+        raise InvalidValueError("bristles", rule, given)
     recorded = np.empty((count, states) if bristles == "all" else (0, 0))
     follows = sum(contact.pressure == "follows" for contact in scene.contacts)
     body, wrench, load = map(
@@ -173,24 +170,21 @@ def _histories(
         histories["ended"] = history("ended", output.ended)._replace(dims=("contact",))
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
-            first = batches.bristles
             cells = batches.cells[c]
-            part = output.bristles[:, first[c] : first[c + 1]]
-            name = f"bristles_{contact.name}"
+            values = output.bristles[:, slice(*batches.bristles[c : c + 2])]
+            dims = ("time", "component")
+            units = contact.model.state_units
             if cells is not None:
                 size = contact.model.state_shape[0]
-                full = np.zeros((len(part), size, len(cells)))
                 # Without the place of the pressure.
-                bent = part[:, : size * cells.sum()]
-                full[:, :, cells] = bent.reshape(len(part), size, -1)
+                bent = values[:, : size * cells.sum()]
+                values = np.zeros((len(bent), size, len(cells)))
+                values[:, :, cells] = bent.reshape(len(bent), size, -1)
                 axis = "axis" if size == 2 else "component"
-                histories[name] = History(
-                    ("time", axis, f"cell_{contact.name}"), full, {"units": "m"}
-                )
-            else:
-                histories[name] = History(
-                    ("time", "component"), part, {"units": contact.model.state_units}
-                )
+                dims = ("time", axis, f"cell_{contact.name}")
+                units = "m"
+            name = f"bristles_{contact.name}"
+            histories[name] = History(dims, values, {"units": units})
     histories["time"] = history("time", output.time)
     histories["contact"] = History(
         ("contact",), np.array([contact.name for contact in scene.contacts]), {}

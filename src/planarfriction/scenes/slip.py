@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
+from planarfriction.geometry import twist_at
 
 if TYPE_CHECKING:
     from planarfriction.models import DistributedModel
@@ -47,12 +48,8 @@ class SlipField(NamedTuple):
 
 def slip_events(solution: Solution) -> tuple[SlipEvent, ...]:
     """Return the slips of all contacts of a solution, contact by contact, each in the order of time."""
-    if solution.scene is None:
-        raise FileError("the file has no scene, which slip events need")
-    found = []
-    for contact in solution.scene.contacts:
-        found += _events(solution, contact)
-    return tuple(found)
+    contacts = solution.scene.contacts
+    return tuple(event for each in contacts for event in _events(solution, each))
 
 
 def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
@@ -60,23 +57,15 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
 
     recorded = solution.histories.get(f"bristles_{contact.name}")
     if recorded is None:
-        raise InvalidValueError(
-            "bristles",
-            "be recorded for slip events: simulate(scene, bristles='all')",
-            "none",
-        )
-    time = np.asarray(solution.histories["time"].values)
-    loads = np.asarray(solution.histories["normal_force"].values)[
-        :, solution.contact_index(contact.name)
-    ]
+        rule = "be recorded for slip events: simulate(scene, bristles='all')"
+        raise InvalidValueError("bristles", rule, "none")
+    time = solution.histories["time"].values
+    index = solution.contact_index(contact.name)
+    loads = solution.histories["normal_force"].values[:, index]
     twists = solution.contact_twist(contact.name)
-    states = np.asarray(recorded.values)
-    share = slip_fraction(contact.model, states, twists, loads)
-    points = centres(contact.model.patch, loads)
-    speed = np.hypot(
-        twists[:, 0] - twists[:, 2] * points[:, 1],
-        twists[:, 1] + twists[:, 2] * points[:, 0],
-    )
+    share = slip_fraction(contact.model, recorded.values, twists, loads)
+    sliding = twist_at(twists, centres(contact.model.patch, loads))
+    speed = np.hypot(sliding[:, 0], sliding[:, 1])
     distance, turn = (
         cumulative_trapezoid(each, time, initial=0.0) for each in (speed, twists[:, 2])
     )
@@ -161,9 +150,7 @@ def _stretches(time: np.ndarray, above: np.ndarray) -> list[tuple[float, float]]
     changes = np.flatnonzero(on[1:] != on[:-1])
     share = above[changes] / (above[changes] - above[changes + 1])
     at = (time[changes] + share * (time[changes + 1] - time[changes])).tolist()
-    at = (
-        ([float(time[0])] if on[0] else []) + at + ([float(time[-1])] if on[-1] else [])
-    )
+    at = time[:1][on[:1]].tolist() + at + time[-1:][on[-1:]].tolist()
     return list(zip(at[::2], at[1::2], strict=True))
 
 
@@ -219,7 +206,7 @@ def slip_field(
             slips[frame] = (slip > SLIPS * distance) & (distance > AT_REST * largest)
             distance[:] = 0.0
             slip[:] = 0.0
-            frame = frame + 1
+            frame += 1
     if len(frames) > 1:  # at first no distance is known: as right after it
         span = times[frames[1]] - times[frames[0]]
         slips[0] = slips[1] & (

@@ -24,8 +24,8 @@ from planarfriction._support.reading import read_bytes
 from planarfriction._support.writing import replacing
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.geometry import rotate, twist_at
+from planarfriction.scenes.contact import contact_poses
 from planarfriction.scenes.scene import Scene
-from planarfriction.scenes.signal import displacement
 from planarfriction.solvers.statistics import Statistics
 
 if TYPE_CHECKING:
@@ -85,18 +85,20 @@ class Solution:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Solution):
             return NotImplemented
-        mine, others = (
-            (each.statistics, each.status, each.message, each.scene)
-            for each in (self, other)
+        return self is other or (
+            self.statistics == other.statistics
+            and self.status == other.status
+            and self.message == other.message
+            and self.scene == other.scene
+            and self.data.identical(other.data)
         )
-        return self is other or (mine == others and self.data.identical(other.data))
 
     def __hash__(self) -> int:
         return hash((self.statistics, self.status, self.message))
 
     def __repr__(self) -> str:
         name = "no scene" if self.scene is None else repr(self.scene.name)
-        time = np.asarray(self.histories["time"].values)
+        time = self.histories["time"].values
         end = (
             f"{each}={float(self.histories[each].values[-1]):.4g}"
             for each in ("x", "y", "theta")
@@ -116,9 +118,8 @@ class Solution:
         """Return in words when contacts with an edge have ended."""
         if "ended" not in self.histories:
             return []
-        times, names = (
-            np.asarray(self.histories[each].values) for each in ("ended", "contact")
-        )
+        names = self.histories["contact"].values
+        times = self.histories["ended"].values
         return [
             f"{str(name)!r} ended at t={t:.4g} s"
             for name, t in zip(names, times, strict=True)
@@ -150,29 +151,20 @@ class Solution:
         Raises InvalidValueError for a contact that does not exist, FileError for a solution without its scene.
         """
         chosen = scene_of(self, "a twist").contacts[self.contact_index(contact)]
-        x, y, theta, *twists, time = (
-            np.asarray(self.histories[name].values)
-            for name in ("x", "y", "theta", "vx", "vy", "omega", "time")
-        )
-        centre = np.stack([x, y], -1)
-        twist = np.stack(twists, -1)
-        at = np.array(chosen.position)
-        angle = chosen.angle
+        poses = columns_of(self, "x", "y", "theta")
+        twist = columns_of(self, "vx", "vy", "omega")
+        if self.scene.velocity is not None:  # in axes of the body
+            return rotate(twist_at(twist, chosen.position), -chosen.angle)
+        time = self.histories["time"].values
+        at = contact_poses(chosen, time, poses)
+        twist = twist_at(twist, at[:, :2] - poses[:, :2])
         if chosen.support_velocity is not None:
             moves = chosen.support_velocity.left(time)
-            to = np.zeros(2)
-            if chosen.mounted_on == "world":
-                shift = displacement(chosen.support_velocity, time)
-                at = at + shift[:, :2]
-                angle = angle + shift[:, 2]
-                to = at
-            twist = twist - twist_at(moves, centre - to)
-        if self.scene.velocity is None and chosen.mounted_on == "world":
-            at = at - centre
-        elif self.scene.velocity is None:
-            at = rotate(at, theta)
-            angle = angle + theta
-        return rotate(twist_at(twist, at), -angle)
+            # Of a pad at its frame, of the ground at the world's origin.
+            if chosen.mounted_on == "body":
+                moves = twist_at(moves, at[:, :2])
+            twist = twist - moves
+        return rotate(twist, -at[:, 2])
 
     def contact_index(self, contact: str | None = None) -> int:
         """Return the index of a contact, given by its name, along the axis `contact`; None takes the only one.
@@ -183,11 +175,8 @@ class Solution:
         if contact is None and len(names) == 1:
             return 0
         if contact is None:
-            raise InvalidValueError(
-                "contact",
-                f"be given if there are several ({', '.join(names)})",
-                contact,
-            )
+            rule = f"be given if there are several ({', '.join(names)})"
+            raise InvalidValueError("contact", rule, contact)
         return names.index(validation.choice("contact", contact, names))
 
     def slip_events(self) -> tuple[SlipEvent, ...]:
@@ -201,6 +190,7 @@ class Solution:
         """
         from planarfriction.scenes.slip import slip_events
 
+        scene_of(self, "a slip event")
         return slip_events(self)
 
     def plot(self) -> Any:
@@ -250,7 +240,7 @@ class Solution:
         Raises FileError if the file cannot be written.
         """
         attributes = {
-            **({} if self.scene is None else _scene_attributes(self.scene)),
+            **_scene_attributes(self.scene),
             "statistics": json.dumps(self.statistics.as_dict()),
             "status": self.status,
             "message": self.message,
@@ -270,11 +260,16 @@ class Solution:
         return _read(path)
 
 
+def columns_of(solution: Solution, *names: str) -> np.ndarray:
+    """Return histories of a solution by their names, `[T, ..., n]`."""
+    return np.stack([solution.histories[name].values for name in names], -1)
+
+
 def scene_of(solution: Solution, what: str) -> Scene:
     """Return the scene of a solution, which `what` needs; raises FileError where it was loaded without one."""
     if solution.scene is None:
         raise FileError(
-            f"the file has no scene, which {what} needs: {solution.data.attrs[_LEFT_OUT]}"
+            f"the file has no scene, which {what} needs: {solution.data.attrs.get(_LEFT_OUT, 'it was left out')}"
         )
     return solution.scene
 
@@ -294,15 +289,10 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
         try:
             with _quiet():
                 data = _renamed(data, functools.partial(quote, safe=_SAFE))
-                content = bytes(
-                    data.assign_attrs({_CHECKSUM: "sha256:" + _DIGITS * "0"}).to_netcdf(
-                        engine="scipy"
-                    )
-                )
-        except (
-            TypeError,
-            RecursionError,
-        ) as error:  # of what someone added to the data
+                data = data.assign_attrs({_CHECKSUM: "sha256:" + _DIGITS * "0"})
+                content = bytes(data.to_netcdf(engine="scipy"))
+        # Of what someone added to the data.
+        except (TypeError, RecursionError) as error:
             raise FileError(f"{path}: cannot be written: {_one_line(error)}") from None
         before, _, after, checksum = _parted(content)
         for part in (before, checksum, after):
@@ -372,9 +362,9 @@ def _read(path: str | Path) -> Solution:
     for name in ("statistics", "status", "message", _CHECKSUM):
         del data.attrs[name]
     try:
-        scene: Any = (
-            Scene.from_dict(json.loads(meta["scene"])) if meta["scene"] else None
-        )
+        scene: Any = None
+        if meta["scene"]:
+            scene = Scene.from_dict(json.loads(meta["scene"]))
         statistics = Statistics(**json.loads(meta["statistics"]))
     except (ValueError, TypeError, FrictionError) as error:
         raise FileError(

@@ -8,6 +8,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
+from planarfriction.geometry import rotate, twist_at
 from planarfriction.scenes.body import pull_on
 
 _LONG = 1e6
@@ -92,24 +93,15 @@ def _states(
 def contact_map(scene: Any, contact: Any) -> np.ndarray:
     """Return `A` `[3, 3]` of `V = A u` at t = 0: the twist of a contact from the velocity of the body."""
     body = scene.body
-    (dx, dy) = contact.position
+    at = np.array(contact.position)
     angle = contact.angle
     if scene.velocity is None and contact.mounted_on == "world":
-        dx = dx - body.position[0]
-        dy = dy - body.position[1]
+        at = at - body.position
     elif scene.velocity is None:
-        cos = np.cos(body.angle)
-        sin = np.sin(body.angle)
-        dx, dy, angle = cos * dx - sin * dy, sin * dx + cos * dy, angle + body.angle
-    cos = np.cos(angle)
-    sin = np.sin(angle)
-    return np.array(
-        [
-            [cos, sin, sin * dx - cos * dy],
-            [-sin, cos, sin * dy + cos * dx],
-            [0.0, 0.0, 1.0],
-        ]
-    )
+        at = rotate(at, body.angle)
+        angle = angle + body.angle
+    # Columns are the twists of the contact for unit velocities.
+    return rotate(twist_at(np.eye(3), at), -angle).T
 
 
 def _sliding(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
@@ -117,14 +109,12 @@ def _sliding(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
     states = []
     for contact, load in zip(scene.contacts, shaped, strict=True):
         model = contact.model
-        twist = contact_map(scene, contact) @ (
-            np.asarray(velocity) - _carried(scene.body, contact)
-        )
-        states.append(
-            model.step(model.rest(), twist, load, _LONG)[0]
-            if load > 0.0
-            else model.rest()
-        )
+        state = model.rest()
+        if load > 0.0:
+            relative = np.asarray(velocity) - _carried(scene.body, contact)
+            twist = contact_map(scene, contact) @ relative
+            state = model.step(state, twist, load, _LONG)[0]
+        states.append(state)
     return states
 
 
@@ -132,11 +122,9 @@ def _carried(body: Any, contact: Any) -> np.ndarray:
     """Return the velocity `[3]` that the centre of mass would have at t = 0 on what the contact touches."""
     if contact.support_velocity is None:
         return np.zeros(3)
-    x, y = np.subtract(
-        body.position, contact.position if contact.mounted_on == "world" else (0.0, 0.0)
-    )
-    vx, vy, omega = contact.support_velocity(0.0)
-    return np.array([vx - omega * y, vy + omega * x, omega])
+    origin = contact.position if contact.mounted_on == "world" else (0.0, 0.0)
+    beside = np.subtract(body.position, origin)
+    return twist_at(contact.support_velocity(0.0), beside)
 
 
 # ---------------------------------------------------------------------- bristles that carry the load
@@ -201,12 +189,10 @@ def _held_by(
                 "start", "be 'rest' or 'sliding' with a law that creeps", scene.start
             )
     pull = pull_on(scene, scene.body, 0.0)
-    each = [
-        _cells_of(scene, *each)
-        for each in zip(scene.contacts, loads, shaped, strict=True)
-    ]
-    whole = _BristleField(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
-    return whole, [len(one.stiffness) for one in each], pull
+    every = zip(scene.contacts, loads, shaped, strict=True)
+    fields = [_cells_of(scene, *each) for each in every]
+    whole = _BristleField(*map(np.concatenate, zip(*fields, strict=True)))
+    return whole, [len(each.stiffness) for each in fields], pull
 
 
 def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleField:
@@ -215,14 +201,11 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
     law = model.law.numbers
     levers = patch.levers() @ contact_map(scene, contact)
     # Points do not spin.
-    levers = np.concatenate(
-        [levers, np.zeros((len(levers), 3 - levers.shape[1], 3))], axis=1
-    )
+    levers = np.pad(levers, ((0, 0), (0, 3 - levers.shape[1]), (0, 0)))
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
     sigma_0 = law.sigma_0 * float(model.law.stiffness_factor(load))
     largest = float(formulas.stribeck(np, np.zeros(()), law)) / sigma_0
-    middle = np.zeros((len(levers), 3))
-    middle[:, :2] = largest * patch.asymmetries()
+    middle = np.pad(largest * patch.asymmetries(), ((0, 0), (0, 1)))
     fixed = np.full(len(levers), model.law.reference_load is not None)
     return _BristleField(
         levers,
@@ -249,11 +232,9 @@ def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:
     size = max(np.abs(scale * pull).max(), np.finfo(float).tiny)
     if np.abs(scale * (cells.load(bent) - pull)).max() > _BALANCED * size:
         at_most = _held(cells, pull, motion)
-        friction = (
-            ""
-            if at_most is None
-            else f" (they hold {100.0 * at_most:.3g} % of the load at most)"
-        )
+        friction = ""
+        if at_most is not None:
+            friction = f" (they hold {100.0 * at_most:.3g} % of the load at most)"
         rule = f"be 'rest' or 'sliding' if the contacts do not hold the body{friction}"
         raise InvalidValueError("start", rule, "equilibrium")
     return motion
@@ -295,18 +276,12 @@ def _bent_to_the_end(
         options=options,
     )
     close = np.abs(found.jac).max() < _NEAR * np.abs(scale * pull).max() / unit
+    x = found.x
     if close:  # the energy hides in its own rounding how close this is
-        closer = root(slope, found.x, jac=curvature)
-        return (
-            unit
-            * scale
-            * (
-                closer.x
-                if np.abs(closer.fun).max() < np.abs(found.jac).max()
-                else found.x
-            )
-        )
-    return unit * scale * found.x
+        closer = root(slope, x, jac=curvature)
+        if np.abs(closer.fun).max() < np.abs(found.jac).max():
+            x = closer.x
+    return unit * scale * x
 
 
 def _held(cells: _BristleField, pull: np.ndarray, motion: np.ndarray) -> float | None:

@@ -125,21 +125,14 @@ class Bookkeeper:
         import xarray as xr
 
         variables = self._results()
-        run, status, failure = (
-            np.full(self.grid.shape, text, dtype=object) for text in ("", MISSING, "")
-        )
+        labels = self.grid.labels
+        texts = np.full((*self.grid.shape, 3), ["", MISSING, ""], dtype=object)
         for index, (key, record) in self.runs.items():
-            run[index] = key
-            status[index] = record.status
-            failure[index] = record.reason
-        for name, texts in (("run", run), ("status", status), ("failure", failure)):
-            variables[name] = History(
-                tuple(self.grid.labels), texts.astype(str), {"long_name": OWN[name]}
-            )
-        variables |= {
-            name: ((name,), np.array(labels))
-            for name, labels in self.grid.labels.items()
-        }
+            texts[index] = key, record.status, record.reason
+        for i, name in enumerate(("run", "status", "failure")):
+            words = {"long_name": OWN[name]}
+            variables[name] = History(tuple(labels), texts[..., i].astype(str), words)
+        variables |= {name: ((name,), np.array(each)) for name, each in labels.items()}
         coordinates = [name for name, each in variables.items() if each[0] == (name,)]
         return xr.Dataset(variables).set_coords(coordinates)
 
@@ -151,11 +144,7 @@ class Bookkeeper:
         if not done:
             return {}
         time = instants(self._ends) if self.timed else None
-        first = (
-            done[min(done)].variables
-            if time is None
-            else on_instants(done[min(done)], time)
-        )
+        first = _over(done[min(done)], time)
         check_names(self.grid, first)
         axes = [name for name, each in first.items() if each.dims == (name,)]
         arrays = {
@@ -164,19 +153,12 @@ class Bookkeeper:
             if name not in axes
         }
         for index in sorted(done):
-            found = (
-                done[index].variables
-                if time is None
-                else on_instants(done[index], time)
-            )
-            self._place(index, found, first, arrays)
-        variables: dict[str, Any] = {
-            name: History(
-                (*self.grid.labels, *first[name].dims), values, first[name].attrs
-            )
-            for name, values in arrays.items()
-        }
-        return variables | {name: first[name] for name in axes}
+            self._place(index, _over(done[index], time), first, arrays)
+        variables: dict[str, Any] = {name: first[name] for name in axes}
+        for name, values in arrays.items():
+            dims = (*self.grid.labels, *first[name].dims)
+            variables[name] = History(dims, values, first[name].attrs)
+        return variables
 
     def _empty(self, example: History, done: int) -> np.ndarray:
         """Return an array for all runs, of which some are `done`, whose entries say that they are missing."""
@@ -189,12 +171,13 @@ class Bookkeeper:
             )
         if values.dtype.kind == "U":
             return np.full(shape, "", dtype=object)
-        kind = (
-            values.dtype
-            if done == self.grid.size or values.dtype.kind in "fc"
-            else np.dtype(float)
+        if values.dtype.kind in "fc":
+            return np.full(shape, np.nan, values.dtype)
+        return (
+            np.full(shape, np.nan)
+            if done < self.grid.size
+            else np.zeros(shape, values.dtype)
         )
-        return np.full(shape, np.nan if kind.kind in "fc" else 0, kind)
 
     def _place(
         self,
@@ -216,10 +199,7 @@ class Bookkeeper:
                 arrays[name] = array = array.astype(np.result_type(array, values))
             array[index] = values
         # They are in the arrays now.
-        self.runs[index] = (
-            key,
-            record._replace(variables={}),
-        )
+        self.runs[index] = key, record._replace(variables={})
 
 
 def _name(content: bytes) -> str:
@@ -238,6 +218,11 @@ def instants(ends: Iterable[tuple[float, float]]) -> np.ndarray:
         np.concatenate([recording_times(*each) for each in sorted(set(ends))])
     )
     return times[np.diff(times, prepend=-np.inf) > SAME_TIME]
+
+
+def _over(record: Record, time: np.ndarray | None) -> dict[str, History]:
+    """Return the variables of a run, over common instants if they are histories."""
+    return record.variables if time is None else on_instants(record, time)
 
 
 def on_instants(record: Record, time: np.ndarray) -> dict[str, History]:
@@ -267,23 +252,15 @@ def on_instants(record: Record, time: np.ndarray) -> dict[str, History]:
 
 def check_names(grid: Grid, variables: Mapping[str, History]) -> None:
     """Check that no swept quantity has the name of something else."""
-    taken = {
-        *OWN,
-        *variables,
-        *(dim for each in variables.values() for dim in each.dims),
-    }
+    taken = {*variables, *(dim for each in variables.values() for dim in each.dims)}
     for name in grid.labels:
         if name in taken:
-            raise InvalidValueError(
-                "name of a swept quantity",
-                "not be that of a variable or of its axis",
-                name,
-            )
+            rule = "not be that of a variable or of its axis"
+            raise InvalidValueError("name of a swept quantity", rule, name)
     for name in OWN:
         if name in variables:
-            raise InvalidValueError(
-                "measure", f"not return anything called {', '.join(OWN)}", name
-            )
+            rule = f"not return anything called {', '.join(OWN)}"
+            raise InvalidValueError("measure", rule, name)
 
 
 def difference(found: Mapping[str, History], first: Mapping[str, History]) -> str:

@@ -76,18 +76,13 @@ class Keys:
         """Return the scene with the models of earlier scenes where they are equal."""
         contacts = []
         for contact in scene.contacts:
-            model = _kept(
-                self._models,
-                self._of_part(contact.model),
-                lambda first=contact.model: first,
-            )
-            contacts.append(
-                contact
-                if model is contact.model
-                else dataclasses.replace(contact, model=model)
-            )
+            digest = self._of_part(contact.model)
+            model = _kept(self._models, digest, lambda first=contact.model: first)
+            if model is not contact.model:
+                contact = dataclasses.replace(contact, model=model)
+            contacts.append(contact)
         same = all(map(operator.is_, contacts, scene.contacts))
-        return scene if same else dataclasses.replace(scene, contacts=tuple(contacts))
+        return scene if same else dataclasses.replace(scene, contacts=contacts)
 
     def key(self, scene: Scene) -> str:
         """Return the key of the run of a scene, the same in every process."""
@@ -109,11 +104,9 @@ class Keys:
     def _digest_of_part(self, part: Any) -> str:
         """Digest a model, patch or signal; what has no plain form counts as itself, unless its runs are to be kept."""
         try:
-            return _digest(
-                model_to_dict(part, self._table)
-                if hasattr(part, "patch")
-                else part.to_dict()
-            )
+            if hasattr(part, "patch"):
+                return _digest(model_to_dict(part, self._table))
+            return _digest(part.to_dict())
         except InvalidValueError:
             if self._kept:
                 raise

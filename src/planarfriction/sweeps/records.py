@@ -104,12 +104,8 @@ def variables(
 ) -> dict[str, History]:
     """Convert the result of a measurement to named arrays: a number, a mapping of names, or an xarray object."""
     if hasattr(found, "data_vars"):  # a Dataset
-        axes = {
-            str(name): found[name]
-            for name in found.coords
-            if found[name].dims == (name,)
-        }
-        found = {**{str(name): found[name] for name in found.data_vars}, **axes}
+        axes = [name for name in found.coords if found[name].dims == (name,)]
+        found = {str(name): found[name] for name in (*found.data_vars, *axes)}
     elif not isinstance(found, Mapping):
         name = getattr(measure, "__name__", "")
         name = name if name.isidentifier() else "measured"  # as "<lambda>" is not
@@ -134,10 +130,8 @@ def _variable(name: str, value: Any) -> History:
     else:
         values = np.asarray(value)
         attrs = {}
-        dims = tuple(
-            f"{name}_{axis}" if values.ndim > 1 else f"{name}_index"
-            for axis in range(values.ndim)
-        )
+        dims = tuple(f"{name}_{axis}" for axis in range(values.ndim))
+        dims = (f"{name}_index",) if values.ndim == 1 else dims
     if values.dtype.kind not in "biufcU":
         rule = f"return numbers, texts, or arrays of them, which {name!r} is not"
         raise InvalidValueError("measure", rule, type(value).__name__)
@@ -151,23 +145,18 @@ def pack(runs: Mapping[str, Record]) -> bytes:
     """
     groups: dict[Any, list[tuple[str, Record]]] = {}
     for key, record in sorted(runs.items()):  # runs end in any order
-        groups.setdefault(tuple(map(_layout, record.variables.items())), []).append(
-            (key, record)
-        )
+        layout = tuple(map(_layout, record.variables.items()))
+        groups.setdefault(layout, []).append((key, record))
     meta = []
     arrays = {}
     for number, group in enumerate(groups.values()):
         first = group[0][1].variables
-        outcomes = [
-            [key, record.status, record.reason, record.end] for key, record in group
-        ]
-        meta.append(
-            [[[name, each.dims, each.attrs] for name, each in first.items()], outcomes]
-        )
+        outcomes = [[key, each.status, each.reason, each.end] for key, each in group]
+        kinds = [[name, each.dims, each.attrs] for name, each in first.items()]
+        meta.append([kinds, outcomes])
         for place, name in enumerate(first):
-            arrays[f"{number}.{place}"] = np.stack(
-                [record.variables[name].values for _, record in group]
-            )
+            values = [record.variables[name].values for _, record in group]
+            arrays[f"{number}.{place}"] = np.stack(values)
     buffer = io.BytesIO()
     np.savez(buffer, meta=np.frombuffer(json.dumps(meta).encode(), np.uint8), **arrays)
     return buffer.getvalue()
@@ -183,9 +172,8 @@ def unpack(content: bytes) -> dict[str, Record]:
     """Convert the bytes of a file to the records of its runs, by their keys."""
     runs = {}
     with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        for number, (variables, outcomes) in enumerate(
-            json.loads(file["meta"].tobytes())
-        ):
+        meta = json.loads(file["meta"].tobytes())
+        for number, (variables, outcomes) in enumerate(meta):
             stacks = [
                 (each, file[f"{number}.{place}"])
                 for place, each in enumerate(variables)

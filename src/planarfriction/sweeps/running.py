@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import itertools
 import pickle
-import queue
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import (
+    FIRST_COMPLETED,
     BrokenExecutor,
     CancelledError,
     Executor,
@@ -81,12 +81,10 @@ class Progress(NamedTuple):
             "damaged and done again": self.damaged,
         }
         words = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-        left = (
-            ""
-            if self.left is None or self.done == self.runs
-            else f", {_duration(self.left)} left"
-        )
-        return f"{self.done} of {self.runs} runs{f' ({words})' if words else ''}{left}"
+        text = f"{self.done} of {self.runs} runs{f' ({words})' if words else ''}"
+        if self.left is None or self.done == self.runs:
+            return text
+        return f"{text}, {_duration(self.left)} left"
 
 
 def _duration(seconds: float) -> str:
@@ -150,10 +148,9 @@ def sweep(
     SweepInterrupted
         Ctrl-C; carries the dataset so far. Finished runs stay in `out`.
     """
-    if executor is not None and not isinstance(executor, Executor):
-        raise InvalidValueError(
-            "executor", "be a concurrent.futures.Executor, or None", executor
-        )
+    if executor is not None:
+        words = "a concurrent.futures.Executor, or None"
+        validation.instance("executor", executor, Executor, words)
     sweeping = Sweeping(make_scene, values, out, measure, progress)
     if isinstance(executor, ProcessPoolExecutor):
         try:
@@ -269,7 +266,6 @@ class Sweeping:
     ) -> None:
         pending: dict[Future, list[_Job]] = {}
         most = workers or _WORKERS
-        done: queue.SimpleQueue[Future] = queue.SimpleQueue()
         jobs = self.jobs()
         again = []
         try:
@@ -290,11 +286,12 @@ class Sweeping:
                     except RuntimeError as error:  # broken, or shut down
                         raise SweepError(_ENDED.format(reason_of(error))) from None
                     pending[future] = batch
-                    future.add_done_callback(done.put)
                 elif not pending:
                     break
-                if not batch or not done.empty():
-                    again += self._collect(done, pending)
+                # Without a batch to hand out, whoever waits hears from time to time that none is done.
+                done, _ = wait(pending, 0.0 if batch else _BETWEEN, FIRST_COMPLETED)
+                again += self._take(done, pending)
+                self._tell()
         except BaseException:
             self._stopped.set()
             for future in pending:
@@ -302,14 +299,8 @@ class Sweeping:
             # Threads of its own, which hand over what they have.
             if stopped is not None:
                 wait(pending)
-            self._take(
-                [
-                    future
-                    for future in pending
-                    if future.done() and not future.cancelled()
-                ],
-                pending,
-            )
+            done = [each for each in pending if each.done() and not each.cancelled()]
+            self._take(done, pending)
             raise
         finally:
             self._tell(at_once=True)
@@ -318,12 +309,8 @@ class Sweeping:
         """Return how many runs to hand out together: fewer towards the end, where workers are to end together."""
         if workers is None:
             return self._size
-        left = (
-            self.grid.size
-            - self.book.found
-            - self.book.new
-            - sum(map(len, pending.values()))
-        )
+        progress = self.progress()
+        left = progress.runs - progress.done - sum(map(len, pending.values()))
         return min(self._size, 1 + left // (_AHEAD * workers))
 
     def jobs(self) -> Iterator[_Job]:
@@ -332,12 +319,8 @@ class Sweeping:
             try:
                 scene = self._make_scene(**values)
             except Exception as error:
-                self.book.add(
-                    index,
-                    "",
-                    Record(FAILED, f"make_scene: {reason_of(error)}", {}),
-                    None,
-                )
+                record = Record(FAILED, f"make_scene: {reason_of(error)}", {})
+                self.book.add(index, "", record, None)
                 continue
             if not isinstance(scene, Scene):
                 raise InvalidValueError(
@@ -350,22 +333,8 @@ class Sweeping:
             else:
                 yield index, key, scene
 
-    def _collect(
-        self, done: queue.SimpleQueue[Future], pending: dict[Future, list[_Job]]
-    ) -> list[list[_Job]]:
-        """Take the runs that are done, or report after a while that none is; returns batches to be handed out again."""
-        try:
-            found = [done.get(timeout=_BETWEEN)]
-            while not done.empty():
-                found.append(done.get())
-        except queue.Empty:
-            found = []
-        again = self._take(found, pending)
-        self._tell()
-        return again
-
     def _take(
-        self, done: list[Future], pending: dict[Future, list[_Job]]
+        self, done: Iterable[Future], pending: dict[Future, list[_Job]]
     ) -> list[list[_Job]]:
         """Note the runs of batches that have ended; returns those that were not reached, in batches."""
         again = []
@@ -381,15 +350,13 @@ class Sweeping:
                 continue
             # any other error means that the executor lost the runs, or could not send one of them
             if error is not None:
-                records = (
-                    [Record(FAILED, reason_of(error), {})] if len(jobs) == 1 else []
-                )
+                failed = Record(FAILED, reason_of(error), {})
+                records = [failed] if len(jobs) == 1 else []
                 size = 1
             else:
                 records, spent = future.result()
-                self._size = size = max(
-                    1, min(int(len(records) * TURN / (spent + 1e-9)), _BATCH)
-                )
+                fitting = int(len(records) * TURN / (spent + 1e-9))
+                self._size = size = max(1, min(fitting, _BATCH))
             for (index, key, scene), record in zip(jobs, records, strict=False):
                 self.book.add(index, key, record, scene)
             left = jobs[len(records) :]

@@ -46,13 +46,8 @@ class Grid:
     def points(self) -> Iterator[tuple[tuple[int, ...], dict[str, Any]]]:
         """Yield the places in the grid, the last quantity fastest, each with its values by name."""
         for index in itertools.product(*map(range, self.shape)):
-            yield (
-                index,
-                {
-                    name: each[i]
-                    for (name, each), i in zip(self.values.items(), index, strict=True)
-                },
-            )
+            places = zip(self.values.items(), index, strict=True)
+            yield index, {name: each[i] for (name, each), i in places}
 
     def words(self, index: tuple[int, ...]) -> str:
         """Describe a point in words: "mass=0.2, pad=disc"."""
@@ -75,14 +70,9 @@ def grid_of(values: Any) -> Grid:
     behind = {}
     for name, given in values.items():
         validation.text("name of a swept quantity in values", name)
-        behind[name] = (
-            list(given.values())
-            if isinstance(given, Mapping)
-            else _scalars(name, given)
-        )
-        labels[name] = (
-            _scalars(name, list(given)) if isinstance(given, Mapping) else behind[name]
-        )
+        labelled = isinstance(given, Mapping)
+        labels[name] = _scalars(name, list(given) if labelled else given)
+        behind[name] = list(given.values()) if labelled else labels[name]
     result = Grid(labels, behind)
     if result.size > MOST_RUNS:
         raise InvalidValueError("values", f"make at most {MOST_RUNS} runs", result.size)
@@ -127,10 +117,6 @@ def _of_one_kind(values: Sequence[Any]) -> bool:
 
 def check_takes(make_scene: Any, names: Sequence[str]) -> Callable[..., Any]:
     """Return `make_scene` if it can be called with these names, or raise InvalidValueError."""
-    if not callable(make_scene):
-        raise InvalidValueError(
-            "make_scene", "be a function that returns a Scene", make_scene
-        )
     try:
         inspect.signature(make_scene).bind(**dict.fromkeys(names))
     except TypeError as error:
@@ -154,6 +140,14 @@ _FAMILIES: dict[str, tuple[Family, str]] = {
     "surface": (SURFACES, "kind"),
 }
 """Tables of a member of a family, and the key that names the member."""
+
+
+def try_ends(make: Callable[..., Any], values: Mapping[str, list[Any]]) -> None:
+    """Make the scene of the first values, or else that of the last; raise its error if neither can be made."""
+    try:
+        make(**{path: each[0] for path, each in values.items()})
+    except FrictionError:
+        make(**{path: each[-1] for path, each in values.items()})
 
 
 class Settable:
@@ -189,10 +183,7 @@ class Settable:
         """Check that the first or the last of the values make a scene; if neither does, a path is wrong."""
         for path, each in values.items():
             self._changed(self._table, path, each[0])
-        try:
-            self(**{path: each[0] for path, each in values.items()})
-        except FrictionError:
-            self(**{path: each[-1] for path, each in values.items()})
+        try_ends(self, values)
 
     def _changed(
         self, table: Mapping[str, Any], path: str, value: Any
@@ -200,38 +191,25 @@ class Settable:
         tables = table.get("contact", [])
         tables = tables if isinstance(tables, list) else [tables]
         # As a solution names them.
-        default = "contact" if len(tables) == 1 else "contact {}"
-        given = [
-            each.get("name") if isinstance(each, Mapping) else None for each in tables
-        ]
-        names = [
-            str(name or default.format(number)) for number, name in enumerate(given, 1)
-        ]
+        names = []
+        for number, each in enumerate(tables, 1):
+            name = each.get("name") if isinstance(each, Mapping) else None
+            default = "contact" if len(tables) == 1 else f"contact {number}"
+            names.append(str(name or default))
         for number, name in enumerate(names):
             if path.startswith(f"{name}."):
                 parts = path[len(name) + 1 :].split(".")
                 changed = _set(tables[number], parts, value, path, name, CONTACT_KEYS)
-                return {
-                    **table,
-                    "contact": [*tables[:number], changed, *tables[number + 1 :]],
-                }
+                tables = [*tables[:number], changed, *tables[number + 1 :]]
+                return {**table, "contact": tables}
         if path in ("body", *names):
-            there = ", ".join(
-                f"{path}.{key}"
-                for key in (BODY_KEYS if path == "body" else CONTACT_KEYS)
-            )
-            raise InvalidValueError(
-                path, f"be one value, not a table of them: {there}", "the table"
-            )
+            keys = BODY_KEYS if path == "body" else CONTACT_KEYS
+            there = ", ".join(f"{path}.{key}" for key in keys)
+            rule = f"be one value, not a table of them: {there}"
+            raise InvalidValueError(path, rule, "the table")
         keys = [key for key in SCENE_KEYS if key != "contact"]
-        return _set(
-            table,
-            path.split("."),
-            value,
-            path,
-            "the scene",
-            [*keys, *names, *self._others],
-        )
+        keys += [*names, *self._others]
+        return _set(table, path.split("."), value, path, "the scene", keys)
 
 
 def _set(
@@ -288,20 +266,12 @@ def _keys(key: str, table: Any) -> list[str] | None:
     if family is None or not isinstance(table, Mapping):
         return None
     make = family.get(table.get(kind, "lugre"))
-    more = (
-        []
-        if make is None
-        else [
-            name
-            for name in inspect.signature(make).parameters
-            if name not in ("patch", "law")
-        ]
-    )
-    return list(
-        dict.fromkeys(
-            [kind, *more, *table, *(("metric", "asymmetry") if key == "patch" else ())]
-        )
-    )
+    keys = [kind, *table]
+    if make is not None:
+        own = inspect.signature(make).parameters
+        keys[1:1] = [name for name in own if name not in ("patch", "law")]
+    keys += ["metric", "asymmetry"] if key == "patch" else []
+    return list(dict.fromkeys(keys))
 
 
 # ---------------------------------------------------------------------- as a command line spells them
@@ -333,12 +303,9 @@ def parse(text: str) -> tuple[str, dict[Any, Any]]:
         for each, value in zip(pieces, values, strict=True)
     ]
     for label in labels:
-        if labels.count(label) > 1:
-            raise InvalidValueError(
-                f"--set {path}",
-                "have each value once",
-                f"{label} {labels.count(label)} times",
-            )
+        if (times := labels.count(label)) > 1:
+            given = f"{label} {times} times"
+            raise InvalidValueError(f"--set {path}", "have each value once", given)
     return path, dict(zip(labels, values, strict=True))
 
 
