@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction._engine.compiler.calls import address_of
-from planarfriction._engine.compiler.memory import Layout, Packed, places_of
+from planarfriction._engine.compiler.memory import Layout, StructBuffer, places_of
 from planarfriction._engine.compiler.threads import share
 from planarfriction._engine.coupled import coupling as kernels
 from planarfriction._engine.coupled.coupling_rows import Followers, Patches, layout
@@ -380,7 +380,7 @@ class CoupledPatches(ByValue):
 class _PackedPatches(NamedTuple):
     """Patches as compiled code sees them."""
 
-    patches: Packed
+    patches: StructBuffer
     """`Patches` of compiled code."""
     layout: Layout
     """Layout of the row of a problem."""
@@ -432,7 +432,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         row=rows.offsets,
     )
     following = [p for p, each in enumerate(fixed) if each is None]
-    return _PackedPatches(Packed(patches), rows, records, sizes, following, fixed)
+    return _PackedPatches(StructBuffer(patches), rows, records, sizes, following, fixed)
 
 
 def follows(model: FrictionModel) -> bool:

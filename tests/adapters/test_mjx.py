@@ -364,7 +364,9 @@ def in_operations(patches):
                 [model.step(z, v, load, dt)[1] / load for model, z, v, load in each]
             )
 
-        found = newton.solve(newton.Unit(unit, by_load), host, guess, radius, 1e-9, 50)
+        found = newton.solve(
+            newton.UnitLoadFriction(unit, by_load), host, guess, radius, 1e-9, 50
+        )
         return found, host.twists(found.wrench), host.loads(found.wrench)
 
     def step(state, host, dt):
@@ -454,7 +456,7 @@ def test_derivatives_of_the_step_in_contact_space_are_differences(reference_load
                 / loads[:, None]
             )
 
-        return newton.Unit(unit, True), newton.HostResponse(
+        return newton.UnitLoadFriction(unit, True), newton.HostResponse(
             twist, load, share * response, share * load_response
         )
 

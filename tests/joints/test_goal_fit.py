@@ -10,7 +10,7 @@ from planarfriction.joints import Drive, JointLog, Plant, identify_joint
 from planarfriction.joints.goal_fit import Trial, improves, result_of
 from planarfriction.joints.goal_verdicts import speed_lag, standing
 from planarfriction.joints.numbers import interval
-from planarfriction.joints.problem import Problem
+from planarfriction.joints.problem import JointFitProblem
 
 SERVO = {
     "inertia": 2e-3,
@@ -39,7 +39,7 @@ def servo_logs(values, count=4, off=True):
         log = JointLog(
             t, np.zeros(len(t)), goal=wave, enabled=on, drive=drive, name=f"log {i}"
         )
-        q = Problem(
+        q = JointFitProblem(
             (log,), PENDULUM, None, ("load",) if "load" in values else ()
         ).simulated(values, [log])[0][:, 0]
         logs.append(
@@ -145,7 +145,7 @@ def test_spreads_intervals_and_words_have_their_numbers(monkeypatch):
     log = JointLog(
         t, 0.1 * np.sin(3.0 * t), dq=0.3 * np.cos(3.0 * (t - 0.02)), voltage=0.0 * t
     )
-    rigid = Problem((log,), PENDULUM, None, ())
+    rigid = JointFitProblem((log,), PENDULUM, None, ())
     moved = rigid.simulated(SERVO, [log])[0][:, 0]
     log = dataclasses.replace(
         log,
@@ -161,7 +161,7 @@ def test_spreads_intervals_and_words_have_their_numbers(monkeypatch):
     # The same but for one, that is shifted by 0.001.
     again = values | {"sigma_2": 0.006}
     kept = Trial(
-        Problem((log,), PENDULUM, None, ("bristles",)),
+        JointFitProblem((log,), PENDULUM, None, ("bristles",)),
         values,
         tuple(folds),
         again,

@@ -7,7 +7,7 @@ import pytest
 
 from planarfriction.joints import Drive, JointLog, Plant, numbers
 from planarfriction.joints import problem as problems
-from planarfriction.joints.problem import Problem
+from planarfriction.joints.problem import JointFitProblem
 
 VALUES = {
     "inertia": 1.8e-3, "offset": -0.02, "torque_gain": 0.107, "back_emf": 0.04, "mu_c": 2.5e-3, "sigma_2": 5e-3,
@@ -27,7 +27,7 @@ def servo(terms):
         enabled=on,
         drive=Drive(400.0, 7.3, 2.9e-3, 0.25),
     )
-    return Problem((log,), Plant(mass=0.49, length=0.1), None, terms)
+    return JointFitProblem((log,), Plant(mass=0.49, length=0.1), None, terms)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_a_joint_turns_round_within_a_step(monkeypatch):
     t = 0.07 * np.arange(12)
     log = JointLog(t, np.zeros(len(t)), voltage=np.full(len(t), -3.0), drive=None)
     log.motion[:, 1] = 2.0
-    problem = Problem((log,), Plant(inertia=1.0), 1.0, ())
+    problem = JointFitProblem((log,), Plant(inertia=1.0), 1.0, ())
     values = {"mu_c": 1.0, "sigma_2": 0.0}
     q = problem.simulated(values, [log])[0][:, 0]
     stop = 2.0 / 4.0  # at (3 + 1) rad/s^2

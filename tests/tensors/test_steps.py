@@ -10,7 +10,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.tensors import distributed, published, steps
 from planarfriction.tensors.namespace import Namespace
-from planarfriction.tensors.steps import LAW, Contact
+from planarfriction.tensors.steps import LAW, ContactArrays
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAW_OF_TEST = pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7, elasto_plastic=0.7)
@@ -32,7 +32,7 @@ def contact_of(kind):
         cells = distributed.cells_of(PATCH, LAW_OF_TEST, None, float)
         return (
             distributed,
-            Contact(numbers, cells),
+            ContactArrays(numbers, cells),
             pf.DistributedModel(PATCH, LAW_OF_TEST),
         )
     shape = published.shape_of(PATCH, LAW_OF_TEST, None)
@@ -43,7 +43,7 @@ def contact_of(kind):
     numeric = published.numbers_of(NUMPY, values, shape.surface.numbers, None)
     return (
         published,
-        Contact(numbers, numeric),
+        ContactArrays(numbers, numeric),
         pf.ReducedModelPublished(PATCH, LAW_OF_TEST),
     )
 

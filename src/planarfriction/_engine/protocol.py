@@ -18,7 +18,7 @@ from planarfriction._engine.compiler.memory import (
 )
 
 
-class Rows(NamedTuple):
+class ChangeRows(NamedTuple):
     """Twist and wrench of a contact and their changes, [3] each."""
 
     twist: Doubles
@@ -27,7 +27,7 @@ class Rows(NamedTuple):
     d_wrench: Doubles
 
 
-ROWS = Layout(Rows, twist=3, wrench=3, d_twist=3, d_wrench=3).offsets
+ROWS = Layout(ChangeRows, twist=3, wrench=3, d_twist=3, d_wrench=3).offsets
 """Rows [4, 3] as `ModelFunctions` take them (see `memory.arrays_at`)."""
 
 
@@ -78,7 +78,7 @@ class ModelFunctions(NamedTuple):
     change: Any = None
     """`(contact, z, z', lin, dz, dz', rows, friction, size)`: write the changes of z' and of the wrench.
 
-    `rows` are `Rows` that hold V, W, dV and take dW. The changes come from `dz`, `dV` and from relative changes of all
+    `rows` are `ChangeRows` that hold V, W, dV and take dW. The changes come from `dz`, `dV` and from relative changes of all
     coefficients of friction and of the size of the patch. None: the model takes no part in derivatives of scenes."""
     solve_transposed: Any = None
     """`(contact, z, r, lin, out)`: solve `D' out = r` with the D that `factor` prepared."""

@@ -42,7 +42,7 @@ NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
 """Parameters by their ranges; the breakaway ratio is in [0, 1), the centre of pressure anywhere."""
 
 
-class Family(NamedTuple):
+class RolloutFunctions(NamedTuple):
     """Parameters and compiled rollouts of one kind of model."""
 
     names: tuple[str, ...]
@@ -59,24 +59,26 @@ class Family(NamedTuple):
 
 
 _COLUMNS = np.array([published_step.NAMES.index(name) for name in PARAMETERS])
-PUBLISHED = Family(PARAMETERS, _COLUMNS, rollout, gradient, sensitivities, tangent)
+PUBLISHED = RolloutFunctions(
+    PARAMETERS, _COLUMNS, rollout, gradient, sensitivities, tangent
+)
 """`ReducedModelPublished`."""
 
 
 @functools.cache
-def _cells(size: int, turned: bool, leans: bool) -> Family:
+def _cells(size: int, turned: bool, leans: bool) -> RolloutFunctions:
     """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3 (see `cell_passes.KINDS`)."""
-    return Family(
+    return RolloutFunctions(
         cells_rollout.PARAMETERS,
         np.array(cells_rollout.COLUMNS),
         *rollouts_of_cells(size, turned, leans),
     )
 
 
-class Packed(NamedTuple):
+class RolloutInputs(NamedTuple):
     """A model as compiled loops see it."""
 
-    family: Family
+    family: RolloutFunctions
     rows: np.ndarray
     """Numbers of law and shape `[..., N]`, with the batch axes of the parameters."""
     shapes: ShapesByLoad | Callable[[np.ndarray, bool], ShapesByLoad]
@@ -114,13 +116,13 @@ def parameters_of(model: Any) -> np.ndarray:
     return packed.rows[packed.family.columns]
 
 
-def pack(model: Any, parameters: Any = None) -> Packed:
+def pack(model: Any, parameters: Any = None) -> RolloutInputs:
     """Return a model as compiled loops see it, with `parameters` `[..., P]` if given, else its own.
 
     A friction coefficient `mu_s` below `mu_c`, which a law refuses, is let through: the formulas are smooth there.
     A model that is packed already, as the tensor front ends hold them, is taken as it is.
     """
-    packed = model if isinstance(model, Packed) else _packed(model)
+    packed = model if isinstance(model, RolloutInputs) else _packed(model)
     if parameters is None:
         return packed
     values = _checked(parameters, packed.family.names)
@@ -131,7 +133,7 @@ def pack(model: Any, parameters: Any = None) -> Packed:
     return packed._replace(rows=rows)
 
 
-def _family(model: Any) -> Family:
+def _family(model: Any) -> RolloutFunctions:
     model = getattr(model, "reduction", model)
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
@@ -167,7 +169,7 @@ def _refusal(model: Any) -> tuple[str, str, Any] | None:
     )
 
 
-def _packed(model: Any) -> Packed:
+def _packed(model: Any) -> RolloutInputs:
     family = _family(model)
     model = model.reduction
     refusal = _refusal(model)
@@ -177,7 +179,7 @@ def _packed(model: Any) -> Packed:
     if isinstance(model, DistributedModel):
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
-        return Packed(
+        return RolloutInputs(
             family,
             np.array(law),
             shapes,
@@ -194,9 +196,9 @@ def _packed(model: Any) -> Packed:
 
 def _on_surface(
     row: np.ndarray, kind: int, size: int, data: np.ndarray, axes: np.ndarray | None
-) -> Packed:
+) -> RolloutInputs:
     none = np.zeros((1, 0))
-    return Packed(
+    return RolloutInputs(
         PUBLISHED, row, ShapesByLoad(np.array([kind, 0, size]), none, none, data), axes
     )
 
@@ -207,7 +209,7 @@ def pack_surface(
     size: int,
     data: np.ndarray,
     root: np.ndarray | None = None,
-) -> Packed:
+) -> RolloutInputs:
     """Return a `ReducedModelPublished` by its limit surface, for rollouts at given parameters of law and shape."""
     row = np.array(
         [*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)]
@@ -221,7 +223,7 @@ def pack_cells(
     weights: np.ndarray,
     positions: np.ndarray,
     reference: Any = 0.0,
-) -> Packed:
+) -> RolloutInputs:
     """Return a `DistributedModel` by its cells and their weights `[..., N]`, for rollouts at given parameters.
 
     `positions` are `[2, N]`, levers `[5, N]`, or these with an asymmetry behind them `[7, N]`; of discs `[3, N]`,
@@ -239,7 +241,7 @@ def pack_cells(
     shapes = cells_by_load(levers, rows[:1] if same else rows, None)
     law = np.array(_any_law(elasto_plastic))
     batch = () if same else weights.shape[:-1]
-    return Packed(
+    return RolloutInputs(
         family, law, shapes, inner=inner, reference=float(reference), batch=batch
     )
 

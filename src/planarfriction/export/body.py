@@ -11,7 +11,7 @@ from planarfriction._engine.coupled import coupling, coupling_steps
 from planarfriction._engine.coupled.coupling_rows import Patches, layout
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.export.c_source import Writer
-from planarfriction.export.c_values import Array, Fixed, Record, Scalar
+from planarfriction.export.c_values import Array, CStruct, Fixed, Scalar
 from planarfriction.export.loops import Loops
 from planarfriction.models.base import lever_of
 
@@ -41,7 +41,7 @@ def body_of(model: Any, precision: str, patches: int) -> dict[str, Any]:
         radius=Array("lever_arm", (patches,), fixed=True),
     )
     writer = Writer()
-    p = Record("p", record)
+    p = CStruct("p", record)
     loops = Loops(writer, {record: "search_t"})
     loops.replaced[coupling_steps.step_patch] = lambda given: _FUNCTIONS[given[2]]
     # The load is given.

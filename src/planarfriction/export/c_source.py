@@ -171,7 +171,7 @@ SHORT = 2
 """Sums and products that each pass does itself instead of keeping their result, which would take stack."""
 
 
-class Passes(NamedTuple):
+class CPasses(NamedTuple):
     """Source of the step of a block of cells."""
 
     cells: int
@@ -189,7 +189,7 @@ class Passes(NamedTuple):
 
 def passes_of(
     writer: Writer, block: Block, count: int, places: Sequence[str], share: str
-) -> Passes | None:
+) -> CPasses | None:
     """Split the step of a cell, whose new state goes to `places`; None for one that has branches.
 
     `share` is its share of the load.
@@ -251,7 +251,7 @@ def passes_of(
         texts.append("\n".join(f"        {line}" for line in lines))
     rows = 1 + max(int(row) for row in re.findall(r"row\[(\d+)\]", "".join(texts)))
     blocks = -(-count // CELLS)
-    return Passes(-(-count // blocks), blocks, rows, "\n".join(shared), texts)
+    return CPasses(-(-count // blocks), blocks, rows, "\n".join(shared), texts)
 
 
 def _again(own: list[Operation]) -> list[Operation]:

@@ -33,14 +33,14 @@ class Array(NamedTuple):
     """True for a table of the source, which no function takes as an argument."""
 
 
-class Record(NamedTuple):
+class CStruct(NamedTuple):
     """A struct in C, by the expression of its address."""
 
     text: str
     kind: np.dtype
 
 
-LEAVES = Scalar, Fixed, Array, Record
+LEAVES = Scalar, Fixed, Array, CStruct
 """Values that are not taken apart."""
 
 
@@ -73,7 +73,7 @@ def kinds_of(value: Any) -> Any:
 
 def kind_of(value: Any) -> Any:
     """Return the kind of a number, or of the numbers of an array, and the shape."""
-    if isinstance(value, (Scalar, Array, Record)):
+    if isinstance(value, (Scalar, Array, CStruct)):
         return value.kind, getattr(value, "shape", None)
     return "real" if isinstance(plain(value), float) else "int", None
 

@@ -28,8 +28,8 @@ from planarfriction.export.c_source import Writer
 from planarfriction.export.c_values import (
     LEAVES,
     Array,
+    CStruct,
     Fixed,
-    Record,
     Scalar,
     kind_of,
     kinds_of,
@@ -74,7 +74,7 @@ class Loops:
         if kernel in self.replaced:
             return (
                 self.replaced[kernel](arguments),
-                [isinstance(x, (Record, Scalar)) for x in leaves(arguments)],
+                [isinstance(x, (CStruct, Scalar)) for x in leaves(arguments)],
                 None,
             )
         straight = kernel.py_func.__module__ == surfaces.__name__
@@ -163,7 +163,7 @@ class _Function:
                 parameters.append((own, None))
                 return each
             kind, _ = kind_of(each)
-            points = isinstance(each, (Array, Record))
+            points = isinstance(each, (Array, CStruct))
             parameters.append(
                 (
                     own,
@@ -188,7 +188,7 @@ class _Function:
     def _of(self, value: Any) -> str:
         return (
             value.text
-            if isinstance(value, (Scalar, Array, Record))
+            if isinstance(value, (Scalar, Array, CStruct))
             else self.loops.writer.constant(plain(value))
         )
 
@@ -311,7 +311,7 @@ class _Translated(_Function):
         for each, part in pairs:
             if not isinstance(each, ast.Name):
                 self._line(f"{self._text(each)} = {self._of(part)};")
-            elif isinstance(part, (Array, Record)):
+            elif isinstance(part, (Array, CStruct)):
                 self.names[each.id] = part
             elif each.id != "_":
                 self._assigned(each.id, part)
@@ -377,7 +377,7 @@ class _Translated(_Function):
 
     def _value_of_attribute(self, node: ast.Attribute) -> Any:
         own = self._value(node.value)
-        if not isinstance(own, Record):
+        if not isinstance(own, CStruct):
             return getattr(own, node.attr)
         kind = own.kind[node.attr]
         name = f"{own.text}->{node.attr}"
@@ -398,7 +398,7 @@ class _Translated(_Function):
         if not isinstance(own, Array):
             return own[places[0]]
         if own.kind in self.loops.structs:
-            return Record(f"({own.text} + {self._of(places[0])})", own.kind)
+            return CStruct(f"({own.text} + {self._of(places[0])})", own.kind)
         rest = own.shape[len(places) :]
         if isinstance(last, ast.Slice):
             end = own.shape[-1] if last.upper is None else self._value(last.upper)

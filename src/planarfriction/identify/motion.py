@@ -18,7 +18,7 @@ from planarfriction.identify.parameters import (
     fitted_law,
     scaled_patch,
 )
-from planarfriction.identify.problem import Problem
+from planarfriction.identify.problem import LeastSquaresProblem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.search import interruptible, multistart, refine
 from planarfriction.identify.slides import (
@@ -169,7 +169,7 @@ def identify_motion(
 
 
 @dataclass(eq=False)
-class SlideProblem(Problem):
+class SlideProblem(LeastSquaresProblem):
     """Slides and a model that predicts their poses; the start of each slide follows the values.
 
     Noise is that of the channels of each slide, `[S, 3]`: slides with large residuals count as noisier.

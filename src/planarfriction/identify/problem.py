@@ -64,7 +64,7 @@ def softened(residual: np.ndarray) -> Linear:
     return residual * factor, 1.0 / (root * factor)
 
 
-class Problem:
+class LeastSquaresProblem:
     """Measurements, a model, and the values that vary: F of the contact, then K of the rig.
 
     Subclasses predict what was measured, and estimate its noise from `values` and the `noise` of before. Given `sigma`
@@ -136,7 +136,7 @@ class Problem:
             yield each.reshape(-1, 3, rows.shape[1])
 
 
-class LogProblem(Problem):
+class LogProblem(LeastSquaresProblem):
     """Logs of twist and wrench, a model, and the rig that measured them."""
 
     def __init__(

@@ -16,7 +16,7 @@ import numpy as np
 from planarfriction.errors import IdentificationInterrupted
 from planarfriction.identify.logs import Arrays, Linear
 from planarfriction.identify.parameters import ALL, Coordinates
-from planarfriction.identify.problem import LogProblem, Problem
+from planarfriction.identify.problem import LeastSquaresProblem, LogProblem
 from planarfriction.identify.uncertainty import Fit, Uncertainty, covariance_of, finite
 from planarfriction.identify.verdicts import VAGUE
 from planarfriction.laws import LuGre
@@ -57,7 +57,7 @@ SCATTER = 0.7
 """Standard deviation of the logarithms of starts around a given one."""
 
 
-def multistart(problem: Problem, starts: Arrays, noise: np.ndarray) -> Fit:
+def multistart(problem: LeastSquaresProblem, starts: Arrays, noise: np.ndarray) -> Fit:
     """Find the best rough fit from starts `[F]` or `[F + K]`, with the same noise for all samples of a channel."""
     coordinates = problem.coordinates(starts[0])
     sigma = problem.even_sigma(noise)
@@ -99,7 +99,7 @@ def warm_start(
 
 
 @contextlib.contextmanager
-def interruptible(problems: Sequence[Problem]) -> Iterator[None]:
+def interruptible(problems: Sequence[LeastSquaresProblem]) -> Iterator[None]:
     """Let Ctrl-C raise `IdentificationInterrupted` with the best values so far of the last problem that has any."""
     try:
         yield
@@ -163,7 +163,7 @@ class Descent:
 
 
 def _best(
-    problem: Problem,
+    problem: LeastSquaresProblem,
     coordinates: Coordinates,
     points: Arrays,
     noise: np.ndarray,

@@ -60,7 +60,7 @@ class Fit(NamedTuple):
     """Problem with its best values."""
 
     problem: Any
-    """`Problem` that was solved."""
+    """`LeastSquaresProblem` that was solved."""
     coordinates: Coordinates
     x: np.ndarray
     """Coordinates `[F + K]`."""

@@ -69,7 +69,9 @@ def identify_joint(
         raise InvalidValueError(
             "plant", "have a mass or an inertia, or torque_gain be given", plant
         )
-    base = problem.Problem(logs, plant, gain, (), -(-goal_fit.GROUPS // len(logs)))
+    base = problem.JointFitProblem(
+        logs, plant, gain, (), -(-goal_fit.GROUPS // len(logs))
+    )
     return goal_fit.fit_goals(base, chosen, auto, progress)
 
 

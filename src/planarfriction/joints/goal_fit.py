@@ -12,7 +12,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.goal_verdicts import judge
 from planarfriction.joints.numbers import Values, interval, least, quantile
-from planarfriction.joints.problem import NEEDS, SHORT, TERMS, Problem
+from planarfriction.joints.problem import NEEDS, SHORT, TERMS, JointFitProblem
 from planarfriction.joints.result import JointFit, Series, not_shown
 
 SPANS = (SHORT, 0.6, np.inf)
@@ -41,7 +41,7 @@ BEST = 2
 class Trial:
     """Fit of one choice of terms, with a fit for each group of samples that was left out."""
 
-    problem: Problem
+    problem: JointFitProblem
     """Logs, plant, and the terms that were fitted."""
     values: dict[str, float]
     """Estimates by name."""
@@ -95,7 +95,7 @@ class Trial:
 
 
 def minimise(
-    problem: Problem,
+    problem: JointFitProblem,
     start: Values,
     spans: Sequence[float] = SPANS,
     without: Sequence[int] = (),
@@ -117,7 +117,11 @@ def minimise(
 
 
 def _least(
-    problem: Problem, values: Values, span: float, without: Sequence[int], **loss: Any
+    problem: JointFitProblem,
+    values: Values,
+    span: float,
+    without: Sequence[int],
+    **loss: Any,
 ) -> dict[str, float]:
     counted = ~np.isin(problem.labels, without)
     return least(
@@ -131,8 +135,8 @@ def _least(
 
 
 def with_term(
-    problem: Problem, values: Values, term: str
-) -> tuple[Problem, dict[str, float]]:
+    problem: JointFitProblem, values: Values, term: str
+) -> tuple[JointFitProblem, dict[str, float]]:
     """Return a problem with one term more than that of `values`, and its best values from the best of its starts."""
     problem = problem.with_terms([*problem.terms, term])
     starts = [{**values, **guess} for guess in problem.guesses(term, values)]
@@ -149,7 +153,7 @@ def with_term(
 
 
 def attempt(
-    problem: Problem, values: dict[str, float], progress: Callable[[str], None]
+    problem: JointFitProblem, values: dict[str, float], progress: Callable[[str], None]
 ) -> Trial:
     """Fit a problem with each group left out, then with each half, and measure the errors of what was left out."""
     folds = []
@@ -187,7 +191,9 @@ VAGUE = 0.5
 """Standard error over the value from which on the number of a term is not known."""
 
 
-def _check_related(problem: Problem, runs: Sequence[np.ndarray]) -> Iterator[Verdict]:
+def _check_related(
+    problem: JointFitProblem, runs: Sequence[np.ndarray]
+) -> Iterator[Verdict]:
     """Yield a verdict on a log that the run from its goal does not resemble, though others do.
 
     Raises InvalidValueError for several such logs, or one alone.
@@ -211,7 +217,10 @@ def _check_related(problem: Problem, runs: Sequence[np.ndarray]) -> Iterator[Ver
 
 
 def fit_goals(
-    base: Problem, chosen: Sequence[str], auto: bool, progress: Callable[[str], None]
+    base: JointFitProblem,
+    chosen: Sequence[str],
+    auto: bool,
+    progress: Callable[[str], None],
 ) -> JointFit:
     """Fit the positions that runs from goal or voltage give, with the `chosen` terms, or with those that they ask for.
 

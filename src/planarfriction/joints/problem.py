@@ -45,7 +45,7 @@ MOVING = 0.05
 
 
 @dataclass(frozen=True)
-class Problem:
+class JointFitProblem:
     """Logs and plant with the terms of the friction that are tried."""
 
     logs: tuple[JointLog, ...]
@@ -72,7 +72,7 @@ class Problem:
     def _more(self) -> list[str]:
         return [name for term in self.terms for name in TERMS[term]]
 
-    def with_terms(self, terms: Sequence[str]) -> Problem:
+    def with_terms(self, terms: Sequence[str]) -> JointFitProblem:
         """Return the problem with other terms."""
         return replace(self, terms=tuple(each for each in TERMS if each in terms))
 

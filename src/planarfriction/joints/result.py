@@ -16,7 +16,7 @@ from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.friction import JointFriction
 from planarfriction.joints.log import JointLog, Plant
 from planarfriction.joints.numbers import PARAMETERS, interval, quantile
-from planarfriction.joints.problem import Problem, friction_of
+from planarfriction.joints.problem import JointFitProblem, friction_of
 
 
 class Series(NamedTuple):
@@ -114,9 +114,9 @@ class JointFit:
 
     def simulate(self, log: JointLog) -> np.ndarray:
         """Simulate q and dq `[T, 2]` of a log from its goal or voltage."""
-        return Problem((log,), self.plant, self.torque_gain, self.terms).simulated(
-            self.values, [log]
-        )[0]
+        return JointFitProblem(
+            (log,), self.plant, self.torque_gain, self.terms
+        ).simulated(self.values, [log])[0]
 
     def table(self) -> str:
         """Return estimates, errors of the logs and verdicts as text."""

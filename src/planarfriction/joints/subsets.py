@@ -49,7 +49,7 @@ WEAK = 1e-3
 """Least Coulomb level of a start, over the largest torque."""
 
 
-class Grid(NamedTuple):
+class TermGrid(NamedTuple):
     """Numbers that are not linear, and that the search goes through."""
 
     v_s: np.ndarray
@@ -70,7 +70,7 @@ class Candidate(NamedTuple):
 
 
 def search(
-    rows: Sequence[Rows], grid: Grid, told: Sequence[str], allowed: Sequence[str]
+    rows: Sequence[Rows], grid: TermGrid, told: Sequence[str], allowed: Sequence[str]
 ) -> list[Candidate]:
     """Score all sets of the `allowed` terms that hold those that were `told`, best first.
 
@@ -136,7 +136,9 @@ def _linear(rows: Rows) -> np.ndarray:
     )[rows.fitted]
 
 
-def _bent(rows: Sequence[Rows], levels: Sequence[np.ndarray], grid: Grid) -> np.ndarray:
+def _bent(
+    rows: Sequence[Rows], levels: Sequence[np.ndarray], grid: TermGrid
+) -> np.ndarray:
     """Compute the friction of levels `[R, L]` at the fitted rows, rigid and with each bend, `[1 + B, F, L]`."""
     found = []
     for each, level in zip(rows, levels, strict=True):
@@ -150,7 +152,7 @@ def _bent(rows: Sequence[Rows], levels: Sequence[np.ndarray], grid: Grid) -> np.
 
 
 def _best(
-    terms: tuple[str, ...], sums: np.ndarray, grid: Grid, least: float
+    terms: tuple[str, ...], sums: np.ndarray, grid: TermGrid, least: float
 ) -> Candidate:
     """Fit a set of terms with each fold left out, and as a whole, at all points of the grid and with all delays.
 

@@ -84,7 +84,7 @@ class Data(NamedTuple):
     """Stribeck speed below which the logs show none [rad/s]."""
     least_bend: float
     """Deflection of bristles below which the logs show none [rad]."""
-    grid: subsets.Grid
+    grid: subsets.TermGrid
     """Stribeck speeds and bends that the logs can show."""
     allowed: list[str]
     """Terms that the logs can show."""
@@ -156,7 +156,7 @@ def prepare(logs: Sequence[JointLog]) -> Data:
     )
     blind = {"stribeck": not falls, "bristles": len(turning) < REVERSALS}
     allowed = [term for term in TERMS if not blind.get(term)]
-    grid = subsets.Grid(speeds, bends)
+    grid = subsets.TermGrid(speeds, bends)
     return Data(
         limits, rows, speed, torque, fastest, slowest_fall, least_bend, grid, allowed
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction._engine.body import rosenbrock as kernels
 from planarfriction._engine.body.body import System
-from planarfriction._engine.body.integration import Method, Output, Progress
+from planarfriction._engine.body.integration import IntegrationProgress, Method, Output
 from planarfriction._engine.compiler import missing, threads, together
 from planarfriction._engine.compiler.calls import address_of, signature_of
 from planarfriction._support.equality import ByValue
@@ -77,10 +77,10 @@ def serve() -> None:
     together.serve(lambda job: address_of(kernels.FUNCTIONS[job]))
 
 
-def start_of(state: np.ndarray) -> Progress:
+def start_of(state: np.ndarray) -> IntegrationProgress:
     """Return the progress of an integration that has yet to begin."""
     clock = np.array([0.0, _FIRST_STEP, np.inf])
-    return Progress(
+    return IntegrationProgress(
         np.array(state, dtype=float),
         np.zeros(2, np.int64),
         clock,
@@ -88,7 +88,7 @@ def start_of(state: np.ndarray) -> Progress:
     )
 
 
-def tried(at: Progress) -> int:
+def tried(at: IntegrationProgress) -> int:
     """Return the number of steps that an integration has tried, accepted or not."""
     return int(at.statistics[kernels.STEPS] + at.statistics[kernels.REJECTIONS])
 

@@ -17,7 +17,7 @@ from planarfriction.scenes import Scene
 from planarfriction.scenes.signal import SAME_TIME
 from planarfriction.scenes.solution import History
 from planarfriction.sweeps.records import FAILED, Record, failure, pack, unpack
-from planarfriction.sweeps.settings import Grid
+from planarfriction.sweeps.settings import ValueGrid
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +52,9 @@ class Bookkeeper:
     by the digest of its content, so that any number of sweeps write to one folder, and damage is seen.
     """
 
-    def __init__(self, grid: Grid, timed: bool, path: str | Path | None = None) -> None:
+    def __init__(
+        self, grid: ValueGrid, timed: bool, path: str | Path | None = None
+    ) -> None:
         self.grid = grid
         self.timed = timed
         self.runs: dict[Index, tuple[str, Record]] = {}
@@ -250,7 +252,7 @@ def on_instants(record: Record, time: np.ndarray) -> dict[str, History]:
     return result
 
 
-def check_names(grid: Grid, variables: Mapping[str, History]) -> None:
+def check_names(grid: ValueGrid, variables: Mapping[str, History]) -> None:
     """Check that no swept quantity has the name of something else."""
     taken = {*variables, *(dim for each in variables.values() for dim in each.dims)}
     for name in grid.labels:

@@ -25,7 +25,7 @@ MOST_RUNS = 100_000_000
 
 
 @dataclass(frozen=True)
-class Grid:
+class ValueGrid:
     """Swept quantities by name, each with labels and the values behind them."""
 
     labels: dict[str, list[Any]]
@@ -57,7 +57,7 @@ class Grid:
         )
 
 
-def grid_of(values: Any) -> Grid:
+def grid_of(values: Any) -> ValueGrid:
     """Make the grid of a mapping from names to lists of scalars, or to mappings from labels to anything.
 
     Raises InvalidValueError for what is neither, for empty lists and for values that are there twice.
@@ -73,7 +73,7 @@ def grid_of(values: Any) -> Grid:
         labelled = isinstance(given, Mapping)
         labels[name] = _scalars(name, list(given) if labelled else given)
         behind[name] = list(given.values()) if labelled else labels[name]
-    result = Grid(labels, behind)
+    result = ValueGrid(labels, behind)
     if result.size > MOST_RUNS:
         raise InvalidValueError("values", f"make at most {MOST_RUNS} runs", result.size)
     return result

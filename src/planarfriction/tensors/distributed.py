@@ -19,7 +19,7 @@ from planarfriction.patch import ContactPatch
 from planarfriction.tensors.elements import Vector, joined, split
 
 
-class Kind(NamedTuple):
+class CellType(NamedTuple):
     """Functions of a kind of cell, in numbers as `kernels` has them."""
 
     bristles: int
@@ -29,12 +29,14 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    2: Kind(2, cells.POSITIONS, points.evaluate, points.step),
-    3: Kind(3, cells.DISC_POSITIONS, discs.evaluate, discs.step),
-    5: Kind(2, cells.LEVERS, points.evaluate, points.step),
-    6: Kind(3, cells.DISC_LEVERS, discs.evaluate, discs.step),
-    7: Kind(2, cells.LEVERS, leaning_cells.evaluate, leaning_cells.step),
-    8: Kind(3, cells.DISC_LEVERS, leaning_cells.evaluate_disc, leaning_cells.step_disc),
+    2: CellType(2, cells.POSITIONS, points.evaluate, points.step),
+    3: CellType(3, cells.DISC_POSITIONS, discs.evaluate, discs.step),
+    5: CellType(2, cells.LEVERS, points.evaluate, points.step),
+    6: CellType(3, cells.DISC_LEVERS, discs.evaluate, discs.step),
+    7: CellType(2, cells.LEVERS, leaning_cells.evaluate, leaning_cells.step),
+    8: CellType(
+        3, cells.DISC_LEVERS, leaning_cells.evaluate_disc, leaning_cells.step_disc
+    ),
 }
 """Kinds of cells by how many numbers each has: points, discs, both with a friction metric, and with asymmetry too.
 

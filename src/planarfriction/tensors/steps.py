@@ -28,7 +28,7 @@ LAW = PARAMETERS[:8]
 """Parameters of the friction law; the others describe the shape of the patch."""
 
 
-class Contact(NamedTuple):
+class ContactArrays(NamedTuple):
     """A law and a patch, ready for one evaluation or for all steps of a rollout."""
 
     law: LawNumbers
@@ -40,7 +40,7 @@ class Contact(NamedTuple):
 
 
 def evaluate(
-    xp: Any, equations: Any, contact: Contact, state: Any, twist: Any, load: Any
+    xp: Any, equations: Any, contact: ContactArrays, state: Any, twist: Any, load: Any
 ) -> tuple[Any, Any]:
     """Return the rate of the state, and the wrench `[..., 3]`."""
     by = equations.drive(xp, *contact[:2], twist)
@@ -61,7 +61,7 @@ def evaluate(
 def step(
     xp: Any,
     equations: Any,
-    contact: Contact,
+    contact: ContactArrays,
     state: Any,
     twist: Any,
     load: Any,
@@ -77,7 +77,7 @@ def step(
 
 
 def advance(
-    xp: Any, equations: Any, contact: Contact, z: Any, by: Any, load: Any, dt: Any
+    xp: Any, equations: Any, contact: ContactArrays, z: Any, by: Any, load: Any, dt: Any
 ) -> tuple[Any, Any]:
     """Return the bristles `[..., d, N]` after `dt`, zeros of contacts without load, and the tractions per unit load.
 
@@ -230,17 +230,17 @@ class TensorModel:
     def _number(self, name: str, value: Any) -> Any:
         return self.xp.real(name, value)
 
-    def _contact_at(self, parameters: Any) -> Contact:
+    def _contact_at(self, parameters: Any) -> ContactArrays:
         return self._prepared(self._values(parameters))
 
-    def _prepared(self, values: Mapping[str, Any]) -> Contact:
+    def _prepared(self, values: Mapping[str, Any]) -> ContactArrays:
         """Return the model at physical values `[...]`."""
         wide = {name: inner(value) for name, value in values.items()}
         law = LawNumbers(
             **{name: wide[name] for name in LAW},
             elasto_plastic=float(self.elasto_plastic),
         )
-        return Contact(law, self._shape(wide), self.reference_load)
+        return ContactArrays(law, self._shape(wide), self.reference_load)
 
     def _evaluated(
         self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any

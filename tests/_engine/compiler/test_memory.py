@@ -15,7 +15,7 @@ from planarfriction._engine.compiler.memory import (
     Doubles,
     Integers,
     Layout,
-    Packed,
+    StructBuffer,
     arrays_at,
     exists,
     offsets_of,
@@ -81,14 +81,14 @@ def totals(rows):
 
 
 def test_compiled_code_reads_a_record_by_its_names():
-    packed = Packed(RECORD)
+    packed = StructBuffer(RECORD)
     assert seen(packed.address) == (3, 0.25, -4, 2.5, 8, True, False)
     assert seen(packed.words) == seen(packed.address)
 
 
 def test_arrays_are_those_of_the_caller():
     own = VALUES.copy()
-    assert doubled(Packed(RECORD._replace(values=own)).address, 3) == 1.0
+    assert doubled(StructBuffer(RECORD._replace(values=own)).address, 3) == 1.0
     assert own.tolist() == [1.0, 3.0, 5.0]
 
 

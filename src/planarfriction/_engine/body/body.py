@@ -40,8 +40,8 @@ from planarfriction._engine.compiler.calls import address_of, call
 from planarfriction._engine.compiler.memory import (
     Doubles,
     Integers,
-    Packed,
     Place,
+    StructBuffer,
     arrays_at,
     at,
     exists,
@@ -123,7 +123,7 @@ class Work(NamedTuple):
     to_pose: Doubles
     """Acceleration per residual of the pose, [3, 3]."""
     rows: Doubles
-    """Twist and wrench of one contact and their changes (see `protocol.Rows`), [4, 3]."""
+    """Twist and wrench of one contact and their changes (see `protocol.ChangeRows`), [4, 3]."""
     frame: Doubles
     """Place of each contact frame, as in `Contacts.place`, and the velocity that it sees (see `place_at`), with the
     spin of the world's side, where something moves, [C, 8]."""
@@ -155,7 +155,7 @@ class SystemRecord(NamedTuple):
 read = reader(SystemRecord)
 
 
-class System(Packed):
+class System(StructBuffer):
     """A body on its contacts, with the memory that its linear algebra works in.
 
     `keepalive` are arrays whose addresses are in the records of the contacts: they live as long as this does.

@@ -52,7 +52,7 @@ class Output(NamedTuple):
     """Time since which each contact is beyond the edge of the body, NaN while it touches, [C]; [0] without edges."""
 
 
-class Progress(NamedTuple):
+class IntegrationProgress(NamedTuple):
     """State of an integration; `rosenbrock.advance` goes on from here and updates it."""
 
     y: Doubles
@@ -127,7 +127,7 @@ class RunRecord(NamedTuple):
     """Address of its `SystemRecord`."""
     method: Method
     output: Output
-    progress: Progress
+    progress: IntegrationProgress
     stages: Stages
     atol: Doubles
     """Absolute tolerances, [n]."""

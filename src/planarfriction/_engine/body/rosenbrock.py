@@ -25,9 +25,9 @@ from planarfriction._engine.body.ends import (
     speed_of,
 )
 from planarfriction._engine.body.integration import (
+    IntegrationProgress,
     Method,
     Output,
-    Progress,
     RunRecord,
     Stages,
     combine,
@@ -53,8 +53,8 @@ from planarfriction._engine.compiler import entry, jit, kernel
 from planarfriction._engine.compiler.calls import address_of, call
 from planarfriction._engine.compiler.memory import (
     Doubles,
-    Packed,
     Place,
+    StructBuffer,
     at,
     exists,
     layout,
@@ -76,31 +76,31 @@ APART = 4
 """Outcome of `advance`: the body has left its supports."""
 
 STEPS = 0
-"""Place in `Progress.statistics` of the number of steps."""
+"""Place in `IntegrationProgress.statistics` of the number of steps."""
 
 REJECTIONS = 1
-"""Place in `Progress.statistics` of the number of rejected steps."""
+"""Place in `IntegrationProgress.statistics` of the number of rejected steps."""
 
 EVALUATIONS = 2
-"""Place in `Progress.statistics` of the number of evaluations of the rates."""
+"""Place in `IntegrationProgress.statistics` of the number of evaluations of the rates."""
 
 JACOBIANS = 3
-"""Place in `Progress.statistics` of the number of Jacobians."""
+"""Place in `IntegrationProgress.statistics` of the number of Jacobians."""
 
 PIECE = 0
-"""Place in `Progress.cursor` of the piece of time."""
+"""Place in `IntegrationProgress.cursor` of the piece of time."""
 
 SAMPLE = 1
-"""Place in `Progress.cursor` of the next sample."""
+"""Place in `IntegrationProgress.cursor` of the next sample."""
 
 SINCE = 0
-"""Place in `Progress.clock` of the time since the piece began."""
+"""Place in `IntegrationProgress.clock` of the time since the piece began."""
 
 STEP = 1
-"""Place in `Progress.clock` of the next step."""
+"""Place in `IntegrationProgress.clock` of the next step."""
 
 FIRST = 2
-"""Place in `Progress.clock` of the mark of a first step."""
+"""Place in `IntegrationProgress.clock` of the mark of a first step."""
 
 # Friction goes by the direction of a contact's twist. While a patch comes to a halt that direction may sweep across a
 # pad, which holds the patch as soon as it is all that stands still, and a step from one side of it to the other has a
@@ -502,7 +502,7 @@ FUNCTIONS = (*BODY_FUNCTIONS, combine, attempt, advance)
 """Functions that every run calls, in the order in which it asks for them."""
 
 
-class Run(Packed):
+class Run(StructBuffer):
     """An integration on which `advance` works: its steps keep their error below `rtol |y| + atol`, `atol` [n]."""
 
     def __init__(
@@ -510,7 +510,7 @@ class Run(Packed):
         system: System,
         method: Method,
         output: Output,
-        progress: Progress,
+        progress: IntegrationProgress,
         *,
         rtol: float,
         atol: np.ndarray,

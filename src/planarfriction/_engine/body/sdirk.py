@@ -14,7 +14,13 @@ import numpy as np
 from planarfriction._engine.body.body import SystemRecord
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
-from planarfriction._engine.compiler.memory import Doubles, Layout, Packed, at, reader
+from planarfriction._engine.compiler.memory import (
+    Doubles,
+    Layout,
+    StructBuffer,
+    at,
+    reader,
+)
 
 GAMMA = 0.25
 PLACES = np.array([0.25, 0.75, 0.55, 0.5, 1.0])
@@ -86,7 +92,7 @@ class Workspace(NamedTuple):
 read_workspace = reader(Workspace)
 
 
-def workspace_for(count: int, inputs: int, n: int) -> Packed:
+def workspace_for(count: int, inputs: int, n: int) -> StructBuffer:
     """Return a workspace for `count` derivatives of n states (made outside compiled code, which it would slow down)."""
     shapes = dict.fromkeys(Workspace._fields, n) | dict.fromkeys(
         ("level", "forcing"), (max(inputs, 1), n)
@@ -103,7 +109,7 @@ def workspace_for(count: int, inputs: int, n: int) -> Packed:
         "pace": 1,
         "left": 1,
     }
-    return Packed(Layout(Workspace, **shapes).made(pace=np.ones(1)))
+    return StructBuffer(Layout(Workspace, **shapes).made(pace=np.ones(1)))
 
 
 class Variation(NamedTuple):

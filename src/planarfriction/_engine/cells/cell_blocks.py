@@ -63,7 +63,7 @@ class Limit(NamedTuple):
     """`(law, z, changes)`: bring back a bristle and its changes."""
 
 
-class Kind(NamedTuple):
+class BlockFunctions(NamedTuple):
     """Compiled functions of a kind of cells in blocks."""
 
     lever: Any

@@ -7,7 +7,7 @@ from typing import Any
 
 from planarfriction._engine.bristles.leaning_cells import Leaning
 from planarfriction._engine.cells import cells_rollout, cells_sensitivities
-from planarfriction._engine.cells.cell_blocks import LANES, Kind, Limit
+from planarfriction._engine.cells.cell_blocks import LANES, BlockFunctions, Limit
 from planarfriction._engine.cells.cell_passes import (
     KINDS,
     backward_passes,
@@ -27,7 +27,7 @@ def _shared(law: LawNumbers, block: Doubles, i: int) -> LawNumbers:
 
 
 def _leaning_at(first: int) -> Any:
-    """Return `cell_blocks.Kind.law` of cells whose asymmetry lies in two fields of a block, from one on."""
+    """Return `cell_blocks.BlockFunctions.law` of cells whose asymmetry lies in two fields of a block, from one on."""
 
     @kernel
     def law_of_cell(law: LawNumbers, block: Doubles, i: int) -> Leaning:
@@ -52,7 +52,9 @@ def rollouts_of_cells(size: int, turned: bool, leans: bool) -> tuple:
     )
     pushed = forward(step, cells_rollout.by_of(path), kind.lengths)
     loops = forward_passes(kind).run, backward_passes(kind).run, share_passes(kind).run
-    functions = Kind(kind.lever, size, *loops, pushed, law, limit, reader_of(size))
+    functions = BlockFunctions(
+        kind.lever, size, *loops, pushed, law, limit, reader_of(size)
+    )
     sensitivities = cells_sensitivities.bound(functions, kind, path)
     rollout, gradient, tangent, shares = (
         cells_rollout.entry_of(each, functions, kind.name)

@@ -105,7 +105,7 @@ KINDS = {
 """Kinds of cells by the components of a bristle, and whether there are a metric and an asymmetry."""
 
 
-class Rows(NamedTuple):
+class CellRows(NamedTuple):
     """Cells of a contact from one on, row by row of n numbers."""
 
     cells: Doubles
@@ -147,7 +147,7 @@ def _fields(letter: str, first: int, count: int) -> dict[str, str]:
 
 
 def _rows(letter: str, field: str, count: int) -> dict[str, str]:
-    """Return the sources of a vector of symbols that lies in `Rows`."""
+    """Return the sources of a vector of symbols that lies in `CellRows`."""
     return {f"{letter}{m}": f"block.{field}[{m} * block.n + i]" for m in range(count)}
 
 
@@ -173,7 +173,7 @@ def _in_block(kind: CellKind) -> dict[str, str]:
 
 
 def _in_rows(kind: CellKind) -> dict[str, str]:
-    """Return the sources of the symbols of cells in `Rows`."""
+    """Return the sources of the symbols of cells in `CellRows`."""
     vectors = _rows("c", "cells", kind.numbers + 2 * kind.leans) | _rows(
         "z", "z", kind.element.size
     )
@@ -206,7 +206,7 @@ def forward_passes(kind: CellKind) -> Passes:
 
 
 def step_passes(kind: CellKind) -> Passes:
-    """Write the step of cells in `Rows`; the new bristles may go where the old ones are, so they are written last."""
+    """Write the step of cells in `CellRows`; the new bristles may go where the old ones are, so they are written last."""
     element = kind.element
     stores = _rows("new", "out", kind.element.size)
     sources = _in_rows(kind) | stores
@@ -285,7 +285,7 @@ def share_passes(kind: CellKind) -> Passes:
 
 
 def rate_passes(kind: CellKind) -> Passes:
-    """Write the rates of cells in `Rows`, and their wrench."""
+    """Write the rates of cells in `CellRows`, and their wrench."""
     element = kind.element
 
     def rate(trace: Trace) -> Any:
@@ -302,7 +302,7 @@ def rate_passes(kind: CellKind) -> Passes:
 
 
 def slope_passes(kind: CellKind) -> Passes:
-    """Write the derivatives of the rates of cells in `Rows` by state and velocity, and of tractions unless linear."""
+    """Write the derivatives of the rates of cells in `CellRows` by state and velocity, and of tractions unless linear."""
     element = kind.element
     written = derive(element.evaluate, ("z", "u"), kind.lengths)
     count = element.size if kind.linear else 2 * element.size

@@ -22,8 +22,8 @@ from planarfriction._engine.cells.cell_passes import (
     DISC,
     KINDS,
     CellKind,
+    CellRows,
     Element,
-    Rows,
     rate_passes,
     slope_passes,
     step_passes,
@@ -66,7 +66,7 @@ def _in_place(
     block: Doubles,
 ) -> Any:
     """Return the rows of cells of a contact from one on, and their number."""
-    rows = Rows(
+    rows = CellRows(
         at(contact.cells, first),
         at(z, first),
         at(contact.weights, first),
@@ -104,7 +104,7 @@ def _filled(numbers: int, size: int) -> Any:
         for m in range(size):
             copy(at(z, m * n + first), at(block, bristle + m * LANES), count)
         copy(at(contact.weights, first), at(block, weight), count)
-        return Rows(
+        return CellRows(
             at(block, RESULTS), at(block, bristle), at(block, weight), out, LANES
         ), lanes
 

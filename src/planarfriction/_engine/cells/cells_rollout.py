@@ -19,7 +19,7 @@ from planarfriction._engine.cells.cell_blocks import (
     LANES,
     OUT,
     WEIGHT,
-    Kind,
+    BlockFunctions,
     Z,
     divided,
     totals,
@@ -113,7 +113,7 @@ def _weigh(
 
 @kernel
 def _bring_back(
-    kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int
+    kind: BlockFunctions, law: LawNumbers, w: Doubles, blocks: int, lanes: int
 ) -> None:
     """Bring bristles back onto their limits (see `settle`)."""
     for k in range(blocks):
@@ -127,7 +127,7 @@ def _bring_back(
 
 @kernel
 def _bring_back_pull(
-    kind: Kind, law: LawNumbers, w: Doubles, blocks: int, lanes: int
+    kind: BlockFunctions, law: LawNumbers, w: Doubles, blocks: int, lanes: int
 ) -> Vector:
     """Carry the cotangents of bristles back over `_bring_back`; return the cotangents of sigma_0 and mu_s."""
     total = (0.0, 0.0)
@@ -143,7 +143,7 @@ def _bring_back_pull(
     return total
 
 
-class Interval(NamedTuple):
+class IntervalWithChanges(NamedTuple):
     """A step of bristles of a law with the stiffness at its load, and the changes of its inputs."""
 
     law: LawNumbers
@@ -158,7 +158,7 @@ class Interval(NamedTuple):
 
 @kernel
 def _bring_back_push(
-    kind: Kind, interval: Interval, block: Doubles, lanes: int
+    kind: BlockFunctions, interval: IntervalWithChanges, block: Doubles, lanes: int
 ) -> None:
     """Bring bristles back onto their limits, with their changes."""
     for i in range(lanes):
@@ -176,7 +176,7 @@ def _bring_back_push(
 
 @kernel
 def _roll(
-    kind: Kind,
+    kind: BlockFunctions,
     law: LawNumbers,
     inputs: Inputs,
     b: int,
@@ -219,7 +219,7 @@ def _roll(
 
 @kernel
 def rollout(
-    kind: Kind, inputs: Inputs, span: tuple[int, ...], z: np.ndarray, wrench: np.ndarray, states: np.ndarray,
+    kind: BlockFunctions, inputs: Inputs, span: tuple[int, ...], z: np.ndarray, wrench: np.ndarray, states: np.ndarray,
     scratch: np.ndarray,
 ) -> None:  # fmt: skip
     """Step the contacts `span[0]` to `span[1]`: `z` [B, size n] in place, wrenches added to `wrench` [B, T, 3].
@@ -243,7 +243,7 @@ def rollout(
 
 @kernel
 def _pull(
-    kind: Kind,
+    kind: BlockFunctions,
     law: LawNumbers,
     inputs: Any,
     b: int,
@@ -297,7 +297,7 @@ def _pull(
 
 @kernel
 def gradient(
-    kind: Kind, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], bars: Bars,
+    kind: BlockFunctions, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], bars: Bars,
     scratch: np.ndarray,
 ) -> None:  # fmt: skip
     """Add the adjoint of `rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`."""
@@ -321,7 +321,7 @@ def gradient(
 
 @kernel
 def shares(
-    kind: Kind, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], out: np.ndarray,
+    kind: BlockFunctions, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], out: np.ndarray,
     scratch: np.ndarray,
 ) -> None:  # fmt: skip
     """Write the cotangents of the weights of cells, from those of the wrenches [B or 1, T, 3], to `out` [B, n].
@@ -358,7 +358,9 @@ def shares(
 
 
 @kernel
-def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
+def _push_one(
+    kind: BlockFunctions, interval: IntervalWithChanges, block: Doubles, i: int
+) -> None:
     """Step a cell and its change."""
     lever = kind.lever
     weight = block[WEIGHT + i]
@@ -385,14 +387,16 @@ def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
 
 
 @kernel
-def _push(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
+def _push(
+    kind: BlockFunctions, interval: IntervalWithChanges, block: Doubles, lanes: int
+) -> None:
     for i in range(lanes):
         _push_one(kind, interval, block, i)
 
 
 @kernel
 def tangent(
-    kind: Kind, inputs: Inputs, span: tuple[int, ...], z: np.ndarray, changes: Bars, wrenches: np.ndarray,
+    kind: BlockFunctions, inputs: Inputs, span: tuple[int, ...], z: np.ndarray, changes: Bars, wrenches: np.ndarray,
     slopes: np.ndarray, scratch: np.ndarray,
 ) -> None:  # fmt: skip
     """Run rollouts with their change along changes of the inputs, added to `wrenches` and `slopes` [B, T, 3].
@@ -428,7 +432,7 @@ def tangent(
             stiffer += pushes[t] * softening(stiff, inputs.reference, load)
             by_law = (stiffer, *d_law[1:7], d_law.breakaway_ratio)
             turn = three(turns[t])
-            interval = Interval(
+            interval = IntervalWithChanges(
                 stiff, by_law, three(twists[t]), turn, load, pushes[t], inputs.dt[t]
             )
             for k in range(blocks):
@@ -448,7 +452,7 @@ def tangent(
 
 
 def _entry(
-    inputs: Inputs, *arguments: Any, loop: Any, kind: Kind, numbers: int
+    inputs: Inputs, *arguments: Any, loop: Any, kind: BlockFunctions, numbers: int
 ) -> None:
     """Run a loop in new scratch memory."""
     loop(
@@ -459,7 +463,7 @@ def _entry(
     )
 
 
-def entry_of(loop: Any, kind: Kind, name: str, numbers: int = BLOCK) -> Any:
+def entry_of(loop: Any, kind: BlockFunctions, name: str, numbers: int = BLOCK) -> Any:
     """Return the entry point of a loop for a kind of cells, whose blocks have so many numbers; it takes the inputs and
     the arguments between these and the scratch memory."""
     return bind(

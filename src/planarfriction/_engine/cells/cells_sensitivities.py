@@ -16,7 +16,7 @@ from planarfriction._engine.cells.cell_blocks import (
     BLOCK,
     LANES,
     WEIGHT,
-    Kind,
+    BlockFunctions,
     Z,
     divided,
 )
@@ -68,12 +68,12 @@ class Interval(NamedTuple):
 
 
 @kernel
-def _change(kind: Kind, block: Doubles, n: int, i: int) -> Vector:
+def _change(kind: BlockFunctions, block: Doubles, n: int, i: int) -> Vector:
     return kind.vector(block, _CHANGE + kind.size * n * LANES + i, LANES)
 
 
 @kernel
-def _changes(kind: Kind, block: Doubles, i: int) -> tuple[Vector, ...]:
+def _changes(kind: BlockFunctions, block: Doubles, i: int) -> tuple[Vector, ...]:
     """Return the changes of bristle i, in the order of `_MOVING`."""
     first = (
         _change(kind, block, 0, i),
@@ -89,7 +89,9 @@ def _changes(kind: Kind, block: Doubles, i: int) -> tuple[Vector, ...]:
 
 
 @kernel
-def _bring_back(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
+def _bring_back(
+    kind: BlockFunctions, interval: Interval, block: Doubles, lanes: int
+) -> None:
     """Bring bristles back onto their limits (see `settle`), with their changes."""
     for i in range(lanes):
         z = kind.vector(block, Z + i, LANES)
@@ -102,7 +104,7 @@ def _bring_back(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> N
 
 
 @kernel
-def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
+def _push_one(kind: BlockFunctions, interval: Interval, block: Doubles, i: int) -> None:
     z = kind.vector(block, Z + i, LANES)
     u = kind.lever.seen(kind.lever.read(block, i, LANES), interval.twist)
     a, b, c, d, e, f = _changes(kind, block, i)
@@ -132,13 +134,15 @@ def _push_one(kind: Kind, interval: Interval, block: Doubles, i: int) -> None:
 
 
 @kernel
-def _push(kind: Kind, interval: Interval, block: Doubles, lanes: int) -> None:
+def _push(kind: BlockFunctions, interval: Interval, block: Doubles, lanes: int) -> None:
     for i in range(lanes):
         _push_one(kind, interval, block, i)
 
 
 @kernel
-def _total(kind: Kind, block: Doubles, lanes: int, load: float, n: int) -> Vector:
+def _total(
+    kind: BlockFunctions, block: Doubles, lanes: int, load: float, n: int
+) -> Vector:
     """Return the wrench of a block, n = 0, or its change with the number n - 1 of the law.
 
     The load is a factor inside the sum, so that sums over blocks round alike in compiled code and outside.
@@ -162,7 +166,7 @@ def _forget(block: Doubles) -> None:
 
 @kernel
 def _follow(
-    kind: Kind,
+    kind: BlockFunctions,
     inputs: Any,
     b: int,
     law: LawNumbers,
@@ -202,7 +206,7 @@ def _follow(
 
 @kernel
 def sensitivities(
-    kind: Kind,
+    kind: BlockFunctions,
     inputs: Any,
     span: tuple,
     z: np.ndarray,
@@ -223,7 +227,7 @@ def sensitivities(
         _read(w, Z, z[b], n, kind.size, _SIZE)
 
 
-def bound(functions: Kind, kind: CellKind, path: str) -> Any:
+def bound(functions: BlockFunctions, kind: CellKind, path: str) -> Any:
     """Return the entry point of a kind of cells; `path` leads to the law of one."""
     by = [(f"{path}.{each}", "z")[: 1 + (each in _MOVING)] for each in PARAMETERS]
     limited = [

@@ -89,7 +89,7 @@ class EdgeContact(NamedTuple):
 read = reader(EdgeContact)
 
 
-class Linear(NamedTuple):
+class EdgeLinearisation(NamedTuple):
     """Numbers at the beginning of a linearisation, before the numbers of the cells."""
 
     share: Doubles
@@ -98,7 +98,7 @@ class Linear(NamedTuple):
     """dW/dq at held bristles, [3, 3]."""
 
 
-_LINEAR = Layout(Linear, share=1, slopes=9)
+_LINEAR = Layout(EdgeLinearisation, share=1, slopes=9)
 _PLACES = _LINEAR.offsets
 OWN = _LINEAR.size
 

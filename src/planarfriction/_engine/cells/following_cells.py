@@ -64,7 +64,7 @@ class FollowingContact(NamedTuple):
     zero: Doubles
     """Zeros, [states]."""
     rows: Doubles
-    """Room for `protocol.Rows`."""
+    """Room for `protocol.ChangeRows`."""
     radius: float
     """Radius of gyration of the weights [m]."""
     centre_x: float
@@ -79,7 +79,7 @@ class FollowingContact(NamedTuple):
 read = reader(FollowingContact)
 
 
-class Linear(NamedTuple):
+class FollowingLinearisation(NamedTuple):
     """Numbers at the beginning of a linearisation, before the numbers of the cells."""
 
     by_x: Doubles
@@ -95,7 +95,9 @@ class Linear(NamedTuple):
     """dF_xy that the residual of the bristles causes, [2]."""
 
 
-_LINEAR = Layout(Linear, by_x=3, by_y=3, centre=2, inverse=4, stiffness=6, residual=2)
+_LINEAR = Layout(
+    FollowingLinearisation, by_x=3, by_y=3, centre=2, inverse=4, stiffness=6, residual=2
+)
 _PLACES = _LINEAR.offsets
 OWN = _LINEAR.size
 
@@ -167,14 +169,14 @@ def _pulls_to(record: FollowingContact, z: Doubles, w: Doubles, zdot: Doubles) -
 
 
 @kernel
-def _by_pressure(m: Linear, a: float, b: float) -> Vector:
+def _by_pressure(m: FollowingLinearisation, a: float, b: float) -> Vector:
     """Return `K (a, b)`."""
     return plus(times(a, three(m.by_x)), b, three(m.by_y))
 
 
 @kernel
 def _solved(
-    record: FollowingContact, m: Linear, r: Doubles, x: float, y: float
+    record: FollowingContact, m: FollowingLinearisation, r: Doubles, x: float, y: float
 ) -> Vector:
     """Return `N^-1 (T r_e - h (x, y))`."""
     x = record.lag * r[record.states] - record.height * x

@@ -139,7 +139,7 @@ def rows_of(record: Any, count: int, **columns: np.ndarray) -> np.ndarray:
     return rows
 
 
-class Packed:
+class StructBuffer:
     """A record, its words, and their address, which compiled functions take; it keeps the arrays alive."""
 
     def __init__(self, record: Any) -> None:

@@ -33,7 +33,12 @@ from planarfriction._engine.compiler.memory import (
     at,
     doubles,
 )
-from planarfriction._engine.coupled.coupling_rows import INVALID, Patches, Problem, read
+from planarfriction._engine.coupled.coupling_rows import (
+    INVALID,
+    ContactSolve,
+    Patches,
+    read,
+)
 from planarfriction._engine.coupled.coupling_steps import step_all, write_load_slopes
 from planarfriction._engine.coupled.following import follow
 
@@ -79,7 +84,7 @@ def _applied(m: Doubles, i: int, n: int, x: Doubles, start: float) -> float:
 
 
 @kernel
-def _size(patches: Patches, p: Problem, i: int) -> float:
+def _size(patches: Patches, p: ContactSolve, i: int) -> float:
     """Return the sum of the magnitudes of all that goes into element i of the twists."""
     size = abs(p.twist_0[i])
     for j in range(3 * patches.count):
@@ -88,7 +93,7 @@ def _size(patches: Patches, p: Problem, i: int) -> float:
 
 
 @kernel
-def _load(patches: Patches, p: Problem) -> None:
+def _load(patches: Patches, p: ContactSolve) -> None:
     """Write the loads that follow from the wrenches."""
     for k in range(patches.count):
         p.load[k] = xp.maximum(
@@ -97,7 +102,7 @@ def _load(patches: Patches, p: Problem) -> None:
 
 
 @kernel
-def _host(patches: Patches, p: Problem) -> None:
+def _host(patches: Patches, p: ContactSolve) -> None:
     """Write the twists and loads that follow from the wrenches."""
     n = 3 * patches.count
     for i in range(n):
@@ -106,7 +111,7 @@ def _host(patches: Patches, p: Problem) -> None:
 
 
 @kernel
-def _misfit(patches: Patches, p: Problem) -> float:
+def _misfit(patches: Patches, p: ContactSolve) -> float:
     """Return the difference of the twists and loads from those that the models' wrenches there cause [m/s].
 
     A load counts as the speed that all of it would cause as friction.
@@ -133,7 +138,7 @@ def _misfit(patches: Patches, p: Problem) -> float:
 
 
 @kernel
-def _write_rows(patches: Patches, p: Problem, k: int, keep_loads: bool) -> None:
+def _write_rows(patches: Patches, p: ContactSolve, k: int, keep_loads: bool) -> None:
     """Write the rows of patch k in the system of the Newton step, whose right-hand side is `change`."""
     n = 3 * patches.count
     a = p.response
@@ -161,7 +166,7 @@ def _write_rows(patches: Patches, p: Problem, k: int, keep_loads: bool) -> None:
 
 
 @kernel
-def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bool:
+def _newton(patches: Patches, p: ContactSolve, keep_loads: bool, falling: bool) -> bool:
     """Write the Newton step from the wrenches into `change` and `move`; return True if it leads downhill.
 
     `falling`: without the directions in which slopes rise. Twists and loads need not be those that the wrenches cause:
@@ -187,7 +192,7 @@ def _newton(patches: Patches, p: Problem, keep_loads: bool, falling: bool) -> bo
 
 
 @kernel
-def _downhill(patches: Patches, p: Problem) -> float:
+def _downhill(patches: Patches, p: ContactSolve) -> float:
     """Write `A dW` into `move`; return `A dW . (dW - dV.P dV)` with P as it is, rising directions and all."""
     n = 3 * patches.count
     move = p.move
@@ -208,7 +213,7 @@ def _downhill(patches: Patches, p: Problem) -> float:
 
 
 @kernel
-def _slope(patches: Patches, p: Problem) -> float:
+def _slope(patches: Patches, p: ContactSolve) -> float:
     """Return `A dW . s` at the wrenches."""
     total = 0.0
     for i in range(3 * patches.count):
@@ -230,7 +235,7 @@ def shortening_of(first: float, here: float) -> float:
 
 @kernel
 def _go(
-    patches: Patches, p: Problem, keep_loads: bool, whole: bool, careful: bool
+    patches: Patches, p: ContactSolve, keep_loads: bool, whole: bool, careful: bool
 ) -> None:
     """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far.
 
@@ -262,7 +267,7 @@ def _go(
 
 
 @kernel
-def _valid(patches: Patches, p: Problem, words: Doubles) -> bool:
+def _valid(patches: Patches, p: ContactSolve, words: Doubles) -> bool:
     """Return True if all inputs are in range, and none is negative that must not be."""
     valid = p.dt[0] >= 0.0
     for i in range(patches.row.records):
@@ -275,7 +280,7 @@ def _valid(patches: Patches, p: Problem, words: Doubles) -> bool:
 
 
 @kernel
-def prepare(patches: Patches, p: Problem) -> float:
+def prepare(patches: Patches, p: ContactSolve) -> float:
     """Write twists and loads without wrenches, and the scale; return the largest speed [m/s] that goes into a twist."""
     n = 3 * patches.count
     a = p.response
@@ -292,7 +297,7 @@ def prepare(patches: Patches, p: Problem) -> float:
 
 
 @kernel
-def _largest_speed(patches: Patches, p: Problem) -> float:
+def _largest_speed(patches: Patches, p: ContactSolve) -> float:
     """Write the models' wrenches; return the largest sum of speeds [m/s] that they and the host put into a twist."""
     largest = 0.0
     for i in range(3 * patches.count):
@@ -304,7 +309,7 @@ def _largest_speed(patches: Patches, p: Problem) -> float:
 
 
 @kernel
-def _start(patches: Patches, p: Problem, tolerance: float) -> tuple[float, bool]:
+def _start(patches: Patches, p: ContactSolve, tolerance: float) -> tuple[float, bool]:
     """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
     _host(patches, p)
     step_all(patches, p, patches.steps)
@@ -329,7 +334,7 @@ def _copy(
 
 
 @kernel
-def _restrain(patches: Patches, p: Problem) -> None:
+def _restrain(patches: Patches, p: ContactSolve) -> None:
     """Scale wrenches that did not converge, so that they do no more work than the bristles give.
 
     The models' wrenches W at their twists V take at least `-W.V dt` from the bristles; under `s W` the host moves at
@@ -362,7 +367,7 @@ def _restrain(patches: Patches, p: Problem) -> None:
 
 @kernel
 def _search(
-    patches: Patches, p: Problem, tolerance: float, most: int, careful: bool
+    patches: Patches, p: ContactSolve, tolerance: float, most: int, careful: bool
 ) -> tuple[float, bool]:
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
     misfit, rest = _start(patches, p, tolerance)
@@ -390,7 +395,7 @@ def _search(
 
 @kernel
 def find(
-    patches: Patches, p: Problem, rounding: float, most: int, again: bool
+    patches: Patches, p: ContactSolve, rounding: float, most: int, again: bool
 ) -> tuple[float, float]:
     """Solve from the wrenches, and `again` where that fails, with care and without them, for a longer time.
 

@@ -14,7 +14,7 @@ from planarfriction._engine.compiler.memory import (
 from planarfriction._engine.protocol import SLOPES
 
 
-class Problem(NamedTuple):
+class ContactSolve(NamedTuple):
     """A problem of k patches."""
 
     dt: Doubles
@@ -108,7 +108,7 @@ class Problem(NamedTuple):
     """Records of the patches among these whose points are cells."""
 
 
-Offsets = offsets_of(Problem)
+Offsets = offsets_of(ContactSolve)
 """Places of the arrays of a problem in its row."""
 
 INVALID = -1.0
@@ -119,7 +119,7 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     """Return the layout of rows for k patches, of so many `points` to share loads, and words of records to copy."""
     k = patches
     n = 3 * patches
-    shapes = dict.fromkeys(Problem._fields, n)
+    shapes = dict.fromkeys(ContactSolve._fields, n)
     shapes |= dict.fromkeys(
         ("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1
     )
@@ -137,7 +137,7 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
         ("response", "matrix"), n * n
     )
     return Layout(
-        Problem,
+        ContactSolve,
         **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3},
     )
 

@@ -8,7 +8,7 @@ from planarfriction._engine.codegen.vectors import clear
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.calls import call
 from planarfriction._engine.compiler.memory import Doubles, Integers, at
-from planarfriction._engine.coupled.coupling_rows import Patches, Problem
+from planarfriction._engine.coupled.coupling_rows import ContactSolve, Patches
 
 LOAD_STEP = 1e-6
 """Share of a load over which wrenches of a fixed stiffness are compared for their slope."""
@@ -27,7 +27,7 @@ def _bring_back(step: Doubles, dx: float, dy: float) -> None:
 
 @kernel
 def step_patch(
-    patches: Patches, p: Problem, functions: Integers, k: int, load: float
+    patches: Patches, p: ContactSolve, functions: Integers, k: int, load: float
 ) -> None:
     """Step patch k under a load, at the twist that it sees."""
     first = patches.firsts[k]
@@ -60,7 +60,7 @@ def step_patch(
 
 
 @kernel
-def write_load_slopes(patches: Patches, p: Problem) -> None:
+def write_load_slopes(patches: Patches, p: ContactSolve) -> None:
     """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
     for k in range(patches.count):
         one = 3 * k
@@ -79,7 +79,7 @@ def write_load_slopes(patches: Patches, p: Problem) -> None:
 
 
 @kernel
-def step_all(patches: Patches, p: Problem, functions: Integers) -> None:
+def step_all(patches: Patches, p: ContactSolve, functions: Integers) -> None:
     """Step all patches at the twists of a problem: write the new state and wrenches per unit load.
 
     `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.

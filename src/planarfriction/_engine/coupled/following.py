@@ -11,7 +11,7 @@ from planarfriction._engine.codegen.vectors import copy
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, Place, at, doubles, integers
-from planarfriction._engine.coupled.coupling_rows import Patches, Problem
+from planarfriction._engine.coupled.coupling_rows import ContactSolve, Patches
 
 
 @kernel
@@ -43,7 +43,7 @@ def _borne(
 
 @kernel
 def _press(
-    patches: Patches, p: Problem, problem_at: Place, k: int, n: int, first: int
+    patches: Patches, p: ContactSolve, problem_at: Place, k: int, n: int, first: int
 ) -> None:
     """Write the weights of the n points of patch k, which begin at `first`, or how far it moves as a whole."""
     x = at(patches.followers.x, first)
@@ -68,14 +68,14 @@ def _press(
 
 
 @kernel
-def hold(patches: Patches, p: Problem) -> None:
+def hold(patches: Patches, p: ContactSolve) -> None:
     """Keep the pressures of the last solution in further ones of the same step."""
     for k in range(patches.count):
         p.follows[k] = -abs(p.follows[k])
 
 
 @kernel
-def follow(patches: Patches, p: Problem, problem_at: Place) -> None:
+def follow(patches: Patches, p: ContactSolve, problem_at: Place) -> None:
     """Write the records that act in the problem, whose row is at `problem_at`, and how far patches move."""
     for k in range(patches.count):
         if p.follows[k] < 0.0:

@@ -33,8 +33,8 @@ from planarfriction._engine.compiler import jit, kernel
 from planarfriction._engine.published.published_contact import PublishedPatch
 from planarfriction._engine.published.published_step import (
     NAMES,
-    Contact,
     HeldTwist,
+    PublishedContactData,
     PublishedStep,
     hold_slopes,
     pull_back,
@@ -156,10 +156,14 @@ def _see_slopes(w: np.ndarray, inputs: Inputs, lanes: int, work: np.ndarray) -> 
 
 
 @kernel
-def _step(w: np.ndarray, c: int, dt: float) -> tuple[Contact, PublishedStep]:
+def _step(
+    w: np.ndarray, c: int, dt: float
+) -> tuple[PublishedContactData, PublishedStep]:
     row = gathered(w, _ROW + c, ABREAST, _NUMBERS)
     twist = _vector(w, _TWIST, c)
-    contact = Contact(LawNumbers(*row[:LAW]), PublishedPatch(*row[LAW:]), 0, 0)
+    contact = PublishedContactData(
+        LawNumbers(*row[:LAW]), PublishedPatch(*row[LAW:]), 0, 0
+    )
     drive = HeldTwist(twist, w[_OMEGA + c], norm(twist), _vector(w, _SLIDING, c))
     return contact, taped_step(contact, drive, _vector(w, _STATE, c), dt)
 
@@ -290,10 +294,10 @@ def gradient(
 
 
 @kernel
-def _contact(inputs: Inputs, row: np.ndarray) -> Contact:
+def _contact(inputs: Inputs, row: np.ndarray) -> PublishedContactData:
     """Return a contact from its row of numbers."""
     surface = inputs.shape.surface
-    return Contact(
+    return PublishedContactData(
         law_of(row),
         shape_of(row[LAW:]),
         (surface[0], surface[1], surface[2]),
@@ -303,7 +307,7 @@ def _contact(inputs: Inputs, row: np.ndarray) -> Contact:
 
 @kernel
 def _jacobian(
-    contact: Contact,
+    contact: PublishedContactData,
     z: Vector,
     twist: Vector,
     load: float,

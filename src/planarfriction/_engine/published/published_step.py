@@ -48,7 +48,7 @@ STILL = 1e-100
 shape_of = reader(PublishedPatch)
 
 
-class Contact(NamedTuple):
+class PublishedContactData(NamedTuple):
     """A contact as the functions of a model see it."""
 
     law: tuple
@@ -103,7 +103,7 @@ def scaled_twist(shape: PublishedPatch, twist: Vector) -> Vector:
 
 
 @kernel
-def hold(contact: Contact, twist: Vector) -> HeldTwist:
+def hold(contact: PublishedContactData, twist: Vector) -> HeldTwist:
     """Return `HeldTwist` at a twist."""
     surface = contact.surface
     scaled = scaled_twist(contact.shape, twist)
@@ -123,7 +123,7 @@ def hold(contact: Contact, twist: Vector) -> HeldTwist:
 
 @kernel
 def hold_slopes(
-    contact: Contact, twist: Vector, work: Doubles
+    contact: PublishedContactData, twist: Vector, work: Doubles
 ) -> tuple[HeldTwist, Vector]:
     """Return `HeldTwist`, and `du/dV_S` row by row."""
     drive = hold(contact, twist)
@@ -176,7 +176,7 @@ _back = DERIVATIVE.back
 
 @kernel
 def taped_step(
-    contact: Contact, drive: HeldTwist, z: Vector, dt: float
+    contact: PublishedContactData, drive: HeldTwist, z: Vector, dt: float
 ) -> PublishedStep:
     """Return `PublishedStep` from the raw state z."""
     (new, wrench), tape = _forth(
@@ -187,7 +187,11 @@ def taped_step(
 
 @kernel
 def pull_back(
-    contact: Contact, step: PublishedStep, slopes: Vector, new: Vector, wrench: Vector
+    contact: PublishedContactData,
+    step: PublishedStep,
+    slopes: Vector,
+    new: Vector,
+    wrench: Vector,
 ) -> Cotangents:
     """Return `Cotangents` from the cotangents of the new state and of the wrench."""
     shape = contact.shape
@@ -218,7 +222,7 @@ def _spins(record: PublishedContact) -> float:
 
 
 @kernel
-def read(contact: Place) -> tuple[PublishedContact, Contact]:
+def read(contact: Place) -> tuple[PublishedContact, PublishedContactData]:
     """Return the record of a contact, and the contact about its centre of pressure, in the axes of its metric.
 
     A point slides as a patch of any size does that does not spin.
@@ -229,7 +233,7 @@ def read(contact: Place) -> tuple[PublishedContact, Contact]:
     shape = PublishedPatch(
         0.0, 0.0, xp.where(spins > 0.0, radius, 1.0), spins * record.shape.second_moment
     )
-    return record, Contact(
+    return record, PublishedContactData(
         record.law, shape, (record.kind, 0, record.size), record.data
     )
 

@@ -276,7 +276,7 @@ class Asking:
 
 
 class CouplingRow(SimpleNamespace):
-    """Arrays of a `coupled.coupling_rows.Problem`, solved in place: a step of Drake has no time for more."""
+    """Arrays of a `coupled.coupling_rows.ContactSolve`, solved in place: a step of Drake has no time for more."""
 
     def __init__(self, coupled: CoupledPatches, shadow: Shadow) -> None:
         words = coupled._blank_problem(shadow.follows)

@@ -489,7 +489,7 @@ class Friction:
             for (_, follow, at), model in groups
         ]
 
-    def _unit(self, own: _Own, pressed, shift, states, dt) -> newton.Unit:
+    def _unit(self, own: _Own, pressed, shift, states, dt) -> newton.UnitLoadFriction:
         """Return the friction of steps, per unit load; that of a fixed stiffness depends on the loads."""
         by_load = any(model.reference_load is not None for model in own.models)
 
@@ -500,7 +500,7 @@ class Friction:
                 / load[:, None]
             )
 
-        return newton.Unit(wrench, by_load)
+        return newton.UnitLoadFriction(wrench, by_load)
 
     def _evaluate(
         self, own: _Own, pressed, shift, states, twist, load, dt

@@ -36,7 +36,7 @@ ROUNDING_SINGLE = 1e-5
 What a body moves, its bristles give, to the last digit; so a held body does not creep however large this is."""
 
 
-class Unit(NamedTuple):
+class UnitLoadFriction(NamedTuple):
     """Friction of the models' steps."""
 
     wrench: Callable[[jax.Array, jax.Array], jax.Array]
@@ -110,7 +110,7 @@ class _Round(NamedTuple):
 class _Search(NamedTuple):
     """Search for the wrenches of one step."""
 
-    unit: Unit
+    unit: UnitLoadFriction
     host: HostResponse
     lever: jax.Array
     """Factors `[k, 3]` that make speeds of twists: 1, 1 and the radius of the patch [m]."""
@@ -237,7 +237,7 @@ class _Search(NamedTuple):
 
 
 def solve(
-    unit: Unit,
+    unit: UnitLoadFriction,
     host: HostResponse,
     guess: jax.Array,
     radius: jax.Array,
@@ -267,7 +267,7 @@ def solve(
     return Solved(end.wrench, end.iterations, end.best, end.best <= near)
 
 
-def fitting(unit: Unit, host: HostResponse, found: jax.Array) -> jax.Array:
+def fitting(unit: UnitLoadFriction, host: HostResponse, found: jax.Array) -> jax.Array:
     """Return the wrenches `found`, with the derivatives of `w(V, N) - W = 0` by all that is in `unit` and `host`."""
 
     def gap(w):

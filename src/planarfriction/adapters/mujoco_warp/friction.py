@@ -309,7 +309,9 @@ class Friction:
             "moments": (k, 2),
             "state": self.coupled.state_shape,
         }
-        self._problem = p = zeros(geometry.Problem, (k, 3), load=(k,), **wide)
+        self._problem = p = zeros(
+            geometry.ContactSolveArrays, (k, 3), load=(k,), **wide
+        )
         self._host = HostStep(
             p.twist, p.load, p.guess, p.response, p.load_response, p.moments
         )
@@ -356,14 +358,14 @@ class Friction:
             ]
         }
         found |= {"surface": surface_velocities(self.m, self.placed).astype(np.float32)}
-        kinds = geometry.Patches.vars
+        kinds = geometry.PatchArrays.vars
         device = self.coupled.device
         arrays = {
             name: wp.array(each, dtype=kinds[name].type.dtype, device=device)
             for name, each in found.items()
         }
         return _filled(
-            geometry.Patches(),
+            geometry.PatchArrays(),
             arrays | {"count": len(shapes), "states": self.coupled.state_shape[0]},
         )
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from planarfriction.joints import JointLog
 from planarfriction.joints.loops.runs import run_plant
-from planarfriction.joints.problem import TERMS, Problem, friction_of
+from planarfriction.joints.problem import TERMS, JointFitProblem, friction_of
 from planarfriction_studies.measured.joints import PENDULUM, read_logs
 
 STEP = 1e-4
@@ -71,7 +71,7 @@ def synthetic_joint(
     }
     for term in terms:
         values |= more[term]
-    problem = Problem(tuple(recorded), PENDULUM, None, terms)
+    problem = JointFitProblem(tuple(recorded), PENDULUM, None, terms)
     scatter = np.array([rng.uniform(*each) for each in (SPREAD, SUPPLY, WANDERS)])
     return SyntheticJoint(
         terms, values, [_moved(problem, values, log, scatter, rng) for log in recorded]
@@ -79,7 +79,7 @@ def synthetic_joint(
 
 
 def _moved(
-    problem: Problem,
+    problem: JointFitProblem,
     values: dict[str, float],
     log: JointLog,
     scatter: np.ndarray,

@@ -127,7 +127,7 @@ class Scratch(NamedTuple):
     """Memory that a step works with."""
 
     problem: Doubles
-    """Words of a `coupling_rows.Problem`."""
+    """Words of a `coupling_rows.ContactSolve`."""
     records: Integers
     """Records of the patches with the laws of the model (see `models.write_laws`)."""
     jacobian: Doubles

@@ -30,7 +30,7 @@ from planarfriction._engine.compiler.memory import (
     integers32,
 )
 from planarfriction._engine.coupled.coupling import shortening_of, too_far
-from planarfriction._engine.coupled.coupling_rows import Problem
+from planarfriction._engine.coupled.coupling_rows import ContactSolve
 from planarfriction._engine.coupled.coupling_rows import read as read_patches
 from planarfriction._engine.coupled.coupling_steps import step_all
 from planarfriction._engine.coupled.following import hold
@@ -65,7 +65,7 @@ INSTALLED, _installed = shared_word("planarfriction_mujoco")
 
 class _Own(NamedTuple):
     host: Host
-    problem: Problem
+    problem: ContactSolve
     scratch: Scratch
     kept: Remembered
 

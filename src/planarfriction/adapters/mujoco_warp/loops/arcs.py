@@ -5,7 +5,7 @@
 import warp as wp
 
 from planarfriction._engine.coupled import placing
-from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, Patches
+from planarfriction.adapters.mujoco_warp.loops.geometry import Frames, Host, PatchArrays
 
 gained = wp.func(placing.bend)
 
@@ -51,7 +51,7 @@ def over_centre(host: Host, w: int, move: wp.vec3, body: int, geom: int) -> wp.v
 
 
 @wp.kernel(enable_backward=False)
-def bend(patches: Patches, host: Host, frames: Frames):
+def bend(patches: PatchArrays, host: Host, frames: Frames):
     """Add to the drifts what patches move in the step, per dt, beyond their twists at its velocities.
 
     Points of what turns go along arcs: to second order, `x_1 - x_0 = dt J v + dt^2 / 2 Jdot v`. The contact moves on,

@@ -10,10 +10,10 @@ import warp as wp
 from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco.loops.centres import FOLLOWS
 from planarfriction.adapters.mujoco_warp.loops.geometry import (
+    ContactSolveArrays,
     Frames,
     Host,
-    Patches,
-    Problem,
+    PatchArrays,
 )
 
 excess = wp.func(placing.excess)
@@ -32,10 +32,10 @@ def speed_of(host: Host, frames: Frames, w: int, p: int) -> float:
 
 @wp.kernel(enable_backward=False)
 def follow_centres(
-    patches: Patches,
+    patches: PatchArrays,
     host: Host,
     frames: Frames,
-    problem: Problem,
+    problem: ContactSolveArrays,
     parameters: wp.array2d(dtype=float),
 ):
     """Move origins towards the centres of the contact forces, as far as bodies move on each other, and note them.

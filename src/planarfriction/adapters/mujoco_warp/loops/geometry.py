@@ -19,7 +19,7 @@ x_axis = wp.func(placing.x_axis_with(wp.where))
 
 
 @wp.struct
-class Patches:
+class PatchArrays:
     """Patches of a model: `count` and arrays [k]."""
 
     count: int
@@ -98,7 +98,7 @@ class Host:
 
 
 @wp.struct
-class Problem:
+class ContactSolveArrays:
     """Problem in contact space of all worlds (see `coupling.HostStep`), with the state at the start of the step."""
 
     state: wp.array2d(dtype=float)
@@ -151,11 +151,11 @@ Places = wp.struct(
 
 @wp.kernel(enable_backward=False)
 def recall(
-    patches: Patches,
+    patches: PatchArrays,
     at: Places,
     host: Host,
     frames: Frames,
-    problem: Problem,
+    problem: ContactSolveArrays,
     memory: wp.array2d(dtype=float),
 ):
     """Bring states, guesses and origins to the times of the worlds: those of the last step's end, or of its start."""
@@ -222,7 +222,7 @@ def drift_of(
 
 
 @wp.func
-def touch(patches: Patches, host: Host, frames: Frames, w: int, p: int, nefc: int):
+def touch(patches: PatchArrays, host: Host, frames: Frames, w: int, p: int, nefc: int):
     """Mark the rows of a patch's contacts; return the sums of their normals and places, and their number."""
     normal = wp.vec3()
     middle = wp.vec3()
@@ -246,7 +246,9 @@ def touch(patches: Patches, host: Host, frames: Frames, w: int, p: int, nefc: in
 
 
 @wp.func
-def is_curved(patches: Patches, host: Host, w: int, p: int, normal: wp.vec3) -> bool:
+def is_curved(
+    patches: PatchArrays, host: Host, w: int, p: int, normal: wp.vec3
+) -> bool:
     """Return True if a patch lies on a curved side, of either geom."""
     sides = patches.curved[p]
     if (sides & wp.static(placing.ROUND)) != 0:
@@ -260,7 +262,12 @@ def is_curved(patches: Patches, host: Host, w: int, p: int, normal: wp.vec3) -> 
 
 @wp.func
 def carry(
-    patches: Patches, problem: Problem, w: int, p: int, cosine: float, sine: float
+    patches: PatchArrays,
+    problem: ContactSolveArrays,
+    w: int,
+    p: int,
+    cosine: float,
+    sine: float,
 ):
     """Write bristles and guess of a patch in its axes of this step instead of the last ones, if there are any."""
     if cosine != 1.0 or sine != 0.0:
@@ -279,10 +286,10 @@ def carry(
 
 @wp.func
 def write_rows(
-    patches: Patches,
+    patches: PatchArrays,
     host: Host,
     frames: Frames,
-    problem: Problem,
+    problem: ContactSolveArrays,
     w: int,
     p: int,
     origin: wp.vec3,
@@ -309,7 +316,9 @@ def write_rows(
 
 
 @wp.kernel(enable_backward=False)
-def place(patches: Patches, host: Host, frames: Frames, problem: Problem):
+def place(
+    patches: PatchArrays, host: Host, frames: Frames, problem: ContactSolveArrays
+):
     """Write the frames of the patches, the Jacobian of their twists, and add the guesses to the passive forces."""
     w = wp.tid()
     nv = frames.jacobian.shape[2]

@@ -11,11 +11,11 @@ import warp as wp
 
 from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco_warp.loops.geometry import (
+    ContactSolveArrays,
     Frames,
     Host,
-    Patches,
+    PatchArrays,
     Places,
-    Problem,
 )
 
 EQUALITY = wp.constant(int(mujoco.mjtConstraint.mjCNSTR_EQUALITY))
@@ -210,7 +210,13 @@ def gain(host: Host, s: Scratch, w: int, dt: wp.float64):
 
 @wp.func
 def write_twists(
-    host: Host, frames: Frames, s: Scratch, out: Problem, w: int, n: int, dt: wp.float64
+    host: Host,
+    frames: Frames,
+    s: Scratch,
+    out: ContactSolveArrays,
+    w: int,
+    n: int,
+    dt: wp.float64,
 ):
     """Write the twists at the end of the step and their response."""
     for c in range(n):
@@ -230,11 +236,11 @@ def write_twists(
 
 @wp.func
 def write_loads(
-    patches: Patches,
+    patches: PatchArrays,
     host: Host,
     frames: Frames,
     s: Scratch,
-    out: Problem,
+    out: ContactSolveArrays,
     w: int,
     nefc: int,
     first_pass: int,
@@ -271,11 +277,11 @@ def write_loads(
 
 @wp.kernel(enable_backward=False)
 def respond(
-    patches: Patches,
+    patches: PatchArrays,
     host: Host,
     frames: Frames,
     s: Scratch,
-    out: Problem,
+    out: ContactSolveArrays,
     first_pass: int,
 ):
     """Write twists, loads and their responses; first with the constraints that MuJoCo's solver has found."""
@@ -311,7 +317,7 @@ def settle(
     host: Host,
     frames: Frames,
     s: Scratch,
-    problem: Problem,
+    problem: ContactSolveArrays,
     wrench: wp.array3d(dtype=float),
     rounds: wp.array(dtype=int),
 ):
@@ -343,12 +349,12 @@ def settle(
 
 @wp.kernel(enable_backward=False)
 def remember(
-    patches: Patches,
+    patches: PatchArrays,
     at: Places,
     host: Host,
     frames: Frames,
     s: Scratch,
-    problem: Problem,
+    problem: ContactSolveArrays,
     state: wp.array2d(dtype=float),
     wrench: wp.array3d(dtype=float),
     twist: wp.array3d(dtype=float),
