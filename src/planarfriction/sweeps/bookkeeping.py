@@ -156,11 +156,11 @@ class Bookkeeper:
         }
         for index in sorted(done):
             self._place(index, _over(done[index], time), first, arrays)
-        variables: dict[str, Any] = {name: first[name] for name in axes}
+        variables: dict[str, Any] = {}
         for name, values in arrays.items():
             dims = (*self.grid.labels, *first[name].dims)
             variables[name] = History(dims, values, first[name].attrs)
-        return variables
+        return variables | {name: first[name] for name in axes}
 
     def _empty(self, example: History, done: int) -> np.ndarray:
         """Return an array for all runs, of which some are `done`, whose entries say that they are missing."""
