@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction._engine.cells.rollouts import Inputs, ShapesByLoad
 from planarfriction._engine.compiler import threads
 from planarfriction._support import validation
-from planarfriction.derivatives.parameters import RolloutInputs, pack
+from planarfriction.derivatives.parameters import PackedRollout, pack
 from planarfriction.errors import InvalidValueError
 
 _WORTH_A_THREAD = 20_000
@@ -24,7 +24,7 @@ LIGHTEST = 1e-9
 class RolloutInputs(NamedTuple):
     """Checked inputs; B contacts in all, one row where all contacts share an input."""
 
-    model: RolloutInputs
+    model: PackedRollout
     rows: np.ndarray
     """Numbers of law and shape, `[B or 1, N]`."""
     state: np.ndarray

@@ -75,7 +75,7 @@ def _cells(size: int, turned: bool, leans: bool) -> RolloutFunctions:
     )
 
 
-class RolloutInputs(NamedTuple):
+class PackedRollout(NamedTuple):
     """A model as compiled loops see it."""
 
     family: RolloutFunctions
@@ -116,13 +116,13 @@ def parameters_of(model: Any) -> np.ndarray:
     return packed.rows[packed.family.columns]
 
 
-def pack(model: Any, parameters: Any = None) -> RolloutInputs:
+def pack(model: Any, parameters: Any = None) -> PackedRollout:
     """Return a model as compiled loops see it, with `parameters` `[..., P]` if given, else its own.
 
     A friction coefficient `mu_s` below `mu_c`, which a law refuses, is let through: the formulas are smooth there.
     A model that is packed already, as the tensor front ends hold them, is taken as it is.
     """
-    packed = model if isinstance(model, RolloutInputs) else _packed(model)
+    packed = model if isinstance(model, PackedRollout) else _packed(model)
     if parameters is None:
         return packed
     values = _checked(parameters, packed.family.names)
@@ -169,7 +169,7 @@ def _refusal(model: Any) -> tuple[str, str, Any] | None:
     )
 
 
-def _packed(model: Any) -> RolloutInputs:
+def _packed(model: Any) -> PackedRollout:
     family = _family(model)
     model = model.reduction
     refusal = _refusal(model)
@@ -179,7 +179,7 @@ def _packed(model: Any) -> RolloutInputs:
     if isinstance(model, DistributedModel):
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
-        return RolloutInputs(
+        return PackedRollout(
             family,
             np.array(law),
             shapes,
@@ -196,9 +196,9 @@ def _packed(model: Any) -> RolloutInputs:
 
 def _on_surface(
     row: np.ndarray, kind: int, size: int, data: np.ndarray, axes: np.ndarray | None
-) -> RolloutInputs:
+) -> PackedRollout:
     none = np.zeros((1, 0))
-    return RolloutInputs(
+    return PackedRollout(
         PUBLISHED, row, ShapesByLoad(np.array([kind, 0, size]), none, none, data), axes
     )
 
@@ -209,7 +209,7 @@ def pack_surface(
     size: int,
     data: np.ndarray,
     root: np.ndarray | None = None,
-) -> RolloutInputs:
+) -> PackedRollout:
     """Return a `ReducedModelPublished` by its limit surface, for rollouts at given parameters of law and shape."""
     row = np.array(
         [*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)]
@@ -223,7 +223,7 @@ def pack_cells(
     weights: np.ndarray,
     positions: np.ndarray,
     reference: Any = 0.0,
-) -> RolloutInputs:
+) -> PackedRollout:
     """Return a `DistributedModel` by its cells and their weights `[..., N]`, for rollouts at given parameters.
 
     `positions` are `[2, N]`, levers `[5, N]`, or these with an asymmetry behind them `[7, N]`; of discs `[3, N]`,
@@ -241,7 +241,7 @@ def pack_cells(
     shapes = cells_by_load(levers, rows[:1] if same else rows, None)
     law = np.array(_any_law(elasto_plastic))
     batch = () if same else weights.shape[:-1]
-    return RolloutInputs(
+    return PackedRollout(
         family, law, shapes, inner=inner, reference=float(reference), batch=batch
     )
 

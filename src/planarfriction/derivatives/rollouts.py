@@ -25,7 +25,7 @@ from planarfriction.derivatives.inputs import (
     share,
     sum_to,
 )
-from planarfriction.derivatives.parameters import RolloutInputs, is_compiled, pack
+from planarfriction.derivatives.parameters import PackedRollout, is_compiled, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.models import FrictionModel
@@ -129,7 +129,7 @@ def rollout(
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
     them.
     """
-    if not isinstance(model, FrictionModel | RolloutInputs):
+    if not isinstance(model, FrictionModel | PackedRollout):
         raise InvalidValueError(
             "model", f"be a friction model ({MODELS.classes()})", type(model).__name__
         )
@@ -221,7 +221,7 @@ def rollout_vjp(
 
 
 def weights_vjp(
-    model: RolloutInputs, state: Any, twist: Any, normal_force: Any, dt: Any, wrenches_bar: Any, weights: np.ndarray, *,
+    model: PackedRollout, state: Any, twist: Any, normal_force: Any, dt: Any, wrenches_bar: Any, weights: np.ndarray, *,
     parameters: Any = None, states: Any = None,
 ) -> np.ndarray:  # fmt: skip
     """Compute the gradient of `sum(wrenches_bar wrenches)` of a `rollout` by the `weights` `[..., N]` of its cells.
@@ -371,7 +371,7 @@ def _on_the_way(inputs: RolloutInputs, states: Any) -> np.ndarray:
 
 
 def _differentiate(
-    model: RolloutInputs, inputs: Inputs, z: np.ndarray, out: Derivatives
+    model: PackedRollout, inputs: Inputs, z: np.ndarray, out: Derivatives
 ) -> None:
     """Run rollouts with their derivatives by numbers of the model: contacts, or the blocks of one, on threads."""
     run = model.family.sensitivities

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from planarfriction._support.equality import ByValue, by_parts
 from planarfriction.derivatives.parameters import (
     PARAMETERS,
-    RolloutInputs,
+    PackedRollout,
     pack_cells,
     pack_surface,
 )
@@ -53,7 +53,7 @@ class DistributedModel(FrictionPytree, CellsModel):
         self.parameters = record_of(LawParameters, law.numbers._asdict())
         self.positions, self.weights, self.remainder = map(jnp.asarray, cells)
 
-    def compiled(self) -> RolloutInputs:
+    def compiled(self) -> PackedRollout:
         """Return the model as compiled rollouts take it."""
         reference = self.reference_load or 0.0
         return pack_cells(self.elasto_plastic, self.weights, self.positions, reference)  # pyright: ignore
@@ -119,7 +119,7 @@ class ReducedModelPublished(FrictionPytree, PublishedModel):
             None if patch.root is None else jnp.asarray(shape.root),
         )
 
-    def compiled(self) -> RolloutInputs:
+    def compiled(self) -> PackedRollout:
         """Return the model as compiled rollouts take it."""
         s = self.surface
         return pack_surface(self.elasto_plastic, s.kind, s.size, s.data, s.root)  # pyright: ignore[reportArgumentType]

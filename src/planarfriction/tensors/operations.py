@@ -15,7 +15,7 @@ import numpy as np
 
 from planarfriction import derivatives
 from planarfriction._support.equality import by_parts
-from planarfriction.derivatives.parameters import RolloutInputs
+from planarfriction.derivatives.parameters import PackedRollout
 from planarfriction.derivatives.rollouts import weights_vjp
 from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.errors import InvalidValueError
@@ -35,7 +35,7 @@ class RolloutOperation(NamedTuple):
     """Last state and wrenches of a rollout, of state, twist, load, parameters and any weights; `held` is `dt` and the
     buffers."""
 
-    pack: Callable[..., RolloutInputs]
+    pack: Callable[..., PackedRollout]
     """Function that makes the parts of the model from weights of cells, if there are any, and the buffers."""
     axes: int
     """Axes of the state of a contact."""

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction._support import validation
-from planarfriction.derivatives.parameters import RolloutInputs
+from planarfriction.derivatives.parameters import PackedRollout
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.patch import ContactPatch
@@ -132,7 +132,7 @@ class FrictionModule(TensorModel, nn.Module):
 
     def compiled(
         self,
-    ) -> tuple[Callable[..., RolloutInputs], tuple[Tensor, ...], tuple[Tensor, ...]]:
+    ) -> tuple[Callable[..., PackedRollout], tuple[Tensor, ...], tuple[Tensor, ...]]:
         """Return the model as compiled rollouts take it: a function of arrays, its buffers, and the weights of cells.
 
         The function packs the model from the weights, if there are cells, and the buffers.

@@ -206,7 +206,10 @@ def forward_passes(kind: CellKind) -> Passes:
 
 
 def step_passes(kind: CellKind) -> Passes:
-    """Write the step of cells in `CellRows`; the new bristles may go where the old ones are, so they are written last."""
+    """Write the step of cells in `CellRows`.
+
+    The new bristles may go where the old ones are, so they are written last.
+    """
     element = kind.element
     stores = _rows("new", "out", kind.element.size)
     sources = _in_rows(kind) | stores
@@ -302,7 +305,10 @@ def rate_passes(kind: CellKind) -> Passes:
 
 
 def slope_passes(kind: CellKind) -> Passes:
-    """Write the derivatives of the rates of cells in `CellRows` by state and velocity, and of tractions unless linear."""
+    """Write the derivatives of the rates of cells in `CellRows` by state and velocity.
+
+    Those of tractions too, unless the bristle is linear.
+    """
     element = kind.element
     written = derive(element.evaluate, ("z", "u"), kind.lengths)
     count = element.size if kind.linear else 2 * element.size

@@ -321,8 +321,8 @@ def gradient(
 
 @kernel
 def shares(
-    kind: BlockFunctions, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...], out: np.ndarray,
-    scratch: np.ndarray,
+    kind: BlockFunctions, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...],
+    out: np.ndarray, scratch: np.ndarray,
 ) -> None:  # fmt: skip
     """Write the cotangents of the weights of cells, from those of the wrenches [B or 1, T, 3], to `out` [B, n].
 
