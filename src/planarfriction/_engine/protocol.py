@@ -79,7 +79,8 @@ class ModelFunctions(NamedTuple):
     """`(contact, z, z', lin, dz, dz', rows, friction, size)`: write the changes of z' and of the wrench.
 
     `rows` are `ChangeRows` that hold V, W, dV and take dW. The changes come from `dz`, `dV` and from relative changes
-    of all coefficients of friction and of the size of the patch. None: the model takes no part in derivatives of scenes."""
+    of all coefficients of friction and of the size of the patch. None: the model takes no part in derivatives of
+    scenes."""
     solve_transposed: Any = None
     """`(contact, z, r, lin, out)`: solve `D' out = r` with the D that `factor` prepared."""
     pull_back: Any = None
