@@ -243,7 +243,7 @@ def test_laws_by_kind(tmp_path, table, law):
         ),
         (
             "law = {}\nmodel = { kind = 'reduced', parts = 4 }\n",
-            "[contact.model]: parts must be left out: write cells=, the number of discs, got 4",
+            "[contact.model]: unknown key 'parts' (valid: kind, cells)",
         ),
     ],
 )

@@ -159,7 +159,11 @@ def test_a_table_is_read_in_little_more_memory_than_its_numbers(tmp_path):
 
 
 def test_pipes_have_a_largest_size():
-    code = "from planarfriction import reading\nreading.MOST_TEXT = 100_000\nreading.read_text('/dev/stdin', 'a text')"
+    code = (
+        "from planarfriction._support import reading\n"
+        "reading.MOST_TEXT = 100_000\n"
+        "reading.read_text('/dev/stdin', 'a text')"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code],
         input=100_001 * "a",

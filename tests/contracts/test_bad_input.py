@@ -542,10 +542,6 @@ def test_what_was_unchecked(call, message):
             "segments must be at most",
         ),
         (
-            lambda: pf.ReducedModel(SQUARE, pf.LuGre(), parts=4),
-            "parts must be left out: write cells=",
-        ),
-        (
             lambda: pf.ReducedModel(SQUARE, pf.LuGre(), cells=0),
             "cells must be an integer >= 1, got 0",
         ),
