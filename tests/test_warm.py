@@ -15,7 +15,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import warm
-from planarfriction._engine.compiler import notice, threads
+from planarfriction._engine.compiler import messages, threads
 from planarfriction.families import MODELS
 
 COUNTING = """
@@ -115,7 +115,7 @@ def test_the_first_function_that_is_compiled_says_so(
 ):
     """Once, to somebody who waits; functions of users say nothing."""
     monkeypatch.setattr(sys, "stderr", stream())
-    monkeypatch.setattr(notice._Said, "done", False)
+    monkeypatch.setattr(messages._Said, "done", False)
     for _ in range(2):
         function = lambda x: x + 1.0
         function.__module__ = module

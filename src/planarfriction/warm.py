@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction import coupling, derivatives, joints, limit_surface, models
-from planarfriction._engine.compiler import threads, together
-from planarfriction._engine.compiler.notice import expect_compilation, watched
+from planarfriction._engine.compiler import parallel, threads
+from planarfriction._engine.compiler.messages import expect_compilation, watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metric
@@ -41,7 +41,7 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
     parts = _parts()
     times = {}
     code = "from planarfriction import warm; warm.serve()"
-    with together.Crew(
+    with parallel.Crew(
         code, range(len(parts)), processes=threads.processors() - 1
     ) as crew:
         for job, (words, work) in enumerate(parts.items()):
@@ -63,7 +63,7 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
 def serve() -> None:
     """Compile parts for another process."""
     parts = list(_parts().values())
-    together.serve(lambda job: parts[job]())
+    parallel.serve(lambda job: parts[job]())
 
 
 def _show(words: str) -> None:

@@ -15,7 +15,7 @@ from planarfriction._engine.bristles.points import step as cell
 from planarfriction._engine.codegen.derivatives import derive, forward, forwards
 from planarfriction._engine.codegen.ratios import per
 from planarfriction._engine.codegen.rules import NotStraightError, primitive
-from planarfriction._engine.codegen.twins import twin
+from planarfriction._engine.codegen.symbolic_functions import twin
 from planarfriction._engine.codegen.vectors import dot, norm, plus, square, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel

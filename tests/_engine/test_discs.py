@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from planarfriction import ContactPatch, DistributedModel, LuGre, formulas
 from planarfriction._engine.bristles import discs, points
-from planarfriction._engine.cells import cell_passes, cells
+from planarfriction._engine.cells import cell_loops, cells
 from planarfriction._engine.cells.cell_blocks import LANES
-from planarfriction._engine.codegen.twins import twin
+from planarfriction._engine.codegen.symbolic_functions import twin
 
 LAW = LuGre(
     mu_c=1.0,
@@ -167,7 +167,7 @@ def test_passes_step_as_the_function_they_come_from(count):
 
 def test_passes_hand_little_on():
     """A pass that handed on everything would leave the nearest cache: 64 lanes of 12 rows are 6 kB."""
-    written = cell_passes.forward_passes(cell_passes.KINDS[3, False, False])
+    written = cell_loops.forward_passes(cell_loops.KINDS[3, False, False])
     assert written.rows <= 24
-    assert written.source.count("def pass_") == cell_passes.DISC.forward[0]
+    assert written.source.count("def pass_") == cell_loops.DISC.forward[0]
     assert LANES * written.rows * 8 <= 16384

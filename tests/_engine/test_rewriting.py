@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
-from planarfriction._engine.codegen.rewriting import Rewriting
+from planarfriction._engine.codegen.rebinding import Rewriting
 
 
 def inner() -> str:

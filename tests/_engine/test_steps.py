@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from planarfriction._engine.bristles import bristle_step, leaning_cells, points
+from planarfriction._engine.bristles import asymmetric_cells, bristle_step, points
 from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.published import published_step
 from planarfriction._engine.published.published_contact import PublishedPatch
@@ -31,7 +31,7 @@ BRISTLE = derive(
     {"z": 2, "u": 2},
 )
 CELL = derive(points.step, ("z", "u"), {"z": 2, "u": 2})
-LEANING = derive(leaning_cells.step, ("z", "u"), {"lean.a": 2, "z": 2, "u": 2})
+LEANING = derive(asymmetric_cells.step, ("z", "u"), {"lean.a": 2, "z": 2, "u": 2})
 
 TURNS = 0.0, 1e-8, 1e-4, 0.5, 1.0, 0.5 * math.pi, 3.0, math.pi - 1e-8
 """Angles between a bristle and its velocity [rad]."""
@@ -95,7 +95,7 @@ def test_derivatives_of_a_cell(law):
         u = _turned(v, direction + rng.choice(TURNS))
         return max(
             misfit(CELL, (law, z, u, dt := _far(rng) / (v * GRIP))),
-            misfit(LEANING, (leaning_cells.Leaning(law, (0.2, 0.1)), z, u, dt)),
+            misfit(LEANING, (asymmetric_cells.Leaning(law, (0.2, 0.1)), z, u, dt)),
         )
 
     assert _worst(draw) < 1e-8

@@ -240,7 +240,7 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     parts = run.friction._parts
     own = run.own.get_discrete_state_vector().value().copy()
     before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
-    monkeypatch.setattr("planarfriction.adapters.drake.asking.MISFIT", 1.0)
+    monkeypatch.setattr("planarfriction.adapters.drake.coupled_step.MISFIT", 1.0)
     shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
     asked = asking.step(
         np.zeros(6), *before, given, own[parts["axes"]], own[parts["answers"]]

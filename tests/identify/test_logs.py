@@ -14,7 +14,7 @@ from planarfriction.identify.checks import Sliding
 from planarfriction.identify.logs import is_mean, unwrapped
 from planarfriction.identify.options import FitOptions
 from planarfriction.identify.problem import LogProblem
-from planarfriction.identify.rig import wrench_noise
+from planarfriction.identify.sensor_errors import wrench_noise
 from tests.support.identification_logs import (
     LAW,
     LOAD,

@@ -13,8 +13,8 @@ import planarfriction as pf
 from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.identify import Log, search
 from planarfriction.identify.parameters import scaled_patch
-from planarfriction.identify.rig import jitter, smoothed
 from planarfriction.identify.search import condensed
+from planarfriction.identify.sensor_errors import jitter, smoothed
 from planarfriction.identify.simulators import (
     SIMULATORS,
     DistributedSimulator,

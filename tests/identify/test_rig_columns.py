@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planarfriction.identify import Log
-from planarfriction.identify.rig import (
+from planarfriction.identify.sensor_errors import (
     Rig,
     SmoothTwist,
     _joined,

@@ -9,7 +9,7 @@ jax = pytest.importorskip("jax", reason="needs the extra [jax]")
 import jax.numpy as jnp  # noqa: E402
 
 from planarfriction import jax as front  # noqa: E402
-from planarfriction._engine.cells.tilt import FARTHEST, tilt_many  # noqa: E402
+from planarfriction._engine.cells.moment_pressure import FARTHEST, tilt_many  # noqa: E402
 from planarfriction.jax.namespace import pressing  # noqa: E402
 
 pytestmark = pytest.mark.jax

@@ -38,7 +38,7 @@ def work_progress(label: str) -> Iterator[Callable[..., None]]:
 
 @contextmanager
 def _bar(words: str) -> Iterator[Callable[..., None]]:
-    from planarfriction._engine.compiler.notice import expect_compilation
+    from planarfriction._engine.compiler.messages import expect_compilation
 
     expect_compilation()  # the bar says it
     console = Console(stderr=True)

@@ -238,7 +238,7 @@ def parse_names(text: str | None) -> tuple[str, ...]:
 
 def parse_nuisance(text: str | None) -> tuple[str, ...]:
     """Parse the names of `--nuisance`, separated by commas; all without it."""
-    from planarfriction.identify.rig import GROUPS
+    from planarfriction.identify.sensor_errors import GROUPS
 
     if text is None:
         return GROUPS

@@ -67,7 +67,7 @@ PUBLISHED = RolloutFunctions(
 
 @functools.cache
 def _cells(size: int, turned: bool, leans: bool) -> RolloutFunctions:
-    """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3 (see `cell_passes.KINDS`)."""
+    """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3 (see `cell_loops.KINDS`)."""
     return RolloutFunctions(
         cells_rollout.PARAMETERS,
         np.array(cells_rollout.COLUMNS),

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from planarfriction._engine.codegen import operators
 from planarfriction._engine.codegen.source import names_in
+from planarfriction._engine.codegen.symbolic_functions import twin
 from planarfriction._engine.codegen.trace import (
     Block,
     Branch,
@@ -21,7 +22,6 @@ from planarfriction._engine.codegen.trace import (
     Operation,
     traced,
 )
-from planarfriction._engine.codegen.twins import twin
 
 TYPES = {"real": "real", "index": "int", "wide": "long long", "bool": "int"}
 """C types by the kind of a number; `real` is a typedef."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from planarfriction._engine.codegen.symbolic_functions import twin
 from planarfriction._engine.codegen.trace import Number, Trace, traced
-from planarfriction._engine.codegen.twins import twin
 from planarfriction._support import validation, writing
 from planarfriction.export.c_source import Writer, rendered
 from planarfriction.export.library import checked_name

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction._engine.cells import tilt
+from planarfriction._engine.cells import moment_pressure
 from planarfriction._engine.compiler import compiled_math
 from planarfriction._engine.published.surfaces import CELLS
 from planarfriction._support import validation, writing
@@ -340,10 +340,11 @@ def tilt_of(count: int) -> str:
     loops = Loops(Writer())
     shares = Array("shares", (count,))
     x, y = (Array(name, (count,), fixed=True) for name in ("place_x", "place_y"))
-    loops.add(tilt.centre, (Scalar("mx"), Scalar("my"), Scalar("load")))
+    loops.add(moment_pressure.centre, (Scalar("mx"), Scalar("my"), Scalar("load")))
     if count > 1:
         loops.add(
-            tilt.tilt, (x, y, shares, Fixed(count), Scalar("cx"), Scalar("cy"), shares)
+            moment_pressure.tilt,
+            (x, y, shares, Fixed(count), Scalar("cx"), Scalar("cy"), shares),
         )
     return re.sub(r"\breal\b", "double", "\n\n".join(loops.functions))
 

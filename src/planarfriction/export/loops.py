@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction._engine.codegen.definitions import definition_of
+from planarfriction._engine.codegen.symbolic_functions import twin
 from planarfriction._engine.codegen.trace import Number, Table, Trace, traced
-from planarfriction._engine.codegen.twins import twin
 from planarfriction._engine.compiler import compiled_math
 from planarfriction._engine.compiler.memory import at
 from planarfriction._engine.published import surfaces

@@ -11,12 +11,18 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction._engine.bristles import discs, points
+from planarfriction._engine.bristles.bristle_limit import within
 from planarfriction._engine.bristles.law import grip
-from planarfriction._engine.bristles.settle import within
 from planarfriction._engine.cells import cells, cells_rollout
 from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.ratios import ratio
-from planarfriction._engine.codegen.rewriting import Rewriting
+from planarfriction._engine.codegen.rebinding import Rewriting
+from planarfriction._engine.codegen.symbolic_functions import (
+    NAMES,
+    SYMBOLS,
+    finished,
+    twin,
+)
 from planarfriction._engine.codegen.trace import (
     Block,
     Mathematics,
@@ -25,7 +31,6 @@ from planarfriction._engine.codegen.trace import (
     Trace,
     traced,
 )
-from planarfriction._engine.codegen.twins import NAMES, SYMBOLS, finished, twin
 from planarfriction._engine.codegen.vectors import norm, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.published import published_contact, published_step

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.codegen.symbolic_functions import twin
 from planarfriction._engine.codegen.trace import (
     Mathematics,
     Number,
@@ -13,7 +14,6 @@ from planarfriction._engine.codegen.trace import (
     Trace,
     traced,
 )
-from planarfriction._engine.codegen.twins import twin
 from planarfriction.export.c_source import Writer
 from planarfriction.limit_surface import LimitSurfaceTable
 from planarfriction.limit_surface.base import CERTIFIED

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.identify.logs import Log
-from planarfriction.identify.rig import LONGEST, TINY, jitter
+from planarfriction.identify.sensor_errors import LONGEST, TINY, jitter
 
 WINDOW = 200
 """Least number of samples of a window."""

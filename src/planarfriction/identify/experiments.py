@@ -40,7 +40,7 @@ from planarfriction.identify.parameters import (
 )
 from planarfriction.identify.problem import LogProblem
 from planarfriction.identify.result import WIDTH, Identification
-from planarfriction.identify.rig import GROUPS, check_groups, wrench_noise
+from planarfriction.identify.sensor_errors import GROUPS, check_groups, wrench_noise
 from planarfriction.identify.uncertainty import finite
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch

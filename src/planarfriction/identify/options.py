@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction._support.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.rig import GROUPS, check_groups
+from planarfriction.identify.sensor_errors import GROUPS, check_groups
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 

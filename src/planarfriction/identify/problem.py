@@ -21,7 +21,12 @@ from planarfriction.identify.parameters import (
     VectorMap,
     check_loads,
 )
-from planarfriction.identify.rig import Rig, as_measured, smoothed, wrench_noise
+from planarfriction.identify.sensor_errors import (
+    Rig,
+    as_measured,
+    smoothed,
+    wrench_noise,
+)
 from planarfriction.identify.simulators import (
     CENTRE,
     SIMULATORS,

@@ -15,7 +15,7 @@ from planarfriction._support.equality import ByValue
 from planarfriction._support.pictures import picture
 from planarfriction.formulas import PARAMETERS
 from planarfriction.identify.parameters import ALL, LAW, SHAPE
-from planarfriction.identify.rig import Nuisance
+from planarfriction.identify.sensor_errors import Nuisance
 from planarfriction.identify.uncertainty import draws
 from planarfriction.identify.verdicts import ModelScore, Verdict, interval
 from planarfriction.laws import LuGre

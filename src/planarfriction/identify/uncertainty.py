@@ -15,7 +15,7 @@ import numpy as np
 
 from planarfriction.identify.logs import Arrays
 from planarfriction.identify.parameters import ALL, LAW, PRIOR, Coordinates, fitted_law
-from planarfriction.identify.rig import TINY
+from planarfriction.identify.sensor_errors import TINY
 
 EXCESS = 1.25
 """Largest reduced chi-square that is still put down to the estimate of the noise."""

@@ -17,7 +17,7 @@ from planarfriction.identify.decimation import samples_of
 from planarfriction.identify.logs import TWO_LOADS, Arrays, Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.problem import SPOILED
-from planarfriction.identify.rig import CHANNELS
+from planarfriction.identify.sensor_errors import CHANNELS
 from planarfriction.identify.uncertainty import HELD_OUT, STRAIN, Fit, Pull, Uncertainty
 
 TWO_SIDED = 1.96

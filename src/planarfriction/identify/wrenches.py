@@ -36,7 +36,6 @@ from planarfriction.identify.parameters import (
 )
 from planarfriction.identify.problem import SPOILED, LogProblem
 from planarfriction.identify.result import Identification
-from planarfriction.identify.rig import CHANNELS, Nuisance, wrench_noise
 from planarfriction.identify.search import (
     guess_starts,
     interruptible,
@@ -45,6 +44,7 @@ from planarfriction.identify.search import (
     stretches,
     warm_start,
 )
+from planarfriction.identify.sensor_errors import CHANNELS, Nuisance, wrench_noise
 from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import correlations, pulls_of_held, uncertainty
 from planarfriction.identify.verdicts import (

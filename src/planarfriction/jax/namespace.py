@@ -9,7 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from planarfriction._engine.cells.tilt import OVERSHOT, SHORTENINGS, SOFTNESS, STEPS
+from planarfriction._engine.cells.moment_pressure import (
+    OVERSHOT,
+    SHORTENINGS,
+    SOFTNESS,
+    STEPS,
+)
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.tensors.namespace import Namespace

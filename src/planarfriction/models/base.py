@@ -19,7 +19,7 @@ from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.tilt import centre_of, moments_of
+from planarfriction.patch.moment_pressure import centre_of, moments_of
 
 
 @by_parts

@@ -29,9 +29,9 @@ from planarfriction.patch.grid import (
 )
 from planarfriction.patch.grid_error import GridError, finer, grid_error
 from planarfriction.patch.metric import positive_definite, symmetric_root
+from planarfriction.patch.moment_pressure import weights_under
 from planarfriction.patch.pressure import Pressure, Uniform
 from planarfriction.patch.pressure_maps import map_grid, read_maps
-from planarfriction.patch.tilt import weights_under
 
 MOST_DEGREE = 40
 """Largest degree of polynomial moments: beyond it powers are rounding."""

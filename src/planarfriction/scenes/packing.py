@@ -12,7 +12,7 @@ from planarfriction._engine.body.contacts import BODY, BODY_AXES, WORLD, Contact
 from planarfriction._engine.compiler.memory import places_of
 from planarfriction._engine.protocol import calls_of
 from planarfriction._engine.records.packed import PackedModel
-from planarfriction._engine.records.under_body import STATES, following, under_edge
+from planarfriction._engine.records.partial_contact import STATES, following, under_edge
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws.base import refuse_fixed_stiffness
 from planarfriction.scenes.contact import Contact

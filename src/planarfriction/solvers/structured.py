@@ -13,7 +13,7 @@ import numpy as np
 from planarfriction._engine.body import rosenbrock as kernels
 from planarfriction._engine.body.body import System
 from planarfriction._engine.body.integration import IntegrationProgress, Method, Output
-from planarfriction._engine.compiler import missing, threads, together
+from planarfriction._engine.compiler import missing, parallel, threads
 from planarfriction._engine.compiler.calls import address_of, signature_of
 from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
@@ -61,10 +61,10 @@ def compiled_together() -> Iterator[None]:
         if missing(function, signature_of(function))
     }
     processes = min(threads.processors() - 1, _MOST_PROCESSES, len(jobs) - 1)
-    if processes < 1 or not together.possible():
+    if processes < 1 or not parallel.possible():
         yield
         return
-    with together.sharing(
+    with parallel.sharing(
         "from planarfriction.solvers import structured; structured.serve()",
         jobs,
         processes,
@@ -74,7 +74,7 @@ def compiled_together() -> Iterator[None]:
 
 def serve() -> None:
     """Compile functions of the solver for another process."""
-    together.serve(lambda job: address_of(kernels.FUNCTIONS[job]))
+    parallel.serve(lambda job: address_of(kernels.FUNCTIONS[job]))
 
 
 def start_of(state: np.ndarray) -> IntegrationProgress:

@@ -10,8 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.bristles import discs, leaning_cells, points, settle
-from planarfriction._engine.bristles.leaning_cells import Leaning
+from planarfriction._engine.bristles import (
+    asymmetric_cells,
+    bristle_limit,
+    discs,
+    points,
+)
+from planarfriction._engine.bristles.asymmetric_cells import Leaning
 from planarfriction._engine.cells import cells
 from planarfriction.formulas import LawNumbers
 from planarfriction.models import DistributedModel
@@ -33,9 +38,9 @@ KINDS = {
     3: CellType(3, cells.DISC_POSITIONS, discs.evaluate, discs.step),
     5: CellType(2, cells.LEVERS, points.evaluate, points.step),
     6: CellType(3, cells.DISC_LEVERS, discs.evaluate, discs.step),
-    7: CellType(2, cells.LEVERS, leaning_cells.evaluate, leaning_cells.step),
+    7: CellType(2, cells.LEVERS, asymmetric_cells.evaluate, asymmetric_cells.step),
     8: CellType(
-        3, cells.DISC_LEVERS, leaning_cells.evaluate_disc, leaning_cells.step_disc
+        3, cells.DISC_LEVERS, asymmetric_cells.evaluate_disc, asymmetric_cells.step_disc
     ),
 }
 """Kinds of cells by how many numbers each has: points, discs, both with a friction metric, and with asymmetry too.
@@ -125,7 +130,7 @@ def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any]:
 def limited(xp, law: LawNumbers, shape: Cells, z):
     """Return bristles brought back onto their limits (see `bristles.settle`)."""
     seen_from = middle(xp, law, shape)
-    return seen_from + xp.over(settle.within)(law, Vector(z - seen_from)).array
+    return seen_from + xp.over(bristle_limit.within)(law, Vector(z - seen_from)).array
 
 
 def evaluate(xp, law: LawNumbers, shape: Cells, z, by):

@@ -17,7 +17,7 @@ from typing import Any
 from planarfriction import formulas
 from planarfriction._engine.bristles import bristle_step
 from planarfriction._engine.codegen import ratios, vectors
-from planarfriction._engine.codegen.rewriting import Rewriting
+from planarfriction._engine.codegen.rebinding import Rewriting
 from planarfriction._engine.compiler import compiled_math
 from planarfriction._engine.published import published_contact, surfaces
 

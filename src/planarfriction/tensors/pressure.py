@@ -10,15 +10,15 @@ import math
 from functools import partial
 from typing import Any, NamedTuple
 
-from planarfriction._engine.cells import tilt
-from planarfriction._engine.cells.tilt import FARTHEST, NARROW, SOFTNESS
+from planarfriction._engine.cells import moment_pressure
+from planarfriction._engine.cells.moment_pressure import FARTHEST, NARROW, SOFTNESS
 from planarfriction.tensors.distributed import Cells, positions_of
 
 
 def centre_of(xp: Any, moments: Any, load: Any) -> Any:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
     return xp.stack(
-        xp.over(tilt.centre)(
+        xp.over(moment_pressure.centre)(
             moments[..., 0], moments[..., 1], xp.where(load > 0.0, load, math.inf)
         ),
         -1,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
-from planarfriction._engine.bristles import settle
+from planarfriction._engine.bristles import bristle_limit
 from planarfriction._support import validation
 from planarfriction.derivatives.parameters import PARAMETERS, check_range
 from planarfriction.errors import InvalidValueError
@@ -49,10 +49,12 @@ def evaluate(
     if reference is None:
         rate, pull = equations.evaluate(xp, law, shape, z, by)
     else:
-        z = xp.over(settle.factor_at)(reference, inner(load)) * z
+        z = xp.over(bristle_limit.factor_at)(reference, inner(load)) * z
         rate, pull = equations.evaluate(xp, law, shape, z, by)
         out = z - equations.middle(xp, law, shape)
-        back = xp.over(settle.recovery)(law, Vector(out), xp.norm(by[0], -2)) * out
+        back = (
+            xp.over(bristle_limit.recovery)(law, Vector(out), xp.norm(by[0], -2)) * out
+        )
         rate = rate - back
         pull = pull + law.sigma_1 * back
     return equations.narrow(rate), load[..., None] * equations.wrench(xp, shape, pull)
@@ -89,7 +91,7 @@ def advance(
     if reference is None:
         new, pull = equations.advance(xp, law, shape, z, by, dt)
     else:
-        factor = xp.over(settle.factor_at)(
+        factor = xp.over(bristle_limit.factor_at)(
             reference, xp.where(loaded, inner(load), reference)
         )
         z = equations.limited(xp, law, shape, factor * z)

@@ -20,7 +20,7 @@ class _Pressing(torch.autograd.Function):
 
     @staticmethod
     def forward(u, v, share, x, y, narrow):
-        from planarfriction._engine.cells.tilt import tilt_many
+        from planarfriction._engine.cells.moment_pressure import tilt_many
 
         rows = [
             np.array(each.detach().cpu().double().reshape(-1, each.shape[-1]).numpy())

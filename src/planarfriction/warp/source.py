@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction._engine.codegen import small_matrices
+from planarfriction._engine.codegen.symbolic_functions import twin
 from planarfriction._engine.codegen.trace import Block, Number, Trace, traced
-from planarfriction._engine.codegen.twins import twin
 from planarfriction._engine.coupled import coupling
 from planarfriction.export.c_source import Writer, rendered
 from planarfriction.export.c_values import Array, Fixed

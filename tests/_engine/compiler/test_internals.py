@@ -10,7 +10,7 @@ import llvmlite
 import numba
 import pytest
 
-from planarfriction._engine.compiler import internals
+from planarfriction._engine.compiler import numba_compat
 
 PROGRAM = """
 import importlib, sys, numba
@@ -63,5 +63,5 @@ def test_without_it_functions_are_compiled_all_the_same(owner, name):
 
 
 def test_what_is_there_is_taken_without_a_word(recwarn):
-    assert internals.part("math", "pi", None) == pytest.approx(3.14159265)
+    assert numba_compat.part("math", "pi", None) == pytest.approx(3.14159265)
     assert not recwarn.list

@@ -10,10 +10,10 @@ import time
 
 import pytest
 
-from planarfriction._engine.compiler import together
-from planarfriction._engine.compiler.together import Crew
+from planarfriction._engine.compiler import parallel
+from planarfriction._engine.compiler.parallel import Crew
 
-WRITES = "from pathlib import Path; from planarfriction._engine.compiler.together import serve; serve(lambda job: {})"
+WRITES = "from pathlib import Path; from planarfriction._engine.compiler.parallel import serve; serve(lambda job: {})"
 """Code of a process whose jobs do something."""
 
 FIRST_RUN = """
@@ -88,9 +88,9 @@ def test_a_process_at_work_is_ended_with_the_block(tmp_path):
     "executable", ["", "/opt/blender/blender", shutil.which("sh") or "sh"]
 )
 def test_nothing_is_shared_by_programs_that_are_not_python(monkeypatch, executable):
-    assert together.possible()
+    assert parallel.possible()
     monkeypatch.setattr(sys, "executable", executable)
-    assert not together.possible()
+    assert not parallel.possible()
 
 
 @pytest.mark.slow

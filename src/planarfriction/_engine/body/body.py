@@ -20,7 +20,7 @@ from planarfriction._engine.body.contacts import (
     contact_map_slopes,
 )
 from planarfriction._engine.body.springs import add_spring_slopes, spring_wrench
-from planarfriction._engine.bristles.settle import factor_at
+from planarfriction._engine.bristles.bristle_limit import factor_at
 from planarfriction._engine.cells import cells
 from planarfriction._engine.cells.fixed_stiffness import bring_back
 from planarfriction._engine.codegen.small_matrices import applied, inverse
@@ -88,7 +88,7 @@ class Motion(NamedTuple):
     anchor: Doubles
     """Pose of the anchor of each spring at the start of each piece, and its velocity, [S, K, 6]."""
     stop_speed: float
-    """Speed [m/s] of a body at rest: the run ends when its speed is below and stays so (see `ends`); 0: never."""
+    """Speed [m/s] of a body at rest: the run ends when its speed is below and stays so (see `termination`); 0: never."""
     stop_radius: float
     """Lever arm that turns spin into speed for that test [m]."""
     stop_time: float
@@ -111,7 +111,7 @@ class Work(NamedTuple):
     twist: Doubles
     """Twist of one contact and what is behind it (see `protocol.Seen`), [10]."""
     factor: Doubles
-    """Factor on the stiffness of each contact (see `settle.factor_at`), as `rates` left it, [C]."""
+    """Factor on the stiffness of each contact (see `bristle_limit.factor_at`), as `rates` left it, [C]."""
     covered: Doubles
     """Share of the load of each contact that lies on the body (see `protocol.Seen`), as `rates` left it, [C]."""
     stiffness: Doubles

@@ -17,13 +17,6 @@ from planarfriction._engine.body.body import (
     settle_all,
 )
 from planarfriction._engine.body.contacts import contact_map
-from planarfriction._engine.body.ends import (
-    INSTANT,
-    at_rest,
-    note_ends,
-    share_until_end,
-    speed_of,
-)
 from planarfriction._engine.body.integration import (
     IntegrationProgress,
     Method,
@@ -36,6 +29,13 @@ from planarfriction._engine.body.integration import (
 )
 from planarfriction._engine.body.springs import spring_drift
 from planarfriction._engine.body.step_control import MOTION, fitted, growth
+from planarfriction._engine.body.termination import (
+    INSTANT,
+    at_rest,
+    note_ends,
+    share_until_end,
+    speed_of,
+)
 from planarfriction._engine.codegen.small_matrices import applied
 from planarfriction._engine.codegen.vectors import (
     Vector,

@@ -2,7 +2,7 @@
 
     z' = u - k z,     t = -(sigma_0 z + sigma_1 z' + sigma_2 u),     k = bristle_decay (docs/physics.md, "Bristles")
 
-Loops over cells and derivatives are written from a trace of its functions (see `cell_passes`).
+Loops over cells and derivatives are written from a trace of its functions (see `cell_loops`).
 """
 
 from __future__ import annotations

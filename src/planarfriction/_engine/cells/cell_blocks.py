@@ -1,7 +1,7 @@
 """Cells in blocks, so that loops over them are vector code without a remainder.
 
 A block holds up to `LANES` cells, field after field. The cells of a contact are spread evenly over its blocks (see
-`divided`); the last one is filled up with cells without load. See `cell_passes` for loops over them.
+`divided`); the last one is filled up with cells without load. See `cell_loops` for loops over them.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def divided(count: int) -> tuple[int, int]:
 
 
 class Limit(NamedTuple):
-    """Compiled functions of the limit of a bristle with a fixed stiffness (see `settle`)."""
+    """Compiled functions of the limit of a bristle with a fixed stiffness (see `bristle_limit`)."""
 
     within: Any
     """`(law, z)`: return the bristle brought back onto its limit, if it is beyond."""
@@ -73,7 +73,7 @@ class BlockFunctions(NamedTuple):
     """`(law, twist, (dt,), block, lanes)`: step the cells of a block, and return their wrench."""
     retreat: Any
     """`(law, twist, (dt, load, 1 or 0 without load, pull[3]), block, lanes)`: carry the cotangent of the state over a
-    step; return the sums of `cell_passes.backward_passes`."""
+    step; return the sums of `cell_loops.backward_passes`."""
     shares: Any
     """Arguments as of `retreat`: add the derivatives of `load pull . wrench` of a step by the weights to `OUT`."""
     pushed: Any

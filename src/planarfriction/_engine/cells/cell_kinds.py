@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from planarfriction._engine.bristles.leaning_cells import Leaning
+from planarfriction._engine.bristles.asymmetric_cells import Leaning
 from planarfriction._engine.cells import cells_rollout, cells_sensitivities
 from planarfriction._engine.cells.cell_blocks import LANES, BlockFunctions, Limit
-from planarfriction._engine.cells.cell_passes import (
+from planarfriction._engine.cells.cell_loops import (
     KINDS,
     backward_passes,
     forward_passes,

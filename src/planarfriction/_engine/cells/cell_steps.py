@@ -1,10 +1,10 @@
-"""Contacts of cells as solver and steps call them (see `cell_passes` for their loops).
+"""Contacts of cells as solver and steps call them (see `cell_loops` for their loops).
 
 A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`) and adds `w B' t` to the wrench, t being its
 traction (docs/physics.md, "Distributed model").
 
 A bristle whose stiffness does not grow with the load (docs/physics.md, "Stiffness and load") moves as one of the
-published law at `l z` with `l = f_ref/f` (see `settle`), and besides returns to its limit where a falling load has left
+published law at `l z` with `l = f_ref/f` (see `bristle_limit`), and besides returns to its limit where a falling load has left
 it beyond. The factor l comes behind the twist.
 """
 
@@ -13,12 +13,12 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from planarfriction._engine.bristles import leaning_cells
-from planarfriction._engine.bristles.leaning_cells import Leaning
-from planarfriction._engine.bristles.settle import recovery
+from planarfriction._engine.bristles import asymmetric_cells
+from planarfriction._engine.bristles.asymmetric_cells import Leaning
+from planarfriction._engine.bristles.bristle_limit import recovery
 from planarfriction._engine.cells import cells, general_cells
 from planarfriction._engine.cells.cell_blocks import LANES, divided, scratch
-from planarfriction._engine.cells.cell_passes import (
+from planarfriction._engine.cells.cell_loops import (
     DISC,
     KINDS,
     CellKind,
@@ -254,7 +254,11 @@ def _recovering(kind: CellKind) -> Element:
     out = _bent  # seen from the middle of its limit
     if kind.leans:
         numbers = _law_of
-        out = leaning_cells.out if kind.element.size == 2 else leaning_cells.out_of_disc
+        out = (
+            asymmetric_cells.out
+            if kind.element.size == 2
+            else asymmetric_cells.out_of_disc
+        )
 
     @kernel
     def evaluate(

@@ -10,8 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.bristles.bristle_limit import (
+    factor_at,
+    softening,
+    stiffened,
+)
 from planarfriction._engine.bristles.law import PARAMETERS, law_of
-from planarfriction._engine.bristles.settle import factor_at, softening, stiffened
 from planarfriction._engine.cells.cell_blocks import (
     BAR,
     BLOCK,
@@ -115,7 +119,7 @@ def _weigh(
 def _bring_back(
     kind: BlockFunctions, law: LawNumbers, w: Doubles, blocks: int, lanes: int
 ) -> None:
-    """Bring bristles back onto their limits (see `settle`)."""
+    """Bring bristles back onto their limits (see `bristle_limit`)."""
     for k in range(blocks):
         block = at(w, k * BLOCK)
         for i in range(lanes):

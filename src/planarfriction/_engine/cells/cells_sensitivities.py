@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.bristles.bristle_limit import factor_at, stiffened
 from planarfriction._engine.bristles.law import law_of
-from planarfriction._engine.bristles.settle import factor_at, stiffened
 from planarfriction._engine.cells.cell_blocks import (
     BLOCK,
     LANES,
@@ -20,7 +20,7 @@ from planarfriction._engine.cells.cell_blocks import (
     Z,
     divided,
 )
-from planarfriction._engine.cells.cell_passes import CellKind
+from planarfriction._engine.cells.cell_loops import CellKind
 from planarfriction._engine.cells.cells_rollout import _lay, _read, _write, entry_of
 from planarfriction._engine.cells.rollouts import Derivatives, row_of
 from planarfriction._engine.codegen.derivatives import forwards
@@ -92,7 +92,7 @@ def _changes(kind: BlockFunctions, block: Doubles, i: int) -> tuple[Vector, ...]
 def _bring_back(
     kind: BlockFunctions, interval: Interval, block: Doubles, lanes: int
 ) -> None:
-    """Bring bristles back onto their limits (see `settle`), with their changes."""
+    """Bring bristles back onto their limits (see `bristle_limit`), with their changes."""
     for i in range(lanes):
         z = kind.vector(block, Z + i, LANES)
         (a, b, c, d, e, f) = _changes(kind, block, i)

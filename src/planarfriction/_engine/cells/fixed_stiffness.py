@@ -1,4 +1,4 @@
-"""Steps of cells whose stiffness does not grow with the load (see `settle`)."""
+"""Steps of cells whose stiffness does not grow with the load (see `bristle_limit`)."""
 
 from __future__ import annotations
 

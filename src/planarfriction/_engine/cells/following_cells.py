@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planarfriction._engine.cells.tilt import SOFTNESS, tilt
+from planarfriction._engine.cells.moment_pressure import SOFTNESS, tilt
 from planarfriction._engine.codegen.vectors import Vector, plus, put, three, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import entry, kernel

@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from planarfriction._engine.bristles.law import traction as traction_of
-from planarfriction._engine.cells.cell_passes import CellKind, Element
+from planarfriction._engine.cells.cell_loops import CellKind, Element
 from planarfriction._engine.cells.cell_steps import rates_of, steps_of
 from planarfriction._engine.cells.cells import LEVERS, Lever
 from planarfriction._engine.codegen.derivatives import forward

@@ -15,14 +15,14 @@ from planarfriction import formulas
 from planarfriction._engine.codegen import operators, vectors
 from planarfriction._engine.codegen.operators import Operator
 from planarfriction._engine.codegen.ratios import per, ratio
-from planarfriction._engine.codegen.rewriting import Rewriting
+from planarfriction._engine.codegen.rebinding import Rewriting
+from planarfriction._engine.codegen.symbolic_functions import NAMES, SYMBOLS
 from planarfriction._engine.codegen.trace import (
     CompiledMathematics,
     Number,
     Trace,
     flat,
 )
-from planarfriction._engine.codegen.twins import NAMES, SYMBOLS
 from planarfriction._engine.compiler import compiled_math as xp
 
 

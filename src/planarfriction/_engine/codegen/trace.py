@@ -2,7 +2,7 @@
 
 A kernel is called in Python with `Number`s instead of floats, which note each operation on a `Trace`. A function
 that asks which way a comparison goes is traced once for either answer, and a `Branch` joins the results. Loops run
-as long as their count is known. Compiled functions are called through their Python twins (see `twins`).
+as long as their count is known. Compiled functions are called through their Python twins (see `symbolic_functions`).
 """
 
 from __future__ import annotations

@@ -12,11 +12,11 @@ from numba.core.compiler import Compiler
 from numba.extending import register_jitable
 
 from planarfriction import formulas
-from planarfriction._engine.compiler import notice  # noqa: F401 (says when the first function is compiled)
-from planarfriction._engine.compiler.internals import part
+from planarfriction._engine.compiler import messages  # noqa: F401 (says when the first function is compiled)
+from planarfriction._engine.compiler.numba_compat import part
 from planarfriction._engine.compiler.sources import Sources
 
-Inner: Any = part("planarfriction._engine.compiler.inner", "Inner", Compiler)
+Inner: Any = part("planarfriction._engine.compiler.inlining", "Inner", Compiler)
 """Numba's compiler for inner functions, or its own for all."""
 
 kept: Any = part(

@@ -16,7 +16,7 @@ from numba import njit, types
 from numba.core.compiler import Compiler
 from numba.extending import intrinsic
 
-from planarfriction._engine.compiler.internals import part
+from planarfriction._engine.compiler.numba_compat import part
 from planarfriction.formulas import LARGEST
 
 # Not `reassoc`: the two-part constants of the argument reductions rely on the order of operations.
@@ -24,7 +24,7 @@ _inline = njit(
     error_model="numpy",
     fastmath={"contract"},
     forceinline=True,
-    pipeline_class=part("planarfriction._engine.compiler.inner", "Inner", Compiler),
+    pipeline_class=part("planarfriction._engine.compiler.inlining", "Inner", Compiler),
     _nrt=False,
     no_cpython_wrapper=True,
     no_cfunc_wrapper=True,

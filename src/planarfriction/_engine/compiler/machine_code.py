@@ -27,9 +27,9 @@ from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
 
-from planarfriction._engine.compiler.internals import need, part
+from planarfriction._engine.compiler.numba_compat import need, part
+from planarfriction._engine.compiler.parallel import wait_for
 from planarfriction._engine.compiler.sources import Sources, digest_of
-from planarfriction._engine.compiler.together import wait_for
 from planarfriction._support.writing import replacing
 
 need(CompileResult, "_reduce", "_rebuild")

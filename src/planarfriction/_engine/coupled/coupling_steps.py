@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarfriction._engine.bristles.settle import factor_at
+from planarfriction._engine.bristles.bristle_limit import factor_at
 from planarfriction._engine.cells.fixed_stiffness import stepped
 from planarfriction._engine.codegen.vectors import clear
 from planarfriction._engine.compiler import kernel

@@ -6,7 +6,7 @@ host that steps on gives the next step the moments that came out.
 
 from __future__ import annotations
 
-from planarfriction._engine.cells.tilt import centre, tilt
+from planarfriction._engine.cells.moment_pressure import centre, tilt
 from planarfriction._engine.codegen.vectors import copy
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel

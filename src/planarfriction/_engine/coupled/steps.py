@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 
-from planarfriction._engine.bristles.settle import factor_at
+from planarfriction._engine.bristles.bristle_limit import factor_at
 from planarfriction._engine.cells.fixed_stiffness import stepped, unscale
 from planarfriction._engine.codegen.vectors import clear, copy, plus, put, three, times
 from planarfriction._engine.compiler import compiled_math as xp

@@ -12,8 +12,8 @@ from planarfriction._engine.bristles.discs import KAPPA
 from planarfriction._engine.cells.cell_steps import fixed_rates_of, functions_of_cells
 from planarfriction._engine.cells.cells import CellsContact
 from planarfriction._engine.cells.general_cells import LINEAR, MATRICES, A, C, E, F
+from planarfriction._engine.cells.moment_pressure import tilted
 from planarfriction._engine.cells.rollouts import ShapesByLoad
-from planarfriction._engine.cells.tilt import tilted
 from planarfriction._engine.compiler.memory import places_of, rows_of, size_of
 from planarfriction._engine.protocol import ModelFunctions, StepFunctions
 from planarfriction._engine.records import packed

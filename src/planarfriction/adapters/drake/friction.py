@@ -21,9 +21,9 @@ from pydrake.systems.framework import (
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
 
 from planarfriction._support import validation
-from planarfriction.adapters.drake.asking import Asking
+from planarfriction.adapters.drake.coupled_step import Asking
 from planarfriction.adapters.drake.patches import PatchContact, found
-from planarfriction.adapters.drake.shadow import Shadow
+from planarfriction.adapters.drake.plant_copy import Shadow
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import InvalidValueError
 

@@ -101,7 +101,7 @@ class Crew:
 
 def serve(work: Callable[[int], Any]) -> None:
     """Do the jobs whose numbers come on the standard input; answers each with the time that it took [s]."""
-    from planarfriction._engine.compiler.notice import expect_compilation
+    from planarfriction._engine.compiler.messages import expect_compilation
 
     expect_compilation()
     with contextlib.suppress(KeyboardInterrupt):

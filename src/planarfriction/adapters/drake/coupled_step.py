@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction._engine.coupled.coupling import solve_batch
-from planarfriction.adapters.drake.shadow import Shadow
+from planarfriction.adapters.drake.plant_copy import Shadow
 from planarfriction.coupling import CoupledPatches, HostStep
 from planarfriction.models.base import lever_of
 

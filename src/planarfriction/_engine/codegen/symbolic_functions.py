@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction._engine.codegen import vectors
-from planarfriction._engine.codegen.rewriting import Rewriting, like
+from planarfriction._engine.codegen.rebinding import Rewriting, like
 from planarfriction._engine.codegen.trace import (
     CompiledMathematics,
     Mathematics,

@@ -6,7 +6,7 @@ import multiprocessing
 import sys
 from typing import Any
 
-from planarfriction._engine.compiler.internals import part
+from planarfriction._engine.compiler.numba_compat import part
 
 Listener: Any = part("numba.core.event", "Listener", object)
 register: Any = part("numba.core.event", "register", lambda kind, listener: None)

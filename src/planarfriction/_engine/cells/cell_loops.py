@@ -1,6 +1,6 @@
 """Steps, rates and their derivatives of cells in blocks as vector loops, written from the functions of one cell.
 
-An `Element` is the bristle of a kind of cells (see `points`, `discs`). See `passes` for how loops come out of a trace,
+An `Element` is the bristle of a kind of cells (see `points`, `discs`). See `loop_generation` for how loops come out of a trace,
 `cell_steps` and `cell_rollouts` for what runs them.
 """
 
@@ -9,16 +9,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from planarfriction._engine.bristles import discs, leaning_cells, points, settle
-from planarfriction._engine.bristles.leaning_cells import Leaning
+from planarfriction._engine.bristles import (
+    asymmetric_cells,
+    bristle_limit,
+    discs,
+    points,
+)
+from planarfriction._engine.bristles.asymmetric_cells import Leaning
 from planarfriction._engine.cells import cells
 from planarfriction._engine.cells.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT, Z
 from planarfriction._engine.cells.cells import CellsContact, Lever
 from planarfriction._engine.cells.cells_rollout import by_of
-from planarfriction._engine.cells.passes import Passes, passes
+from planarfriction._engine.cells.loop_generation import Passes, passes
 from planarfriction._engine.codegen.derivatives import derive
+from planarfriction._engine.codegen.symbolic_functions import twin
 from planarfriction._engine.codegen.trace import Number, Trace, traced
-from planarfriction._engine.codegen.twins import twin
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles
 from planarfriction.formulas import LawNumbers
@@ -34,10 +39,10 @@ class Element(NamedTuple):
     """`(law, z, u)`: return z' and the traction; with a fixed stiffness `(law, z, u, factor)`."""
     step: Any
     """`(law, z, u, dt)`: return the bristle after dt and its traction."""
-    within: Any = settle.within
-    """`(law, z)`: return a bristle brought back onto its limit (see `settle`)."""
+    within: Any = bristle_limit.within
+    """`(law, z)`: return a bristle brought back onto its limit (see `bristle_limit`)."""
     forward: tuple[int, int] = 8, 2
-    """Division into passes that is fastest for a few dozen cells (see `passes`)."""
+    """Division into passes that is fastest for a few dozen cells (see `loop_generation`)."""
     backward: tuple[int, int] = 6, 6
     rate: tuple[int, int] = 5, 0
     slopes: tuple[int, int] = 4, 2
@@ -48,16 +53,16 @@ DISC = Element("discs", 3, discs.evaluate, discs.step)
 LEANING_POINT = Element(
     "leaning points",
     2,
-    leaning_cells.evaluate,
-    leaning_cells.step,
-    leaning_cells.within,
+    asymmetric_cells.evaluate,
+    asymmetric_cells.step,
+    asymmetric_cells.within,
 )
 LEANING_DISC = Element(
     "leaning discs",
     3,
-    leaning_cells.evaluate_disc,
-    leaning_cells.step_disc,
-    leaning_cells.within_disc,
+    asymmetric_cells.evaluate_disc,
+    asymmetric_cells.step_disc,
+    asymmetric_cells.within_disc,
 )
 """Elements whose law is a `Leaning`; the asymmetry stands behind the numbers of the lever."""
 

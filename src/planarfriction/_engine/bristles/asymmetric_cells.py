@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from planarfriction import formulas
-from planarfriction._engine.bristles import discs, points, settle
+from planarfriction._engine.bristles import bristle_limit, discs, points
 from planarfriction._engine.codegen.vectors import Vector, norm, plus, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
@@ -32,7 +32,7 @@ def _in_plane(size: float, a: Vector) -> Vector:
 def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
     """Return functions of a bristle from those of a `plain` one, from its `speed(u)`, and from `scaled(size, a)`.
 
-    `out(lean, z)` returns a bristle as seen from the middle of its limit, c at rest; `within` is as in `settle`.
+    `out(lean, z)` returns a bristle as seen from the middle of its limit, c at rest; `within` is as in `bristle_limit`.
     """
     rate_of = plain.evaluate
     step_of = plain.step
@@ -53,8 +53,8 @@ def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
 
     @kernel
     def within(lean: Leaning, z: Vector) -> Vector:
-        """Compute `settle.within` of a bristle."""
-        return plus(settle.within(lean.law, out(lean, z)), 1.0, middle(lean))
+        """Compute `bristle_limit.within` of a bristle."""
+        return plus(bristle_limit.within(lean.law, out(lean, z)), 1.0, middle(lean))
 
     @kernel
     def evaluate(lean: Leaning, z: Vector, u: Vector) -> tuple[Vector, Vector]:

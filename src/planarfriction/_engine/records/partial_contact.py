@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction._engine.cells import edge_cells, following_cells
-from planarfriction._engine.cells.tilt import NARROW
+from planarfriction._engine.cells.moment_pressure import NARROW
 from planarfriction._engine.compiler.memory import place_of, places_of, row_of, rows_of
 from planarfriction._engine.protocol import calls_of
 from planarfriction._engine.records.distributed import CompiledDistributed

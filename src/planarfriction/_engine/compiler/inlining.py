@@ -16,7 +16,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 
-from planarfriction._engine.compiler.internals import need
+from planarfriction._engine.compiler.numba_compat import need
 
 need(_dynfunc, "make_function")
 need(

@@ -23,7 +23,7 @@ def moments_of(value: Any) -> np.ndarray:
 def centre_of(moments: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Return the centre of pressure `(-m_y, m_x)/f_N` `[..., 2]` [m]; 0 without load."""
     # Compiled code, which a patch alone does not need.
-    from planarfriction._engine.cells.tilt import REACH
+    from planarfriction._engine.cells.moment_pressure import REACH
 
     loaded = (load > 0.0)[..., None]
     with np.errstate(over="ignore"):
@@ -35,7 +35,7 @@ def centre_of(moments: np.ndarray, load: np.ndarray) -> np.ndarray:
 
 def weights_under(patch: Any, normal_force: Any, moments: Any) -> np.ndarray:
     """Return the weights `[..., N]` of the cells of a patch under a load and its moments."""
-    from planarfriction._engine.cells.tilt import tilted
+    from planarfriction._engine.cells.moment_pressure import tilted
 
     if normal_force is None:
         raise InvalidValueError(
