@@ -218,7 +218,7 @@ LIGHTEST = {"double": formulas.LIGHTEST, "float": 1e-6}
 
 
 def _settled(cell: Any, reference: float, lightest: float) -> Any:
-    """Return the step of a cell with a fixed stiffness under a load (see `bristles.settle`)."""
+    """Return the step of a cell with a fixed stiffness under a load (see `bristles.bristle_limit`)."""
 
     def settled(law: Any, z: Any, u: Any, dt: Any, load: Any) -> Any:
         factor = reference / xp.maximum(load, lightest)

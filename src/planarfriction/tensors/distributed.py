@@ -99,7 +99,7 @@ def _bristle(xp, name: str, law: Any, shape: Cells, z, u, *dt):
 
 
 def middle(xp, law: LawNumbers, shape: Cells):
-    """Return the middle of the limit of every bristle at rest `[..., d, N]`, or 0.0 (see `bristles.settle`)."""
+    """Return the middle of the limit of every bristle at rest `[..., d, N]`, or 0.0 (see `bristles.bristle_limit`)."""
     _, asymmetry = _numbers(shape)
     if asymmetry is None:
         return 0.0
@@ -128,7 +128,7 @@ def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any]:
 
 
 def limited(xp, law: LawNumbers, shape: Cells, z):
-    """Return bristles brought back onto their limits (see `bristles.settle`)."""
+    """Return bristles brought back onto their limits (see `bristles.bristle_limit`)."""
     seen_from = middle(xp, law, shape)
     return seen_from + xp.over(bristle_limit.within)(law, Vector(z - seen_from)).array
 

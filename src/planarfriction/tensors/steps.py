@@ -83,7 +83,7 @@ def advance(
 ) -> tuple[Any, Any]:
     """Return the bristles `[..., d, N]` after `dt`, zeros of contacts without load, and the tractions per unit load.
 
-    With a fixed stiffness the step is the published one of another deflection and time (see `bristles.settle`).
+    With a fixed stiffness the step is the published one of another deflection and time (see `bristles.bristle_limit`).
     """
     (law, shape, reference) = contact
     loaded = inner(load > 0.0)

@@ -88,7 +88,8 @@ class Motion(NamedTuple):
     anchor: Doubles
     """Pose of the anchor of each spring at the start of each piece, and its velocity, [S, K, 6]."""
     stop_speed: float
-    """Speed [m/s] of a body at rest: the run ends when its speed is below and stays so (see `termination`); 0: never."""
+    """Speed [m/s] of a body at rest: the run ends when its speed is below and stays so (see `termination`); 0:
+    never."""
     stop_radius: float
     """Lever arm that turns spin into speed for that test [m]."""
     stop_time: float

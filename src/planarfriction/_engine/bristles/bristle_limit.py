@@ -5,8 +5,8 @@ f_ref/f`, in place of `sigma_0`. Rates and tractions per unit load then follow t
 deflection, and a step of dt from z is 1/l of a step of `l dt` from `l z`.
 
 At rest a published bristle is never bent further than `mu_s/sigma_0`, seen from `a mu_s/sigma_0` where friction differs
-forwards and backwards (see `asymmetric_cells`). One that a falling load has left beyond is brought back onto that limit,
-by steps as they begin (`cells.fixed_stiffness.stepped`), by the solver within a short time (`recovery`).
+forwards and backwards (see `asymmetric_cells`). One that a falling load has left beyond is brought back onto that
+limit, by steps as they begin (`cells.fixed_stiffness.stepped`), by the solver within a short time (`recovery`).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Steps, rates and their derivatives of cells in blocks as vector loops, written from the functions of one cell.
 
-An `Element` is the bristle of a kind of cells (see `points`, `discs`). See `loop_generation` for how loops come out of a trace,
-`cell_steps` and `cell_rollouts` for what runs them.
+An `Element` is the bristle of a kind of cells (see `points`, `discs`). See `loop_generation` for how loops come out of
+a trace, `cell_steps` and `cells_rollout` for what runs them.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`) and adds `
 traction (docs/physics.md, "Distributed model").
 
 A bristle whose stiffness does not grow with the load (docs/physics.md, "Stiffness and load") moves as one of the
-published law at `l z` with `l = f_ref/f` (see `bristle_limit`), and besides returns to its limit where a falling load has left
-it beyond. The factor l comes behind the twist.
+published law at `l z` with `l = f_ref/f` (see `bristle_limit`), and besides returns to its limit where a falling load
+has left it beyond. The factor l comes behind the twist.
 """
 
 from __future__ import annotations
