@@ -12,7 +12,7 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction._engine.bristles import discs, points
 from planarfriction._engine.bristles.bristle_limit import within
-from planarfriction._engine.bristles.law import grip
+from planarfriction._engine.bristles.law import inverse_deflection
 from planarfriction._engine.cells import cells, cells_rollout
 from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.ratios import ratio
@@ -271,7 +271,9 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         given = _law(trace, law)
         u = lever.seen(own, _vector(trace, *_TWIST))
         speed, pull = twin(sliding)(u)[2:]
-        z = twin(times)(twin(ratio)(1.0, speed * twin(grip)(given, speed)), pull)
+        z = twin(times)(
+            twin(ratio)(1.0, speed * twin(inverse_deflection)(given, speed)), pull
+        )
         return lever.wrench(own, twin(cell)(given, z, u, 0.0)[1])
 
     def slopes(trace: Trace) -> Any:
@@ -357,8 +359,8 @@ def _published(model: ReducedModelPublished, *_: Any) -> Pieces:
     def steady(trace: Trace) -> Any:
         own, part = steps.read(contact(trace))
         held = steps.hold(part, steps.seen(own, _vector(trace, *_TWIST)))
-        grip = part.law.sigma_0 / twin(formulas.stribeck)(Mathematics, held.v, part.law)
-        x, y, s = twin(times)(twin(ratio)(1.0, grip * held.v), held.u)
+        q = part.law.sigma_0 / twin(formulas.stribeck)(Mathematics, held.v, part.law)
+        x, y, s = twin(times)(twin(ratio)(1.0, q * held.v), held.u)
         settled = x, y, part.shape.contact_radius * s
         wrench = steps.wrench_of(own, steps.taped_step(part, held, settled, 0.0).wrench)
         return tuple(Mathematics.where(held.v > 0.0, each, 0.0) for each in wrench)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from planarfriction import formulas, models
 from planarfriction._engine.bristles import bristle_step
-from planarfriction._engine.bristles.law import grip
+from planarfriction._engine.bristles.law import inverse_deflection
 from planarfriction._engine.published import published_contact
 from planarfriction._engine.published.published_contact import PublishedPatch, Root
 from planarfriction.formulas import LawNumbers
@@ -129,7 +129,7 @@ def drive(xp, law: LawNumbers, own: PublishedNumbers, twist) -> Drive:
     speed = xp.norm(twist, -2)
     u = wide(own.surface(narrow(twist), narrow(speed)))
     per_h = xp.over(published_contact.per_h)(Vector(u), speed)
-    return Drive(u, speed, per_h, xp.over(grip)(law, speed), viscous)
+    return Drive(u, speed, per_h, xp.over(inverse_deflection)(law, speed), viscous)
 
 
 def evaluate(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive):

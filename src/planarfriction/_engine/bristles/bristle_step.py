@@ -6,7 +6,7 @@ A bristle `z` driven by `u` steps by
     n = back (exp(-x) z + (1 - exp(-x))/x dt u),   k(n)
 
 (docs/physics.md, "A step at a held twist"). `k` sees the deflection `|z| q/h` and `along = z/|z| . u/h`, with the
-grip `q`, the speed `v` and `h = |u|/v`. `codegen.derivatives` writes the derivatives.
+inverse deflection `q`, the speed `v` and `h = |u|/v`. `codegen.derivatives` writes the derivatives.
 
 At the kinks: the slope of a norm at zero is zero, and `along` of no bristle is constant. A minimum or maximum of equal
 numbers has the slope of its first argument. A bristle that the cap just touches counts as not capped: steady sliding

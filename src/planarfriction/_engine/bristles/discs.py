@@ -17,7 +17,7 @@ import math
 
 from planarfriction import formulas
 from planarfriction._engine.bristles.bristle_step import capped, seen
-from planarfriction._engine.bristles.law import grip, traction
+from planarfriction._engine.bristles.law import inverse_deflection, traction
 from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.vectors import Vector, norm
 from planarfriction._engine.compiler import compiled_math as xp
@@ -89,7 +89,7 @@ def _rate(u: Vector, z: Vector, k: float, c_t: float, c_s: float, per: float) ->
 def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
     """Return z' and the traction of a disc that moves at u."""
     c_t, c_s, speed, pull = sliding(u)
-    q = grip(law, speed)
+    q = inverse_deflection(law, speed)
     deflection, along, share = _seen(z, pull, _per_h(speed, pull), q)
     rate = _rate(
         u,
@@ -134,7 +134,7 @@ def _relaxed(
 def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
     """Return the bristle after dt and its traction, by the equations of `bristle_step`."""
     c_t, c_s, speed, pull = sliding(u)
-    q = grip(law, speed)
+    q = inverse_deflection(law, speed)
     per_h = _per_h(speed, pull)
     per = 1.0 / (c_t * c_s)
     deflection, along, share = _seen(z, pull, per_h, q)

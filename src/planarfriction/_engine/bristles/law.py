@@ -37,7 +37,7 @@ def squared(law: LawNumbers) -> LawNumbers:
 
 
 @kernel
-def grip(law: LawNumbers, speed: float) -> float:
+def inverse_deflection(law: LawNumbers, speed: float) -> float:
     """Return `sigma_0/g(v)` [1/m]: one over the steady deflection of a bristle."""
     return law.sigma_0 / formulas.stribeck(xp, speed, law)
 

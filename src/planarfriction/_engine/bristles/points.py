@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from planarfriction import formulas
 from planarfriction._engine.bristles import bristle_step
-from planarfriction._engine.bristles.law import grip, traction
+from planarfriction._engine.bristles.law import inverse_deflection, traction
 from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.vectors import Vector, dot, norm, plus
 from planarfriction._engine.compiler import compiled_math as xp
@@ -22,7 +22,7 @@ def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
     """Compute z' and the traction of a point that moves at u."""
     speed = norm(u)
     size = norm(z)
-    q = grip(law, speed)
+    q = inverse_deflection(law, speed)
     rate = plus(
         u,
         -formulas.bristle_decay(xp, size * q, ratio(dot(z, u), size), speed, q, law),
@@ -35,5 +35,7 @@ def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
 def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
     """Compute the bristle after dt and its traction (see `bristle_step`)."""
     speed = norm(u)
-    new, k = bristle_step.step(law, z, u, speed, 1.0, grip(law, speed), dt)
+    new, k = bristle_step.step(
+        law, z, u, speed, 1.0, inverse_deflection(law, speed), dt
+    )
     return new, traction(law, new, plus(u, -k, new), u)

@@ -20,7 +20,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction._engine.bristles.bristle_step import seen
-from planarfriction._engine.bristles.law import grip, traction
+from planarfriction._engine.bristles.law import inverse_deflection, traction
 from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.small_matrices import applied, inverse
@@ -175,7 +175,7 @@ def per_h(u: Vector, v: float) -> float:
 def decay_of(
     law: LawNumbers, z: Vector, u: Vector, v: float, per: float, q: float
 ) -> float:
-    """Return the decay of a scaled bristle at the scaled speed v; `per` is `1/|h|`, q the grip."""
+    """Return the decay of a scaled bristle at the scaled speed v; `per` is `1/|h|`, q the inverse deflection."""
     deflection, along = seen(z, norm(z), u, per, q)
     return formulas.bristle_decay(xp, deflection, along, v, q, law)
 
@@ -184,7 +184,7 @@ def decay_of(
 def _decay(law: LawNumbers, z: Vector, u: Vector, twist: Vector) -> float:
     """Return the decay of the bristle at the scaled twist for which the limit surface gives u."""
     v = norm(twist)
-    return decay_of(law, z, u, v, per_h(u, v), grip(law, v))
+    return decay_of(law, z, u, v, per_h(u, v), inverse_deflection(law, v))
 
 
 _SLOPES = derive(_decay, ("z", "u", "twist"), {"z": 3, "u": 3, "twist": 3})

@@ -14,7 +14,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction._engine.bristles import bristle_step
-from planarfriction._engine.bristles.law import PARAMETERS, grip
+from planarfriction._engine.bristles.law import PARAMETERS, inverse_deflection
 from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.vectors import (
     Vector,
@@ -150,7 +150,9 @@ def _step(
     r = shape.contact_radius
     v = norm(twist)
     scaled = z[0], z[1], z[2] / r
-    new, k = bristle_step.step(law, scaled, u, v, per_h(u, v), grip(law, v), dt)
+    new, k = bristle_step.step(
+        law, scaled, u, v, per_h(u, v), inverse_deflection(law, v), dt
+    )
     rate = plus(u, -k, new)
     fx = formulas.traction(new[0], rate[0], twist[0], law)
     fy = formulas.traction(new[1], rate[1], twist[1], law)
