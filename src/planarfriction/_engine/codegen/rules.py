@@ -143,8 +143,17 @@ def _relaxation(results: tuple, _: Any, x: Any) -> tuple:
     return (0.0, -remaining), (0.0, formulas.relaxation_slope(xp, x, remaining, mean))
 
 
-# One over a norm of 1e-160 leaves the range of numbers if it is squared, or multiplied by anything but its vector.
-primitive(vectors.norm, lambda size, a: (vectors.times(per(size), a),))
+def _unit(size: Any, a: Any) -> tuple:
+    """Return the unit vector of `a`; zeros without a direction.
+
+    Quotients, since compilers order products anew: one over a norm of 1e-160 leaves the range of numbers if it is
+    squared, or multiplied by anything but its vector.
+    """
+    divisor = xp.where(size > 0.0, size, 1.0)
+    return (tuple(each / divisor for each in a),)
+
+
+primitive(vectors.norm, _unit)
 primitive(per, lambda t, x: (-t * t,))
 primitive(ratio, lambda t, x, y: (per(y), -t * per(y)))
 primitive(formulas.relaxation, _relaxation)
