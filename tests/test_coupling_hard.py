@@ -69,8 +69,10 @@ def test_what_does_not_converge_does_no_work_that_bristles_do_not_give():
     assert lost >= 5 and wrong >= 50
 
 
-@pytest.mark.parametrize("speed", [1e-3, 1.0])
-@pytest.mark.parametrize("growth", [0.5, 2.0, 10.0])
+@pytest.mark.parametrize(
+    ("growth", "speed"),
+    [(0.5, 1e-3), (0.5, 1.0), (2.0, 1e-3), (10.0, 1e-3), (10.0, 1.0)],
+)
 def test_a_wedge_that_jams_stops(speed, growth):
     """The load grows by so many newtons for each of friction, which is 1.2 N for each of load: above 1/1.2 it jams."""
     patches = CoupledPatches(PATCHES.models[:1])

@@ -236,7 +236,8 @@ def cases(draw):
         patch = pf.ContactPatch.line(0.02, int(random.integers(2, 9)), profile=None)
         patch = dataclasses.replace(patch, pressure=random.uniform(size=patch.cells))
     elif shape == "polygon":
-        angle = np.sort(random.uniform(0.0, 2.0 * math.pi, size=7))
+        # No gap of half a turn, which would make sides cross.
+        angle = (np.arange(7) + random.uniform(size=7)) * 2.0 * math.pi / 7.0
         patch = pf.ContactPatch.polygon(
             0.02
             * random.uniform(0.3, 1.0, 7)[:, None]

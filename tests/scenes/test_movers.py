@@ -212,7 +212,7 @@ def test_velocities_of_contacts_are_checked():
     moving = pf.Contact(MODELS["reduced"], 1.0, name="pad", support_velocity=SWAY)
     with pytest.raises(
         pf.FrictionError,
-        match="support_velocity of contact 'pad' must be None if the body's",
+        match="support_velocity of contact 'pad' must be None if the velocity",
     ):
         pf.Scene(body, [moving], 1.0, velocity=(1.0, 0.0, 0.0))
 

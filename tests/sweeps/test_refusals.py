@@ -171,7 +171,7 @@ REFUSED = [
             (
                 "",
                 1.0,
-                " must name a value of the scene: the scene has name, t_end, save_every, stop_speed,",
+                " must name a value of the scene: the scene has name, t_end, save_every,",
             ),
         )
     ),
