@@ -1,4 +1,4 @@
-"""Pressure that follows the moments of the load (the rule: `cells.tilt`)."""
+"""Pressure that follows the moments of the load (the rule: `cells.moment_pressure`)."""
 
 from __future__ import annotations
 

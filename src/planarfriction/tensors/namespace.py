@@ -44,7 +44,7 @@ class Namespace:
     - `extremes(name, value)`: smallest and largest number, or None if there is none to read without waiting;
       InvalidValueError outside the range of `validation.within_range`.
     - `pressing(u, v, share, x, y, narrow)`: the cells at (u, v) with shares of a load that press where it is at (x, y),
-      bool `[..., N]`, by the rule of `cells.tilt` in its scaled coordinates; without derivatives
+      bool `[..., N]`, by the rule of `cells.moment_pressure` in its scaled coordinates; without derivatives
     - `to_numpy(value)`, where anything but an array of the library stays; `from_numpy(array, like)`, a copy with the
       number type and the device of `like`
     - `in_double(function, *arrays)`, the result of a function of arrays computed in double precision, in their own

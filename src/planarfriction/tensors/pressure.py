@@ -1,4 +1,4 @@
-"""Pressure that follows the moments of the load over `xp`: `cells.tilt` in operations with derivatives.
+"""Pressure that follows the moments of the load over `xp`: `cells.moment_pressure` in operations with derivatives.
 
 A front end finds which cells press, without derivatives (`Namespace.pressing`). With these the plane has a closed form,
 whose derivatives are those of the rule: cells that are about to lift press with nothing.
