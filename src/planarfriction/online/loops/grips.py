@@ -129,7 +129,7 @@ REPEATS = 4.0
 """Repetitions from which a slip velocity that is not 0 is that of a frozen sensor [-]."""
 
 FROZEN = 8.0
-"""Repetitions from which such a sensor leaves no measurement that a grip may follow [-]."""
+"""Equal slip velocities in a row from which a grip follows no measurement [-]."""
 
 UNSURE = 1.2
 """Grip of a part whose friction cannot be found, over the one that its load needs at the least friction [-]."""
