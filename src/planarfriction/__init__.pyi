@@ -12,6 +12,7 @@ from . import laws as laws
 from . import limit_surface as limit_surface
 from . import models as models
 from . import online as online
+from . import pads as pads
 from . import patch as patch
 from . import planning as planning
 from . import plots as plots
@@ -39,6 +40,7 @@ from .limit_surface import LimitSurfaceTablePublished as LimitSurfaceTablePublis
 from .models import DistributedModel as DistributedModel
 from .models import ReducedModel as ReducedModel
 from .models import ReducedModelPublished as ReducedModelPublished
+from .pads import Pad as Pad
 from .patch import ContactPatch as ContactPatch
 from .patch import Grid as Grid
 from .patch import LinearGradient as LinearGradient

@@ -16,12 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planarfriction._engine.compiler.calls import address_of
-from planarfriction._engine.compiler.memory import Layout, StructBuffer, places_of
+from planarfriction._engine.compiler.memory import places_of
 from planarfriction._engine.compiler.threads import share
 from planarfriction._engine.coupled import coupling as kernels
-from planarfriction._engine.coupled.coupling_rows import Followers, Patches, layout
 from planarfriction._engine.records.packed import PackedModel
+from planarfriction._engine.records.patches import PackedPatches, packed_patches
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
@@ -262,8 +261,6 @@ class CoupledPatches(ByValue):
         for p in range(len(self.models)) if patches is None else patches:
             if not follows(self.models[p]):
                 rule = "be None: a patch without cells cannot follow them while its shape follows the load"
-                if self.models[p].law.reference_load is not None:
-                    rule = "be None for a law with a reference_load"
                 raise InvalidValueError(
                     "moments", rule, f"model {p}: {type(self.models[p]).__name__}"
                 )
@@ -369,70 +366,14 @@ class CoupledPatches(ByValue):
         return np.cumsum([0, *(math.prod(model.state_shape) for model in self.models)])
 
     @functools.cached_property
-    def _packed(self) -> _PackedPatches:
-        return _packed(self.models, self._bounds)
+    def _packed(self) -> PackedPatches:
+        # All cells, whatever load they carry: a lever arm that does not follow the load.
+        levers = list(map(lever_of, self.models))
+        return packed_patches([model.compiled for model in self.models], levers)
 
     @property
     def _parts(self) -> dict[str, slice]:
         return self._packed.layout.slices
-
-
-class _PackedPatches(NamedTuple):
-    """Patches as compiled code sees them."""
-
-    patches: StructBuffer
-    """`Patches` of compiled code."""
-    layout: Layout
-    """Layout of the row of a problem."""
-    records: np.ndarray
-    """Addresses of the patches' records, int `[k]`; 0 of those that follow their loads."""
-    sizes: np.ndarray
-    """Words of the patches' records, int `[k]`; 0 of those that follow their loads."""
-    following: list[int]
-    """Patches whose shapes follow their loads."""
-    kept: list[PackedModel | None]
-    """Objects behind the addresses, which have to be kept alive."""
-
-
-def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatches:
-    compiled = [model.compiled for model in models]
-    fixed = [each.fixed for each in compiled]
-    records = np.array(
-        [0 if each is None else places_of(each.records)[0] for each in fixed], np.int64
-    )
-    sizes = np.array(
-        [0 if each is None else each.records.shape[1] for each in fixed], np.int64
-    )
-    places, words = zip(*(each.points() for each in compiled), strict=True)
-    x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
-    followers = Followers(
-        x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64)
-    )
-    rows = layout(
-        len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum())
-    )
-    patches = Patches(
-        count=len(models),
-        states=int(bounds[-1]),
-        solve=address_of(kernels.solve),
-        steps=np.array(
-            [address_of(each.functions.step) for each in compiled], np.int64
-        ),
-        slopes=np.array(
-            [address_of(each.functions.slopes) for each in compiled], np.int64
-        ),
-        firsts=bounds.astype(np.int64),
-        # all cells, whatever load they carry: a lever arm that does not follow the load
-        radius=np.array([lever_of(model) for model in models]),
-        reference=np.array(
-            [model.law.reference_load or 0.0 for model in models], float
-        ),
-        bristle=np.array([model.state_shape[0] for model in models], np.int64),
-        followers=followers,
-        row=rows.offsets,
-    )
-    following = [p for p, each in enumerate(fixed) if each is None]
-    return _PackedPatches(StructBuffer(patches), rows, records, sizes, following, fixed)
 
 
 def follows(model: FrictionModel) -> bool:

@@ -36,8 +36,8 @@ class Seen(NamedTuple):
 
     twist: Doubles
     """[3]"""
-    factor: Doubles
-    """Factor on the stiffness, [1]."""
+    load: Doubles
+    """Load [N], [1]."""
     place: Doubles
     """Place of the body in the contact frame [m], and its angle in the world, [3]."""
     axes: Doubles
@@ -46,7 +46,7 @@ class Seen(NamedTuple):
     """Share of the load of whole cells that lies on the body, to be written where there is an edge; else 1, [1]."""
 
 
-_SEEN = Layout(Seen, twist=3, factor=1, place=3, axes=2, covered=1)
+_SEEN = Layout(Seen, twist=3, load=1, place=3, axes=2, covered=1)
 
 
 SEEN = _SEEN.offsets
@@ -126,7 +126,8 @@ class StepFunctions(NamedTuple):
     """Compiled steps of a contact with S states.
 
     Their arguments are `(contact, z, V, dt, new, out)`: the address of the contact's record (with which the solver
-    calls its `protocol.ModelFunctions`), a number `dt`, and pointers to doubles. They write the new state to `new` and
+    calls its `protocol.ModelFunctions`), a number `dt`, and pointers to doubles; behind V is the load. They write the new
+    state to `new` and
     to `out`, per unit load, the wrench W at the end of the step [3] and derivatives.
     """
 

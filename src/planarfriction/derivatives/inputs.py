@@ -69,7 +69,7 @@ class RolloutInputs(NamedTuple):
             self.normal_force,
             self.dt,
             which,
-            self.model.reference,
+            self.model.springs,
         )
 
 

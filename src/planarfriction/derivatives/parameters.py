@@ -66,12 +66,12 @@ PUBLISHED = RolloutFunctions(
 
 
 @functools.cache
-def _cells(size: int, turned: bool, leans: bool) -> RolloutFunctions:
+def _cells(size: int, turned: bool, sort: str) -> RolloutFunctions:
     """Return the rollouts of `DistributedModel` of points, size 2, or of discs, 3 (see `cell_loops.KINDS`)."""
     return RolloutFunctions(
         cells_rollout.PARAMETERS,
         np.array(cells_rollout.COLUMNS),
-        *rollouts_of_cells(size, turned, leans),
+        *rollouts_of_cells(size, turned, sort),
     )
 
 
@@ -87,8 +87,8 @@ class PackedRollout(NamedTuple):
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
     inner: tuple[int, ...] = (3,)
     """Shape of the state of one contact."""
-    reference: float = 0.0
-    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
+    springs: float = 1.0
+    """See `cells.rollouts.Inputs`."""
     batch: tuple[int, ...] = ()
     """Batch axes of the weights of cells, if contacts differ in them: `shapes` has one row for each."""
 
@@ -139,7 +139,7 @@ def _family(model: Any) -> RolloutFunctions:
         return PUBLISHED
     if isinstance(model, DistributedModel) and not is_rate_law(model.law):
         return _cells(
-            model.patch.bristles, model.patch.anisotropic, model.patch.asymmetric
+            model.patch.bristles, model.patch.anisotropic, model.compiled.sort
         )
     kind = (
         "cells with a RateLaw"
@@ -184,7 +184,7 @@ def _packed(model: Any) -> PackedRollout:
             np.array(law),
             shapes,
             inner=model.state_shape,
-            reference=model.compiled.reference,
+            springs=model.compiled.springs,
         )
     shape = model.shape_at(1.0)
     surface = shape.surface.numbers

@@ -26,9 +26,6 @@ class FrictionLaw(Checked):
     dimensions, where `axis` is the axis of the components.
     """
 
-    reference_load: ClassVar[float | None] = None
-    """Load [N] at which `sigma_0` holds, of a law whose stiffness does not grow with the load; None: it does."""
-
     def _repr_html_(self) -> str:
         return picture("law in a notebook", self)
 
@@ -48,10 +45,7 @@ class FrictionLaw(Checked):
 
     @property
     def largest_deflection(self) -> float:
-        """Steady-state deflection at high speed, `mu_c / sigma_0` [m], which is the natural scale of a bristle.
-
-        That at the reference load, of a law that has one: deflections grow with the load then.
-        """
+        """Steady-state deflection at high speed, `mu_c / sigma_0` [m], which is the natural scale of a bristle."""
         return self.numbers.mu_c / self.numbers.sigma_0
 
     def steady_friction(self, speed: ArrayLike) -> np.ndarray:
@@ -71,44 +65,18 @@ class FrictionLaw(Checked):
         """True if a bristle that is not driven keeps its deflection, so that a contact can stick under a load."""
         return self.numbers.creep_speed == 0.0
 
-    def stiffness_factor(self, normal_force: ArrayLike) -> np.ndarray:
-        """Return what `sigma_0` has to be multiplied by at loads `[...]` [N]: `reference_load/f_N`, or 1 without one.
-
-        Raises InvalidValueError for a load below zero.
-        """
-        load = validation.non_negative_numbers("normal_force", normal_force)
-        if self.reference_load is None:
-            return np.ones(load.shape)
-        return self.reference_load / np.maximum(
-            load, formulas.LIGHTEST * self.reference_load
-        )
-
     def rate(
         self,
         state: ArrayLike,
         velocity: ArrayLike,
-        normal_force: ArrayLike | None = None,
         *,
         axis: int | None = None,
     ) -> np.ndarray:
         """Return the rate `zdot` [m/s] of bristles with deflection `state` [m] driven at `velocity` [m/s].
 
-        All broadcast; a law with a `reference_load` needs the `normal_force` [N]. How the rate of bristles grows that a
-        falling load has left beyond their limit is up to models (see docs/physics.md, "Stiffness and load").
-
-        Raises InvalidValueError for shapes that do not broadcast, and where a load is missing.
+        Both broadcast. Raises InvalidValueError for shapes that do not broadcast.
         """
         z, v = _bristles(state, velocity, axis)
-        if normal_force is not None:
-            validation.non_negative_numbers("normal_force", normal_force)
-        if self.reference_load is not None:
-            if normal_force is None:
-                raise InvalidValueError(
-                    "normal_force",
-                    "be given for a law with a reference_load",
-                    normal_force,
-                )
-            z = z * _expanded(self.stiffness_factor(normal_force), axis)
         return self._bristle(z, v, axis)[0]
 
     def force(
@@ -126,10 +94,9 @@ class FrictionLaw(Checked):
         """
         z, v = _bristles(state, velocity, axis)
         load = validation.non_negative_numbers("normal_force", normal_force)
-        factor = _expanded(self.stiffness_factor(load), axis)
-        load = _expanded(load, axis)
+        load = load if axis is None else np.expand_dims(load, axis)
         validation.broadcast(state=z, velocity=v, normal_force=load)
-        return load * self._bristle(factor * z, v, axis)[1]
+        return load * self._bristle(z, v, axis)[1]
 
     def _bristle(
         self, z: np.ndarray, v: np.ndarray, axis: int | None
@@ -145,10 +112,6 @@ class FrictionLaw(Checked):
             v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
         )
         return rate, formulas.traction(z, rate, v, law)
-
-
-def _expanded(load: np.ndarray, axis: int | None) -> np.ndarray:
-    return load if axis is None else np.expand_dims(load, axis)
 
 
 def _bristles(
@@ -188,16 +151,6 @@ def refuse_rate_law(law: Any, by: str) -> None:
     if is_rate_law(law):
         rule = f"have the bristles of LuGre for {by}, not a rate of its own"
         raise InvalidValueError("law", rule, type(law).__name__)
-
-
-def refuse_fixed_stiffness(law: Any, by: str) -> None:
-    """Raise for a law whose stiffness does not grow with the load, where it must."""
-    if getattr(law, "reference_load", None) is not None:
-        raise InvalidValueError(
-            "law",
-            f"have no reference_load for {by}, which does not know it",
-            law.reference_load,
-        )
 
 
 def _norm(vector: np.ndarray, axis: int | None) -> np.ndarray:

@@ -29,9 +29,6 @@ class Dahl(FrictionLaw):
     """Coulomb coefficient [-]."""
     sigma_0: float = checked(validation.positive, default=1e6)
     """Bristle stiffness per unit normal load [1/m]."""
-    reference_load: float | None = checked(validation.positive, default=None)
-    """Load [N] at which `sigma_0` holds, for a stiffness `sigma_0 reference_load` [N/m] that does not grow with the
-    load; None: the stiffness is `sigma_0 f_N`, as published."""
 
     @property
     def numbers(self) -> LawNumbers:

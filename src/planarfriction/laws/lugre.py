@@ -79,9 +79,6 @@ class LuGre(FrictionLaw):
     )
     """Elasto-plastic extension, None for plain LuGre; a number is the breakaway ratio [-] of `ElastoPlastic`: bristles
     deflected less than this share of their maximum do not slip."""
-    reference_load: float | None = checked(validation.positive, default=None)
-    """Load [N] at which `sigma_0` holds, for a stiffness `sigma_0 reference_load` [N/m] that does not grow with the
-    load; None: the stiffness is `sigma_0 f_N`, as published."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -18,6 +18,7 @@ from planarfriction._support.equality import ByValue, by_parts, unusual
 from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
+from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.moment_pressure import centre_of, moments_of
 
@@ -56,6 +57,9 @@ class FrictionModel(ByValue):
     """Geometry of the contact, and how the load is distributed over it."""
     law: FrictionLaw
     """Law of the bristles, such as `LuGre`."""
+
+    pad: ClassVar[Pad | None] = None
+    """Pad under the patch, which models with bristles in cells can have (`DistributedModel`, `ReducedModel`)."""
 
     state_units: ClassVar[str] = "m"
     """Units of the state: one for all components, or one for each."""
@@ -255,10 +259,6 @@ class FrictionModel(ByValue):
         All come out in C order and writable: compiled loops know no other arrays, and sums run the same way.
         """
         held = None if moments is None else moments_of(moments)
-        if held is not None and self.law.reference_load is not None:
-            raise InvalidValueError(
-                "moments", "be None for a law with a reference_load", "moments"
-            )
         state = validation.numbers("state", state)
         inner = self.state_shape
         if state.shape[state.ndim - len(inner) :] != inner:
@@ -316,9 +316,28 @@ class FrictionModel(ByValue):
         ]
 
 
+def refuse_pad(model: FrictionModel, by: str) -> None:
+    """Raise InvalidValueError for a model with a pad, which `by` does not know."""
+    if model.reduction.pad is not None:
+        pad = type(model.reduction.pad).__name__
+        raise InvalidValueError("pad", f"be None for {by}, which knows no pads", pad)
+
+
+def refuse_common(model: FrictionModel, by: str) -> None:
+    """Raise InvalidValueError for a pad with a common compliance, which `by` does not know."""
+    pad = model.reduction.pad
+    if pad is not None and model.compiled.compliance is not None:
+        rule = f"have no common compliance for {by}, which knows none"
+        raise InvalidValueError("pad", rule, type(pad).__name__)
+
+
 def lever_of(model: FrictionModel) -> float:
     """Return the lever arm [m] at which spins of a patch count as speeds."""
-    patch = model.patch
+    return arm_of(model.patch)
+
+
+def arm_of(patch: ContactPatch) -> float:
+    """Return the lever arm [m] at which spins of a patch count as speeds."""
     return math.sqrt(
         float((patch.positions**2).sum(axis=1).mean() + 0.5 * (patch.radii**2).mean())
     )
@@ -328,7 +347,4 @@ def _named(law: FrictionLaw) -> str:
     """Return a law in few words, with its friction coefficients."""
     numbers = law.numbers
     static = "" if numbers.mu_s == numbers.mu_c else f", mu_s={numbers.mu_s:g}"
-    fixed = (
-        "" if law.reference_load is None else f", reference_load={law.reference_load:g}"
-    )
-    return f"{type(law).__name__}(mu_c={numbers.mu_c:g}{static}{fixed}, ...)"
+    return f"{type(law).__name__}(mu_c={numbers.mu_c:g}{static}, ...)"

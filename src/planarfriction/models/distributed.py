@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
 
 from planarfriction._engine.records.distributed import CompiledDistributed
 from planarfriction._engine.records.rate_cells import CompiledRateCells
-from planarfriction.errors import InvalidValueError
-from planarfriction.formulas import LIGHTEST
+from planarfriction._engine.records.soft import CompiledSoft
+from planarfriction._support import validation
+from planarfriction._support.equality import checked
 from planarfriction.laws.base import is_rate_law, refuse_creep, refuse_rate_law
-from planarfriction.models.base import FrictionModel, ModelJacobians
+from planarfriction.models.base import (
+    FrictionModel,
+    ModelJacobians,
+    arm_of,
+    refuse_common,
+)
+from planarfriction.pads import Pad
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,14 +37,21 @@ class DistributedModel(FrictionModel):
     bristle decays towards `a_i g/sigma_0` instead of zero, `zdot_i = u_i - k_i (z_i - a_i g/sigma_0)`, `k_i = beta
     sigma_0 |u_i|/g`, where beta depends on the deflection measured from there.
 
-    A law with a `reference_load` (`LuGre`, `Dahl`) has a stiffness that does not grow with the load; a bristle that a
-    falling load has left beyond its limit slips back onto it (see docs/physics.md, "Stiffness and load").
+    With a `pad` bristle i is a piece of it, whose stiffness K_i is its own and does not grow with its load N_i: it moves
+    as above with `l_i z_i` in place of `z_i`, `l_i = K_i/(sigma_0 N_i)`, and damps along `u_i` alone (docs/pads.md). The
+    state of a pad with a common compliance is flat, `[d N + 3]`; the displacement of the face is last.
 
     Raises InvalidValueError for what is not a patch or a law, for a law that creeps on a patch with an asymmetry, and
-    for one with a `reference_load` on a patch whose shape depends on the load.
+    for a pad that does not go with them.
 
     Source: Waltersson and Karayiannidis 2024, section III.
     """
+
+    _: KW_ONLY
+    pad: Pad | None = checked(  # pyright: ignore[reportIncompatibleVariableOverride]
+        validation.instance, Pad, "a Pad or None", default=None
+    )
+    """Pad under the patch; None: bristles whose stiffness grows with the load, as published."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -50,21 +64,28 @@ class DistributedModel(FrictionModel):
             # At rest they would push.
             refuse_creep(self.law, "patches with an asymmetry")
             refuse_rate_law(self.law, "patches with an asymmetry")
-        if self.law.reference_load is not None and self.patch.depends_on_load:
-            rule = "have a shape that does not depend on the load, for a law with a reference_load"
-            raise InvalidValueError("patch", rule, self.patch.name or "one that does")
+        if self.pad is not None:
+            refuse_rate_law(self.law, "a pad")
+            self.pad.check(self.patch, self.law)
 
     @property
     def state_shape(self) -> tuple[int, ...]:
-        """`(2, N)` for the N cells that can carry load; `(3, N)` for discs."""
-        return (self.patch.bristles, len(self.patch.positions))
+        """`(2, N)` for the N cells that can carry load; `(3, N)` for discs; flat with the face of a pad behind."""
+        return self.compiled.state_shape
 
     @functools.cached_property
     def compiled(self) -> CompiledDistributed:
         """Machine form of the model (see `FrictionModel.compiled`)."""
-        return (CompiledRateCells if is_rate_law(self.law) else CompiledDistributed)(
-            self.law, self.patch
-        )
+        if is_rate_law(self.law):
+            return CompiledRateCells(self.law, self.patch)
+        if self._common:
+            return CompiledSoft(self.law, self.patch, self.pad, arm_of(self.patch))
+        return CompiledDistributed(self.law, self.patch, self.pad)
+
+    @functools.cached_property
+    def _common(self) -> bool:
+        """True if the pieces of the pad have a compliance in common."""
+        return self.pad is not None and self.pad.compliance(self.patch) is not None
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Return the analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.
@@ -80,11 +101,10 @@ class DistributedModel(FrictionModel):
         wrench_state = np.einsum("dan,...abn->...dbn", lever, share * pull_state)
         rate_load = np.zeros_like(state)
         wrench_load = self.compiled.evaluate(state, twist, load)[1]
-        # Rates and tractions are functions of `z f_ref/f`.
-        if self.compiled.reference > 0.0:
-            per = np.where(
-                load > LIGHTEST * self.compiled.reference, -1.0, 0.0
-            ) / np.where(load > 0.0, load, 1.0)
+        # Rates and tractions of a pad are functions of `z/f`.
+        if self.pad is not None:
+            refuse_common(self, "derivatives of rates")
+            per = -1.0 / np.where(load > 0.0, load, np.inf)
             rate_load = np.einsum("...,...abn,...bn->...an", per, rate_state, state)
             wrench_load = wrench_load + np.einsum(
                 "...,...dbn,...bn->...d", per, wrench_state, state
@@ -99,4 +119,5 @@ class DistributedModel(FrictionModel):
         )
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
+        refuse_common(self, "a start under load")
         return deflections

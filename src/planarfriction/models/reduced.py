@@ -12,10 +12,17 @@ import numpy as np
 
 from planarfriction._engine.records.base import CompiledModel
 from planarfriction._support import validation
+from planarfriction._support.equality import checked
 from planarfriction.laws import FrictionLaw
-from planarfriction.laws.base import is_rate_law
-from planarfriction.models.base import FrictionModel, ModelJacobians
+from planarfriction.laws.base import is_rate_law, refuse_rate_law
+from planarfriction.models.base import (
+    FrictionModel,
+    ModelJacobians,
+    refuse_common,
+)
 from planarfriction.models.distributed import DistributedModel
+from planarfriction.models.pad_discs import discs_of
+from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 
 POINTS = 2
@@ -34,16 +41,22 @@ class ReducedModel(FrictionModel):
     reduced model, all of them are the distributed one. The state is `[3, n]` [m], n at most `cells`. A `RateLaw`, whose
     bristles have two components, gets twice as many points at the centres of discs, and the state `[2, n]`.
 
-    Raises InvalidValueError unless `cells` is an integer >= 1.
+    The discs of a `pad` are chosen by its stiffness, and their stiffnesses fitted once to that of all its pieces, in a
+    second or a few (see `models.pad_discs`).
+
+    Raises InvalidValueError unless `cells` is an integer >= 1, and for a pad as `DistributedModel` does.
     """
 
     _: KW_ONLY
-    cells: int = 24
+    cells: int = checked(validation.count, default=24)
     """Number of discs that stand for the patch."""
+    pad: Pad | None = checked(  # pyright: ignore[reportIncompatibleVariableOverride]
+        validation.instance, Pad, "a Pad or None", default=None
+    )
+    """Pad under the patch; None: bristles whose stiffness grows with the load, as published."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "cells", validation.count("cells", self.cells))
         _ = self.reduction
 
     @functools.cached_property
@@ -55,7 +68,12 @@ class ReducedModel(FrictionModel):
         if is_rate_law(self.law):
             few = self.patch.discs(POINTS * self.cells)
             return DistributedModel(dataclasses.replace(few, radii=None), self.law)
-        return DistributedModel(self.patch.discs(self.cells), self.law)
+        if self.pad is None:
+            return DistributedModel(self.patch.discs(self.cells), self.law)
+        refuse_rate_law(self.law, "a pad")
+        self.pad.check(self.patch, self.law)
+        discs, pad = discs_of(self.patch, self.law, self.pad, self.cells)
+        return DistributedModel(discs, self.law, pad=pad)
 
     @property
     def state_shape(self) -> tuple[int, ...]:
@@ -83,13 +101,26 @@ class ReducedModel(FrictionModel):
         return changed
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
-        return _of_discs(self.reduction.patch, self.patch, deflections, load)
+        refuse_common(self, "a start under load")
+        few = self.reduction
+        if self.pad is None:
+            stiff = self.patch.weights(load), few.patch.weights(load)
+        else:
+            pieces = few.pad.pieces(few.patch, self.law)  # pyright: ignore
+            stiff = self.pad.pieces(self.patch, self.law), pieces
+        return _of_discs(few.patch, self.patch, deflections, *stiff)
 
 
 def _of_discs(
-    few: ContactPatch, patch: ContactPatch, deflections: np.ndarray, load: float
+    few: ContactPatch,
+    patch: ContactPatch,
+    deflections: np.ndarray,
+    weights: np.ndarray,
+    borne: np.ndarray,
 ) -> np.ndarray:
     """Return the bristles of discs from the `deflections` `[2 or 3, N]` of the cells of a patch.
+
+    `weights` and `borne` are shares of the stiffness of the cells and of the discs, or stiffnesses.
 
     A disc takes the rigid motion that is nearest to the cells next to it; the least rigid motion of all discs that
     gives them the wrench of all cells is added.
@@ -97,7 +128,6 @@ def _of_discs(
     from scipy.spatial import KDTree
 
     nearest = np.asarray(KDTree(few.positions).query(patch.positions)[1])
-    weights = patch.weights(load)
     levers = patch.levers()
     discs = few.levers()
     shares = np.bincount(nearest, weights, few.cells)
@@ -121,7 +151,6 @@ def _of_discs(
         spreads, spin / np.where(spreads, spread, 1.0), 0.0
     )
     whole = np.einsum("n,nij,in->j", weights, levers, deflections)
-    borne = few.weights(load)
     missing = whole - np.einsum("n,nij,in->j", borne, discs, state)
     stiffness = np.einsum("n,nia,nib->ab", borne, discs, discs)
     return state + np.einsum(

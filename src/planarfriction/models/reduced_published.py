@@ -16,7 +16,7 @@ from planarfriction._support import validation
 from planarfriction._support.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
-from planarfriction.laws.base import refuse_fixed_stiffness, refuse_rate_law
+from planarfriction.laws.base import refuse_rate_law
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.models.base import FrictionModel, ModelJacobians
@@ -195,7 +195,6 @@ class ReducedModelPublished(FrictionModel):
     def __post_init__(self) -> None:
         super().__post_init__()
         refuse_rate_law(self.law, "ReducedModelPublished")
-        refuse_fixed_stiffness(self.law, "ReducedModelPublished")
         validation.choice("on_load_change", self.on_load_change, ON_LOAD_CHANGE)
         if self.surface is None:
             self._set(surface=LimitSurfaceTablePublished(self.patch))

@@ -130,6 +130,42 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
         return type(patch)(positions, areas, law, None, patch.name, **fields)
 
 
+class Membership(NamedTuple):
+    """Cells of a patch in clusters: membership m is a part of a cell."""
+
+    cells: np.ndarray
+    """Cell of each membership, in the order of clusters, `[M]`."""
+    parted: np.ndarray
+    """Part of the cell, `[M]`."""
+    begins: np.ndarray
+    """First membership of each cluster, `[n]`."""
+
+    def sums(self, values: np.ndarray) -> np.ndarray:
+        """Return the sums `[..., n]` of values `[..., N]` of cells over those of each cluster."""
+        parts = values[..., self.cells] * self.parted
+        return np.add.reduceat(parts, self.begins, axis=-1)
+
+
+def clusters_of(patch: ContactPatch, shares: np.ndarray, n: int) -> Membership:
+    """Return up to n clusters of the cells of a patch with these `shares` `[N]`."""
+    squares = (patch.cell_extents() ** 2).sum(axis=1) / 12.0
+    found = _clusters(patch.positions, shares, squares, n)
+    order = np.argsort(found.labels, kind="stable")
+    labels = found.labels[order]
+    begins = np.searchsorted(labels, np.arange(labels[-1] + 1))
+    return Membership(found.cells[order], found.parted[order], begins)
+
+
+def mirrors(patch: ContactPatch) -> int:
+    """Return the number of mirrors of the shape of a patch that lie on its principal axes."""
+    weights = patch.areas / patch.areas.sum()
+    middle, axes, scale = _frame(patch.positions, weights)
+    points = (patch.positions - middle) @ axes / scale
+    order = np.argsort(points @ SLANTED, kind="stable")
+    period = _period(points[order], weights[order], np.ones(len(order)))
+    return int((period.signs.prod(axis=1) < 0.0).sum())
+
+
 # ---------------------------------------------------------------------- friction that depends on the direction
 
 

@@ -14,7 +14,7 @@ from planarfriction._engine.protocol import calls_of
 from planarfriction._engine.records.packed import PackedModel
 from planarfriction._engine.records.partial_contact import STATES, following, under_edge
 from planarfriction.errors import InvalidValueError
-from planarfriction.laws.base import refuse_fixed_stiffness
+from planarfriction.models.base import refuse_pad
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between, displacement
 from planarfriction.scenes.start import first_slopes, first_states
@@ -44,11 +44,11 @@ def packed_contact(
     """
     packed = contact.model.packed(loads, between)
     if contact.edge:
-        refuse_fixed_stiffness(contact.model.law, "an edge")
+        refuse_pad(contact.model, "an edge")
         return under_edge(contact.model.compiled, packed, outline)  # pyright: ignore[reportArgumentType]
     if contact.pressure == "fixed":
         return packed
-    refuse_fixed_stiffness(contact.model.law, "a pressure that follows the load")
+    refuse_pad(contact.model, "a pressure that follows the load")
     return following(
         contact.model.compiled, packed, contact.centre_of_mass, contact.height
     )
@@ -241,16 +241,16 @@ class SegmentBatches:
             count=np.array([contact.count for contact in contacts], dtype=float),
             state=_starts([model.states for model in self.models]),
             linear=_starts([model.workspace for model in self.models]),
-            reference=np.array([model.reference for model in self.models]),
-            bristle=np.array([model.bristle for model in self.models]),
+            stiff=np.array([model.stiff for model in self.models]),
+            bristle=np.array([contact.model.state_shape[0] for contact in contacts]),
         )
         laws = [contact.model.law for contact in contacts]
         peaks = [self._pieces.largest(c) for c in range(len(contacts))]
         bends = [
-            1.0 / float(law.stiffness_factor(peak)) if peak > 0.0 else 1.0
-            for law, peak in zip(laws, peaks, strict=True)
+            peak / model.stiff if peak > 0.0 and model.stiff > 0.0 else 1.0
+            for model, peak in zip(self.models, peaks, strict=True)
         ]
-        # Deflections at the largest loads, as multiples of those that the laws name: 1 but for a fixed stiffness.
+        # Deflections at the largest loads, as multiples of those that the laws name: 1 but for pads.
         bent = list(zip(bends, self.models, laws, strict=True))
         self._length = min(bend * law.largest_deflection for bend, _, law in bent)
         self._stop_time = max(

@@ -33,10 +33,8 @@ def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
     loads = np.array([float(contact.normal_force(0.0)) for contact in scene.contacts])
     shaped = np.where(loads > 0.0, shaped, 0.0)
     if scene.start == "sliding":
-        fixed = [
-            contact.model.law.reference_load is not None for contact in scene.contacts
-        ]
-        return _sliding(scene, np.where(fixed, loads, shaped))
+        pads = [contact.model.reduction.pad is not None for contact in scene.contacts]
+        return _sliding(scene, np.where(pads, loads, shaped))
     return _equilibrium(scene, loads, shaped)
 
 
@@ -53,7 +51,7 @@ def first_slopes(
     motion = _least_energy(cells, pull)
     bent, slope = cells.bent(motion)
     share = np.repeat(d_loads / np.where(loads == 0.0, 1.0, loads), sizes, axis=1)
-    # Limits of a fixed stiffness grow with loads.
+    # Limits of pads grow with loads.
     longer = bent - np.einsum("nij,nj->ni", slope, cells.levers @ motion)
     fixed = cells.fixed[:, None]
     held = np.einsum(
@@ -136,13 +134,13 @@ class _BristleField(NamedTuple):
     levers: np.ndarray
     """Jacobian of the displacement of each cell by a small motion of the body, `[n, 3, 3]`."""
     stiffness: np.ndarray
-    """`count f_N w_i sigma_0`, or `count f_ref w_i sigma_0`, `[n]` [N/m]."""
+    """`count f_N w_i sigma_0`, or that of the pieces of a pad, `[n]` [N/m]."""
     largest: np.ndarray
     """Largest deflection `[n]` [m]."""
     middle: np.ndarray
     """Deflection of each bristle that is as far from its largest in all directions `[n, 3]` [m]."""
     fixed: np.ndarray
-    """True for cells whose stiffness does not grow with the load, bool `[n]`."""
+    """True for pieces of a pad, whose stiffness does not grow with the load, bool `[n]`."""
 
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the deflections `[n, 3]` after a small motion of the body, and slopes `[n, 3, 3]` by the stretch."""
@@ -203,17 +201,18 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
     # Points do not spin.
     levers = np.pad(levers, ((0, 0), (0, 3 - levers.shape[1]), (0, 0)))
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
-    sigma_0 = law.sigma_0 * float(model.law.stiffness_factor(load))
-    largest = float(formulas.stribeck(np, np.zeros(()), law)) / sigma_0
-    middle = np.pad(largest * patch.asymmetries(), ((0, 0), (0, 1)))
-    fixed = np.full(len(levers), model.law.reference_load is not None)
-    return _BristleField(
-        levers,
-        contact.count * load * sigma_0 * weights,
-        np.full(len(levers), largest),
-        middle,
-        fixed,
-    )
+    holds = float(formulas.stribeck(np, np.zeros(()), law)) * load * weights
+    stiffness = law.sigma_0 * load * weights
+    pad = model.reduction.pad
+    if pad is not None:
+        stiffness = pad.pieces(patch, model.law)
+    largest = np.full(len(levers), float(formulas.stribeck(np, np.zeros(()), law)))
+    largest = largest / law.sigma_0
+    middle = np.pad(largest[:, None] * patch.asymmetries(), ((0, 0), (0, 1)))
+    pads = np.full(len(levers), pad is not None)
+    if pad is not None:
+        largest = holds / stiffness
+    return _BristleField(levers, contact.count * stiffness, largest, middle, pads)
 
 
 def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:

@@ -20,9 +20,7 @@ from planarfriction._engine.body.contacts import (
     contact_map_slopes,
 )
 from planarfriction._engine.body.springs import add_spring_slopes, spring_wrench
-from planarfriction._engine.bristles.bristle_limit import factor_at
 from planarfriction._engine.cells import cells
-from planarfriction._engine.cells.fixed_stiffness import bring_back
 from planarfriction._engine.codegen.small_matrices import applied, inverse
 from planarfriction._engine.codegen.vectors import (
     Vector,
@@ -58,7 +56,7 @@ from planarfriction._engine.protocol import (
 )
 
 NO_LOAD = 1e-6
-"""Share of the reference load below which a fixed stiffness is fixed no longer: limits of 1e-12 m are not followed."""
+"""Share of the load at which a law would be as stiff as its pad, below which limits are not followed: 1e-12 m."""
 
 
 class Motion(NamedTuple):
@@ -111,8 +109,8 @@ class Work(NamedTuple):
     """Wrench of each contact per unit load, [C, 3]."""
     twist: Doubles
     """Twist of one contact and what is behind it (see `protocol.Seen`), [10]."""
-    factor: Doubles
-    """Factor on the stiffness of each contact (see `bristle_limit.factor_at`), as `rates` left it, [C]."""
+    load: Doubles
+    """Loads of contacts as bristles of pads see them, as `rates` left them, [C]."""
     covered: Doubles
     """Share of the load of each contact that lies on the body (see `protocol.Seen`), as `rates` left it, [C]."""
     stiffness: Doubles
@@ -149,7 +147,7 @@ class SystemRecord(NamedTuple):
     rates: int
     """Address of `rates`, and of the functions below."""
     linearise: int
-    factor: int
+    load: int
     solve: int
 
 
@@ -172,7 +170,7 @@ class System(StructBuffer):
         n = len(contacts.count)
         square = (3, 3)
         work = layout(
-            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=SEEN_SIZE, factor=n,
+            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=SEEN_SIZE, load=n,
             covered=n, stiffness=18, matrix=square, inverse=square, to_pose=square, rows=(4, 3), frame=(n, 8),
         )  # fmt: skip
         self._block = np.zeros(work.size)
@@ -216,8 +214,8 @@ def record_of(system: SystemRecord, piece: int, c: int) -> Place:
 
 @kernel
 def hardly_loaded(system: SystemRecord, piece: int, c: int) -> bool:
-    """Return True if contact c has a fixed stiffness and starts a piece with hardly any load."""
-    return load_of(system, piece, 0.0, c) < NO_LOAD * system.contacts.reference[c]
+    """Return True if contact c is one of a pad and starts a piece with hardly any load."""
+    return load_of(system, piece, 0.0, c) < NO_LOAD * system.contacts.stiff[c]
 
 
 @kernel
@@ -230,7 +228,8 @@ def settle_all(system: SystemRecord, piece: int, y: Doubles) -> None:
         if hardly_loaded(system, piece, c):
             contact = cells.read(record_of(system, piece, c))
             size = system.contacts.bristle[c]
-            bring_back(contact, size, at(y, system.contacts.state[c]), 1.0 / NO_LOAD)
+            load = NO_LOAD * system.contacts.stiff[c]
+            cells.settle(contact, size, load, at(y, system.contacts.state[c]))
 
 
 @kernel
@@ -310,11 +309,11 @@ def _placed(a: Doubles, x: float, y: float, angle: float) -> Vector:
 def _seen_from(
     work: Work, c: int, place: Doubles, pose: Doubles, a: Doubles, u: Doubles
 ) -> Seen:
-    """Write what contact c sees of a body: twist, factor, place and axes, with all of the contact covered."""
+    """Write what contact c sees of a body: twist, load, place and axes, with all of the contact covered."""
     seen = arrays_at(SEEN, work.twist)
     put(seen.twist, applied(a, u))
     put(seen.place, _placed(a, pose[0] - place[0], pose[1] - place[1], pose[2]))
-    seen.factor[0] = work.factor[c]
+    seen.load[0] = work.load[c]
     seen.axes[0] = place[2]
     seen.axes[1] = place[3]
     seen.covered[0] = 1.0
@@ -337,10 +336,8 @@ def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> 
         w = at(work.wrench, 3 * c)
         place, seen = place_at(system, piece, since, c, body)
         contact_map(system.contacts.mount[c], place, at(body, 3), a)
-        reference = system.contacts.reference[c]
-        work.factor[c] = factor_at(
-            reference, xp.maximum(load_of(system, piece, since, c), NO_LOAD * reference)
-        )
+        load = load_of(system, piece, since, c)
+        work.load[c] = xp.maximum(load, NO_LOAD * system.contacts.stiff[c])
         inputs = _seen_from(work, c, place, at(body, 3), a, seen)
         states = at(y, first), work.twist, at(dy, first), w
         call(functions_of(system, c).evaluate, (record_of(system, piece, c), *states))

@@ -42,10 +42,10 @@ class Contacts(NamedTuple):
     """Number of the state at which the bristles of each contact begin, [C + 1]."""
     linear: Integers
     """Number of the workspace at which the linearisation of each contact begins, [C + 1]."""
-    reference: Doubles
-    """Reference load [N] of laws whose stiffness does not grow with the load; 0 of others, [C]."""
+    stiff: Doubles
+    """Loads [N] at which laws alone would be as stiff as their pads; 0 without one, [C]."""
     bristle: Integers
-    """Components of a bristle of each contact with such a law, [C]."""
+    """Components of a bristle of each contact, [C]."""
 
 
 @kernel

@@ -204,7 +204,7 @@ def _drifts(system: SystemRecord, piece: int) -> bool:
     drifts = exists(system.motion.mover)
     for c in range(system.size):
         changes = system.motion.load[(2 * piece + 1) * system.size + c] != 0.0
-        drifts = drifts or (changes and system.contacts.reference[c] > 0.0)
+        drifts = drifts or (changes and system.contacts.stiff[c] > 0.0)
     return drifts
 
 

@@ -157,9 +157,9 @@ def gained_load(parameter: int, place: int, c: int, load: float) -> float:
 def follow_load(
     system: SystemRecord, c: int, y: Doubles, load: float, more: float, dy: Doubles
 ) -> None:
-    """Add to the change `dy` of the bristles of contact c, if their stiffness is fixed, the change by `more` load."""
-    reference = system.contacts.reference[c]
-    if reference > 0.0 and load > NO_LOAD * reference:
+    """Add to the change `dy` of the bristles of contact c, if they are of a pad, the change by `more` load."""
+    stiff = system.contacts.stiff[c]
+    if stiff > 0.0 and load > NO_LOAD * stiff:
         for m in range(system.contacts.state[c], system.contacts.state[c + 1]):
             dy[m] -= more / load * y[m]
 
@@ -230,9 +230,7 @@ def wrench_by_input(
     state = system.contacts.state
     more = gained_load(parameter, place, c, load)
     put(rows.d_wrench, (0.0, 0.0, 0.0))
-    if parameter in (FRICTION, SIZE) or (
-        more > 0.0 and system.contacts.reference[c] > 0.0
-    ):
+    if parameter in (FRICTION, SIZE) or (more > 0.0 and system.contacts.stiff[c] > 0.0):
         put(rows.twist, applied(maps_of(system, c)[0], seen_by(system, c, y)))
         put(rows.wrench, unit)
         put(rows.d_twist, (0.0, 0.0, 0.0))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from planarfriction import formulas
-from planarfriction._engine.bristles import bristle_limit, discs, points
+from planarfriction._engine.bristles import discs, points
 from planarfriction._engine.codegen.vectors import Vector, norm, plus, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
@@ -30,10 +30,7 @@ def _in_plane(size: float, a: Vector) -> Vector:
 
 
 def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
-    """Return functions of a bristle from those of a `plain` one, from its `speed(u)`, and from `scaled(size, a)`.
-
-    `out(lean, z)` returns a bristle as seen from the middle of its limit, c at rest; `within` is as in `bristle_limit`.
-    """
+    """Return functions of a bristle from those of a `plain` one, from its `speed(u)`, and from `scaled(size, a)`."""
     rate_of = plain.evaluate
     step_of = plain.step
 
@@ -42,19 +39,6 @@ def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
         return scaled(
             formulas.stribeck(xp, speed(u), lean.law) / lean.law.sigma_0, lean.a
         )
-
-    @kernel
-    def middle(lean: Leaning) -> Vector:
-        return scaled(lean.law.mu_s / lean.law.sigma_0, lean.a)
-
-    @kernel
-    def out(lean: Leaning, z: Vector) -> Vector:
-        return plus(z, -1.0, middle(lean))
-
-    @kernel
-    def within(lean: Leaning, z: Vector) -> Vector:
-        """Compute `bristle_limit.within` of a bristle."""
-        return plus(bristle_limit.within(lean.law, out(lean, z)), 1.0, middle(lean))
 
     @kernel
     def evaluate(lean: Leaning, z: Vector, u: Vector) -> tuple[Vector, Vector]:
@@ -70,10 +54,8 @@ def _leaning(plain: Any, speed: Any, scaled: Any) -> tuple:
         new, pull = step_of(lean.law, plus(z, -1.0, c), u, dt)
         return plus(new, 1.0, c), plus(pull, -lean.law.sigma_0, c)
 
-    return out, within, evaluate, step
+    return evaluate, step
 
 
-out, within, evaluate, step = _leaning(points, norm, times)
-out_of_disc, within_disc, evaluate_disc, step_disc = _leaning(
-    discs, discs.mean_speed, _in_plane
-)
+evaluate, step = _leaning(points, norm, times)
+evaluate_disc, step_disc = _leaning(discs, discs.mean_speed, _in_plane)

@@ -131,8 +131,8 @@ def _relaxed(
 
 
 @kernel
-def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
-    """Return the bristle after dt and its traction, by the equations of `bristle_step`."""
+def moved(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+    """Return the bristle after dt and its rate there, by the equations of `bristle_step`."""
     c_t, c_s, speed, pull = sliding(u)
     q = inverse_deflection(law, speed)
     per_h = _per_h(speed, pull)
@@ -144,5 +144,11 @@ def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vect
     free = _relaxed(z, u, formulas.mean_decay(start, end, dt) * dt * per, c_t, c_s, dt)
     far, along, share = _seen(free, pull, per_h, q)
     new, far = capped(law, free, far, deflection)
-    rate = _rate(u, new, _decay(law, far, along, share, speed, q), c_t, c_s, per)
+    return new, _rate(u, new, _decay(law, far, along, share, speed, q), c_t, c_s, per)
+
+
+@kernel
+def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+    """Return the bristle after dt and its traction."""
+    new, rate = moved(law, z, u, dt)
     return new, traction(law, new, rate, u)

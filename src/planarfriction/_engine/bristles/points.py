@@ -32,10 +32,17 @@ def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
 
 
 @kernel
-def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
-    """Compute the bristle after dt and its traction (see `bristle_step`)."""
+def moved(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+    """Compute the bristle after dt and its rate there (see `bristle_step`)."""
     speed = norm(u)
     new, k = bristle_step.step(
         law, z, u, speed, 1.0, inverse_deflection(law, speed), dt
     )
-    return new, traction(law, new, plus(u, -k, new), u)
+    return new, plus(u, -k, new)
+
+
+@kernel
+def step(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
+    """Compute the bristle after dt and its traction."""
+    new, rate = moved(law, z, u, dt)
+    return new, traction(law, new, rate, u)

@@ -51,18 +51,6 @@ def divided(count: int) -> tuple[int, int]:
     return blocks, -(-count // (blocks * VECTOR)) * VECTOR
 
 
-class Limit(NamedTuple):
-    """Compiled functions of the limit of a bristle with a fixed stiffness (see `bristle_limit`)."""
-
-    within: Any
-    """`(law, z)`: return the bristle brought back onto its limit, if it is beyond."""
-    forth: Any
-    back: Any
-    """Forth and back of `within` (see `derivatives.derive`), by z, `sigma_0` and `mu_s`."""
-    pushed: Any
-    """`(law, z, changes)`: bring back a bristle and its changes."""
-
-
 class BlockFunctions(NamedTuple):
     """Compiled functions of a kind of cells in blocks."""
 
@@ -70,17 +58,16 @@ class BlockFunctions(NamedTuple):
     size: int
     """Components of a bristle."""
     advance: Any
-    """`(law, twist, (dt,), block, lanes)`: step the cells of a block, and return their wrench."""
+    """`(law, twist, (dt, load), block, lanes)`: step the cells of a block, and return their wrench."""
     retreat: Any
     """`(law, twist, (dt, load, 1 or 0 without load, pull[3]), block, lanes)`: carry the cotangent of the state over a
     step; return the sums of `cell_loops.backward_passes`."""
     shares: Any
     """Arguments as of `retreat`: add the derivatives of `load pull . wrench` of a step by the weights to `OUT`."""
     pushed: Any
-    """`(law, z, u, dt, dz, du, changes of the law)`: step a cell and its change."""
+    """`(law, z, u, dt, dz, du, changes of the law, change of the cell's load)`: step a cell and its change."""
     law: Any
-    """`(law, block, i)`: return the law of cell i, with its asymmetry if there is one."""
-    limit: Limit
+    """`(law, block, i, load)`: return the law of cell i, with its asymmetry or its piece of a pad if there is one."""
     vector: Any
     """`(row, first, stride)`: return the components of a bristle."""
 

@@ -6,56 +6,72 @@ import functools
 from typing import Any
 
 from planarfriction._engine.bristles.asymmetric_cells import Leaning
+from planarfriction._engine.bristles.elastic import Elastic
 from planarfriction._engine.cells import cells_rollout, cells_sensitivities
-from planarfriction._engine.cells.cell_blocks import LANES, BlockFunctions, Limit
+from planarfriction._engine.cells.cell_blocks import LANES, WEIGHT, BlockFunctions
 from planarfriction._engine.cells.cell_loops import (
     KINDS,
+    CellKind,
     backward_passes,
     forward_passes,
     share_passes,
 )
-from planarfriction._engine.codegen.derivatives import derive, forward
-from planarfriction._engine.codegen.vectors import reader_of
+from planarfriction._engine.codegen.derivatives import forward
+from planarfriction._engine.codegen.vectors import Vector, reader_of
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles
 from planarfriction.formulas import LawNumbers
 
 
 @kernel
-def _shared(law: LawNumbers, block: Doubles, i: int) -> LawNumbers:
+def _shared(law: LawNumbers, block: Doubles, i: int, load: float) -> LawNumbers:
     return law
 
 
-def _leaning_at(first: int) -> Any:
-    """Return `cell_blocks.BlockFunctions.law` of cells whose asymmetry lies in two fields of a block, from one on."""
+def _law_of(kind: CellKind) -> Any:
+    """Return `cell_blocks.BlockFunctions.law`, which reads what stands behind the numbers of the lever."""
+    first = LANES * kind.numbers
 
     @kernel
-    def law_of_cell(law: LawNumbers, block: Doubles, i: int) -> Leaning:
+    def leaning(law: LawNumbers, block: Doubles, i: int, load: float) -> Leaning:
         return Leaning(law, (block[first + i], block[first + LANES + i]))
 
-    return law_of_cell
+    @kernel
+    def elastic(law: LawNumbers, block: Doubles, i: int, load: float) -> Elastic:
+        return Elastic(law, block[first + i], block[WEIGHT + i] * load)
+
+    return leaning if kind.leans else elastic if kind.pad else _shared
+
+
+def _pushed(kind: CellKind) -> Any:
+    """Return `cell_blocks.BlockFunctions.pushed`: only a pad sees the load of a cell."""
+    by = cells_rollout.by_of(kind.path, kind.pad)
+    changed = forward(kind.element.step, by, kind.lengths)
+
+    @kernel
+    def plain(
+        law: Any, z: Vector, u: Vector, dt: float, dz: Vector, du: Vector, d_law: tuple, heavier: float
+    ) -> Any:  # fmt: skip
+        return changed(law, z, u, dt, dz, du, *d_law)
+
+    @kernel
+    def of_pad(
+        law: Any, z: Vector, u: Vector, dt: float, dz: Vector, du: Vector, d_law: tuple, heavier: float
+    ) -> Any:  # fmt: skip
+        return changed(law, z, u, dt, dz, du, *d_law, heavier)
+
+    return of_pad if kind.pad else plain
 
 
 @functools.cache
-def rollouts_of_cells(size: int, turned: bool, leans: bool) -> tuple:
+def rollouts_of_cells(size: int, turned: bool, sort: str) -> tuple:
     """Return rollout, gradient, sensitivities, tangent and shares of a kind of cells (see `KINDS`)."""
-    kind = KINDS[size, turned, leans]
-    path, law = (
-        ("lean.law", _leaning_at(LANES * kind.numbers)) if leans else ("law", _shared)
-    )
-    step = kind.element.step
-    within = kind.element.within
-    by = ("z", f"{path}.sigma_0", f"{path}.mu_s")
-    limited = derive(within, by, kind.lengths)
-    limit = Limit(
-        within, limited.forth, limited.back, forward(within, by, kind.lengths)
-    )
-    pushed = forward(step, cells_rollout.by_of(path), kind.lengths)
+    kind = KINDS[size, turned, sort]
     loops = forward_passes(kind).run, backward_passes(kind).run, share_passes(kind).run
     functions = BlockFunctions(
-        kind.lever, size, *loops, pushed, law, limit, reader_of(size)
+        kind.lever, size, *loops, _pushed(kind), _law_of(kind), reader_of(size)
     )
-    sensitivities = cells_sensitivities.bound(functions, kind, path)
+    sensitivities = cells_sensitivities.bound(functions, kind)
     rollout, gradient, tangent, shares = (
         cells_rollout.entry_of(each, functions, kind.name)
         for each in (

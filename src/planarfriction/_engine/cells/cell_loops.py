@@ -9,13 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from planarfriction._engine.bristles import (
-    asymmetric_cells,
-    bristle_limit,
-    discs,
-    points,
-)
+from planarfriction._engine.bristles import asymmetric_cells, discs, elastic, points
 from planarfriction._engine.bristles.asymmetric_cells import Leaning
+from planarfriction._engine.bristles.elastic import Elastic
 from planarfriction._engine.cells import cells
 from planarfriction._engine.cells.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT, Z
 from planarfriction._engine.cells.cells import CellsContact, Lever
@@ -36,11 +32,9 @@ class Element(NamedTuple):
     size: int
     """Components d."""
     evaluate: Any
-    """`(law, z, u)`: return z' and the traction; with a fixed stiffness `(law, z, u, factor)`."""
+    """`(law, z, u)`: return z' and the traction."""
     step: Any
     """`(law, z, u, dt)`: return the bristle after dt and its traction."""
-    within: Any = bristle_limit.within
-    """`(law, z)`: return a bristle brought back onto its limit (see `bristle_limit`)."""
     forward: tuple[int, int] = 8, 2
     """Division into passes that is fastest for a few dozen cells (see `loop_generation`)."""
     backward: tuple[int, int] = 6, 6
@@ -55,16 +49,18 @@ LEANING_POINT = Element(
     2,
     asymmetric_cells.evaluate,
     asymmetric_cells.step,
-    asymmetric_cells.within,
 )
 LEANING_DISC = Element(
     "leaning discs",
     3,
     asymmetric_cells.evaluate_disc,
     asymmetric_cells.step_disc,
-    asymmetric_cells.within_disc,
 )
 """Elements whose law is a `Leaning`; the asymmetry stands behind the numbers of the lever."""
+
+PAD_POINT = Element("points of a pad", 2, elastic.evaluate, elastic.step)
+PAD_DISC = Element("discs of a pad", 3, elastic.evaluate_disc, elastic.step_disc)
+"""Elements whose law is an `Elastic`; `Elastic.stiff` stands behind the numbers of the lever."""
 
 
 class CellKind(NamedTuple):
@@ -80,8 +76,18 @@ class CellKind(NamedTuple):
     """Record of the numbers of the law."""
     linear: bool = True
     """See `general_cells.Bristle`."""
-    fixed: bool = False
-    """True for a fixed stiffness, whose factor comes in place of dt (see `cell_steps`)."""
+    pad: bool = False
+    """True for elements whose law is an `Elastic`, which see their load."""
+
+    @property
+    def rows(self) -> int:
+        """Numbers of a cell: those of the lever, and what stands behind them."""
+        return self.numbers + 2 * self.leans + self.pad
+
+    @property
+    def path(self) -> str:
+        """Name of the law among the arguments of the element."""
+        return "lean.law" if self.leans else "pad.law" if self.pad else "law"
 
     @property
     def lengths(self) -> dict[str, int]:
@@ -91,23 +97,37 @@ class CellKind(NamedTuple):
 
 
 @kernel
-def _leaning(contact: CellsContact, i: int) -> Leaning:
+def _leaning(contact: CellsContact, i: int, load: float) -> Leaning:
     return Leaning(contact.law, (contact.lean[i], contact.lean[contact.count + i]))
 
 
+def _of_pad(name: str, element: Element, lever: Lever, numbers: int) -> CellKind:
+    lever = lever._replace(law=cells.elastic)
+    return CellKind(name, element, lever, numbers, linear=False, pad=True)
+
+
+PLAIN = "plain"
+LEANS = "leans"
+PAD = "pad"
+"""Sorts of bristles: of the law alone, with an asymmetry, of a pad."""
+
 KINDS = {
-    (2, False, False): CellKind("isotropic", POINT, cells.POSITIONS, 2),
-    (2, True, False): CellKind("turned", POINT, cells.LEVERS, 5),
-    (3, False, False): CellKind("discs", DISC, cells.DISC_POSITIONS, 3),
-    (3, True, False): CellKind("turned_discs", DISC, cells.DISC_LEVERS, 6),
-    (2, True, True): CellKind(
+    (2, False, PLAIN): CellKind("isotropic", POINT, cells.POSITIONS, 2),
+    (2, True, PLAIN): CellKind("turned", POINT, cells.LEVERS, 5),
+    (3, False, PLAIN): CellKind("discs", DISC, cells.DISC_POSITIONS, 3),
+    (3, True, PLAIN): CellKind("turned_discs", DISC, cells.DISC_LEVERS, 6),
+    (2, True, LEANS): CellKind(
         "leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning), 5, True
     ),
-    (3, True, True): CellKind(
+    (3, True, LEANS): CellKind(
         "leaning_discs", LEANING_DISC, cells.DISC_LEVERS._replace(law=_leaning), 6, True
     ),
+    (2, False, PAD): _of_pad("pad", PAD_POINT, cells.POSITIONS, 2),
+    (2, True, PAD): _of_pad("turned_pad", PAD_POINT, cells.LEVERS, 5),
+    (3, False, PAD): _of_pad("pad_discs", PAD_DISC, cells.DISC_POSITIONS, 3),
+    (3, True, PAD): _of_pad("turned_pad_discs", PAD_DISC, cells.DISC_LEVERS, 6),
 }
-"""Kinds of cells by the components of a bristle, and whether there are a metric and an asymmetry."""
+"""Kinds of cells by the components of a bristle, whether there is a metric, and the sort of bristles."""
 
 
 class CellRows(NamedTuple):
@@ -126,20 +146,22 @@ class _Symbols:
 
     def __init__(self, trace: Trace, kind: CellKind) -> None:
         self.trace = trace
-        numbers = self.several("c", kind.numbers + 2 * kind.leans)
+        numbers = self.several("c", kind.rows)
         law = kind.law(
             *(Number(trace, f"{kind.law.__name__}.{name}") for name in kind.law._fields)
         )
-        self.law = Leaning(law, numbers[-2:]) if kind.leans else law
-        self.cell, self.z, self.v = (
-            numbers[: kind.numbers],
-            self.several("z", kind.element.size),
-            self.several("v", 3),
-        )
+        self.cell = numbers[: kind.numbers]
+        self.z = self.several("z", kind.element.size)
+        self.v = self.several("v", 3)
         self.dt = Number(trace, "dt")
+        self.load = Number(trace, "load")
         self.weight = Number(trace, "weight")
         self.u = twin(kind.lever.seen)(self.cell, self.v)
-        self.inputs = (self.law, self.z, self.u, self.dt)[: 3 + kind.fixed]
+        self.law = law
+        if kind.leans:
+            self.law = Leaning(law, numbers[-2:])
+        elif kind.pad:
+            self.law = Elastic(law, numbers[-1], self.weight * self.load)
 
     def several(self, letter: str, count: int) -> tuple:
         """Return a vector of symbols."""
@@ -159,29 +181,23 @@ def _rows(letter: str, field: str, count: int) -> dict[str, str]:
 def _shared(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols that all cells share."""
     law = {f"{kind.law.__name__}.{name}": f"law.{name}" for name in kind.law._fields}
-    return {**law, **{f"v{m}": f"v[{m}]" for m in range(3)}, "dt": "shared[0]"}
+    twist = {f"v{m}": f"v[{m}]" for m in range(3)}
+    return {**law, **twist, "dt": "shared[0]", "load": "shared[1]"}
 
 
-_PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {
-    "load": "shared[1]",
-    "keeps": "shared[2]",
-}
-"""Sources of the cotangent of a wrench, of the load, and of 1, or 0 without load."""
+_PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"keeps": "shared[2]"}
+"""Sources of the cotangent of a wrench, and of 1, or 0 without load."""
 
 
 def _in_block(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in a block."""
-    vectors = _fields("c", 0, kind.numbers + 2 * kind.leans) | _fields(
-        "z", Z, kind.element.size
-    )
+    vectors = _fields("c", 0, kind.rows) | _fields("z", Z, kind.element.size)
     return {**_shared(kind), **vectors, "weight": f"block[{WEIGHT} + i]"}
 
 
 def _in_rows(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in `CellRows`."""
-    vectors = _rows("c", "cells", kind.numbers + 2 * kind.leans) | _rows(
-        "z", "z", kind.element.size
-    )
+    vectors = _rows("c", "cells", kind.rows) | _rows("z", "z", kind.element.size)
     return {**_shared(kind), **vectors, "weight": "block.weights[0 + i]"}
 
 
@@ -234,15 +250,13 @@ def backward_passes(kind: CellKind) -> Passes:
     """
     element = kind.element
     lever = kind.lever
-    written = derive(
-        element.step, by_of("lean.law" if kind.leans else "law"), kind.lengths
-    )
+    written = derive(element.step, by_of(kind.path, kind.pad), kind.lengths)
 
     def adjoint(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
-        load, keeps, by_load = (
-            Number(trace, name) for name in ("load", "keeps", "by_load")
-        )
+        keeps = Number(trace, "keeps")
+        by_load = Number(trace, "by_load")
+        load = s.load
         pulled = twin(lever.seen)(s.cell, s.several("p", 3))
         (_, traction), tape = twin(written.forth)(s.law, s.z, s.u, s.dt)
         state_bar = tuple(keeps * each for each in s.several("b", element.size))
@@ -250,6 +264,8 @@ def backward_passes(kind: CellKind) -> Passes:
             tape, (state_bar, tuple(load * s.weight * each for each in pulled))
         )
         along = sum(a * b for a, b in zip(pulled, traction, strict=True))
+        if kind.pad:
+            along = along + law_bar.pop()
         return (
             z_bar,
             twin(lever.wrench)(s.cell, u_bar),
@@ -279,7 +295,7 @@ def share_passes(kind: CellKind) -> Passes:
         _, traction = twin(kind.element.step)(s.law, s.z, s.u, s.dt)
         pulled = twin(kind.lever.seen)(s.cell, s.several("p", 3))
         along = sum(a * b for a, b in zip(pulled, traction, strict=True))
-        return (Number(trace, "before") + Number(trace, "load") * along,)
+        return (Number(trace, "before") + s.load * along,)
 
     store = f"block[{OUT} + i]"
     sources = {**_in_block(kind), **_PULL, "before": store}
@@ -298,7 +314,7 @@ def rate_passes(kind: CellKind) -> Passes:
 
     def rate(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
-        zdot, traction = twin(element.evaluate)(*s.inputs)
+        zdot, traction = twin(element.evaluate)(s.law, s.z, s.u)
         return zdot, twin(kind.lever.wrench)(
             s.cell, tuple(s.weight * each for each in traction)
         )
@@ -323,7 +339,7 @@ def slope_passes(kind: CellKind) -> Passes:
 
     def slopes(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
-        _, tape = twin(written.forth)(*s.inputs)
+        _, tape = twin(written.forth)(s.law, s.z, s.u)
         rows = [
             twin(written.back)(tape, (unit[: element.size], unit[element.size :]))
             for unit in units

@@ -3,9 +3,7 @@
 A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`) and adds `w B' t` to the wrench, t being its
 traction (docs/physics.md, "Distributed model").
 
-A bristle whose stiffness does not grow with the load (docs/physics.md, "Stiffness and load") moves as one of the
-published law at `l z` with `l = f_ref/f` (see `bristle_limit`), and besides returns to its limit where a falling load
-has left it beyond. The factor l comes behind the twist.
+Cells of a pad (see `elastic`) see their load: that of the contact comes behind the twist.
 """
 
 from __future__ import annotations
@@ -13,9 +11,6 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from planarfriction._engine.bristles import asymmetric_cells
-from planarfriction._engine.bristles.asymmetric_cells import Leaning
-from planarfriction._engine.bristles.bristle_limit import recovery
 from planarfriction._engine.cells import cells, general_cells
 from planarfriction._engine.cells.cell_blocks import LANES, divided, scratch
 from planarfriction._engine.cells.cell_loops import (
@@ -23,7 +18,6 @@ from planarfriction._engine.cells.cell_loops import (
     KINDS,
     CellKind,
     CellRows,
-    Element,
     rate_passes,
     slope_passes,
     step_passes,
@@ -33,11 +27,9 @@ from planarfriction._engine.codegen.vectors import (
     Vector,
     clear,
     copy,
-    norm,
     plus,
     put,
     three,
-    times,
 )
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, Place, at
@@ -47,7 +39,6 @@ from planarfriction._engine.protocol import (
     functions_of,
     step_functions,
 )
-from planarfriction.formulas import LawNumbers
 
 RESULTS = LANES * 4 * DISC.size**2
 """Numbers of the results of a block of cells: derivatives of rates and tractions, or rates or bristles, row by row."""
@@ -139,30 +130,27 @@ def _through(
 
 def evaluate(
     contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, cell_rows: Any, rate: Any, copied: int,
-    fixed: bool, read: Any,
+    pad: bool, read: Any,
 ) -> None:  # fmt: skip
-    """Write `z'`, and `W`; behind V is the factor of a `fixed` stiffness."""
-    factor = v[3] if fixed else 0.0
-    put(
-        w,
-        _through(read(contact), z, three(v), (factor,), zdot, cell_rows, rate, copied),
-    )
+    """Write `z'`, and `W`; behind V is the load of a `pad`."""
+    shared = (0.0, v[3] if pad else 0.0)
+    put(w, _through(read(contact), z, three(v), shared, zdot, cell_rows, rate, copied))
 
 
 def linearise(
-    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any, fixed: bool,
+    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any, pad: bool,
     read: Any,
 ) -> None:  # fmt: skip
     """Write A and F of each cell, and C and E unless tractions are linear (see `general_cells`)."""
     record = read(contact)
     twist = three(v)
-    factor = v[3] if fixed else 0.0
+    shared = (0.0, v[3] if pad else 0.0)
     block = scratch(BLOCK)
     n = record.count
     (_, lanes) = divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block, block)
-        slope(record.law, twist, (factor,), rows, count)
+        slope(record.law, twist, shared, rows, count)
         square = bristle.size * bristle.size
         for m in range(2 * square if bristle.linear else 4 * square):
             row = m if m < 2 * square else m + square  # behind the inverse
@@ -171,30 +159,30 @@ def linearise(
 
 def step(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, cell_rows: Any, advance: Any,
-    copied: int, read: Any,
+    copied: int, pad: bool, read: Any,
 ) -> None:  # fmt: skip
-    """Advance the bristles by `dt` at a held twist, and write the wrench at the end."""
+    """Advance the bristles by `dt` at a held twist, and write the wrench at the end; behind V is the load of a `pad`."""
+    shared = (dt, v[3] if pad else 0.0)
     put(
         out,
-        _through(read(contact), z, three(v), (dt,), new, cell_rows, advance, copied),
+        _through(read(contact), z, three(v), shared, new, cell_rows, advance, copied),
     )
 
 
 @functools.cache
 def functions_of_cells(
-    size: int, turned: bool, leans: bool
+    size: int, turned: bool, sort: str
 ) -> tuple[ModelFunctions, StepFunctions]:
     """Return the functions of contacts of a kind of cells (see `KINDS`); they are written on first use."""
-    kind = KINDS[size, turned, leans]
+    kind = KINDS[size, turned, sort]
     return rates_of(kind, cells.read), steps_of(kind, cells.read)
 
 
 def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
     """Return the arguments of templates that rates and steps of a kind of cells share."""
     size = kind.element.size
-    numbers = kind.numbers + 2 * kind.leans
     copied = size if size == DISC.size else 0  # points come by the hundred
-    cell_rows = _filled(numbers, size) if copied else _in_place
+    cell_rows = _filled(kind.rows, size) if copied else _in_place
     bristle = general_cells.bristle(size, kind.linear)
     return {
         "lever": kind.lever,
@@ -202,6 +190,7 @@ def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
         "read": read,
         "copied": copied,
         "cell_rows": cell_rows,
+        "pad": kind.pad,
     }
 
 
@@ -210,7 +199,6 @@ def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
     loops = {
         "slope": slope_passes(kind).run,
         "rate": rate_passes(kind).run,
-        "fixed": kind.fixed,
     }
     return functions_of(
         kind.name,
@@ -227,58 +215,3 @@ def steps_of(kind: CellKind, read: Any) -> StepFunctions:
     return step_functions(
         kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops
     )
-
-
-# ---------------------------------------------------------------------- of a fixed stiffness
-
-
-@kernel
-def _itself(law: LawNumbers) -> LawNumbers:
-    return law
-
-
-@kernel
-def _law_of(lean: Leaning) -> LawNumbers:
-    return lean.law
-
-
-@kernel
-def _bent(law: LawNumbers, z: Vector) -> Vector:
-    return z
-
-
-def _recovering(kind: CellKind) -> Element:
-    """Return the bristle that recovers from beyond its limit, from the rate and the traction of the published one."""
-    published = kind.element.evaluate
-    numbers = _itself
-    out = _bent  # seen from the middle of its limit
-    if kind.leans:
-        numbers = _law_of
-        out = (
-            asymmetric_cells.out
-            if kind.element.size == 2
-            else asymmetric_cells.out_of_disc
-        )
-
-    @kernel
-    def evaluate(
-        law: LawNumbers | Leaning, z: Vector, u: Vector, factor: float
-    ) -> tuple[Vector, Vector]:
-        bent = times(factor, z)
-        rate, traction = published(law, bent, u)
-        plain = numbers(law)
-        beyond = out(law, bent)
-        k = recovery(plain, beyond, norm(u))
-        return plus(rate, -k, beyond), plus(traction, plain.sigma_1 * k, beyond)
-
-    return Element(f"recovering {kind.element.name}", kind.element.size, evaluate, None)
-
-
-@functools.cache
-def fixed_rates_of(size: int, turned: bool, leans: bool) -> ModelFunctions:
-    """Return the functions of the solver for contacts of a kind of cells (see `KINDS`) with a fixed stiffness."""
-    kind = KINDS[size, turned, leans]
-    fixed = kind._replace(
-        name=f"fixed_{kind.name}", element=_recovering(kind), linear=False, fixed=True
-    )
-    return rates_of(fixed, cells.read)

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from planarfriction._engine.codegen.vectors import Vector, reader_of
+from planarfriction._engine.bristles.elastic import Elastic, factor
+from planarfriction._engine.codegen.vectors import Vector, norm, reader_of
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, reader
 from planarfriction.formulas import LawNumbers
@@ -23,14 +24,36 @@ class CellsContact(NamedTuple):
     count: int
     """n"""
     cells: Doubles
-    """Numbers of the cells: x, y [2, n], or L_xx, L_xy, L_yy, (L J rho)_x, (L J rho)_y, a_x, a_y [7, n]."""
+    """Numbers of the cells: x, y [2, n], or L_xx, L_xy, L_yy, (L J rho)_x, (L J rho)_y [5, n], of discs kappa a too;
+    behind these the asymmetry a_x, a_y, or `stiff`."""
     lean: Doubles
     """Rows a_x, a_y of these, [2, n]; none where friction is the same forwards and backwards."""
+    stiff: Doubles
+    """`elastic.Elastic.stiff` [N] of the pieces of a pad, [n]; none without one."""
     weights: Doubles
     """[n]"""
 
 
 read = reader(CellsContact)
+
+
+@kernel
+def elastic(contact: CellsContact, i: int, load: float) -> Elastic:
+    """Return the law of a piece of a pad under the load of the contact."""
+    return Elastic(contact.law, contact.stiff[i], contact.weights[i] * load)
+
+
+@kernel
+def settle(contact: CellsContact, size: int, load: float, z: Doubles) -> None:
+    """Bring bristles of so many components of a pad back onto their limits at a load."""
+    n = contact.count
+    for i in range(n):
+        longest = contact.law.mu_s / contact.law.sigma_0
+        bent = norm((z[i], z[n + i], z[2 * n + i] if size == 3 else 0.0))
+        over = bent * factor(elastic(contact, i, load)) / longest
+        if over > 1.0:
+            for m in range(size):
+                z[m * n + i] = z[m * n + i] / over
 
 
 class Lever(NamedTuple):
@@ -45,7 +68,7 @@ class Lever(NamedTuple):
     around: Any
     """`(cell, P)`: return `B' P B` of a matrix [d, d], nine numbers."""
     law: Any
-    """`(contact, i)`: return the law of the cell."""
+    """`(contact, i, load)`: return the law of the cell under the load of the contact."""
 
 
 # ---------------------------------------------------------------------- the levers
@@ -76,7 +99,7 @@ def _wrench_by_map(cell: Vector, t: Vector) -> Vector:
 
 
 @kernel
-def _law_of_all(contact: CellsContact, i: int) -> LawNumbers:
+def _law_of_all(contact: CellsContact, i: int, load: float) -> LawNumbers:
     return contact.law
 
 

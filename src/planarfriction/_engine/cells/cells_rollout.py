@@ -10,11 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.bristles.bristle_limit import (
-    factor_at,
-    softening,
-    stiffened,
-)
 from planarfriction._engine.bristles.law import PARAMETERS, law_of
 from planarfriction._engine.cells.cell_blocks import (
     BAR,
@@ -49,9 +44,9 @@ COLUMNS = tuple(LawNumbers._fields.index(name) for name in PARAMETERS)
 """Places of `PARAMETERS` in a row."""
 
 
-def by_of(path: str) -> tuple[str, ...]:
-    """Return the arguments by which steps of cells are differentiated, whose law stands at a path."""
-    return "z", "u", *(f"{path}.{name}" for name in PARAMETERS)
+def by_of(path: str, pad: bool = False) -> tuple[str, ...]:
+    """Return the arguments by which steps of cells are differentiated, whose law stands at a path; last, their load."""
+    return "z", "u", *(f"{path}.{name}" for name in PARAMETERS), *["pad.load"] * pad
 
 
 # ---------------------------------------------------------------------- blocks
@@ -112,43 +107,8 @@ def _weigh(
             block[BY_LOAD + i] = by_load[first + i]
 
 
-# ---------------------------------------------------------------------- limits of a fixed stiffness
-
-
-@kernel
-def _bring_back(
-    kind: BlockFunctions, law: LawNumbers, w: Doubles, blocks: int, lanes: int
-) -> None:
-    """Bring bristles back onto their limits (see `bristle_limit`)."""
-    for k in range(blocks):
-        block = at(w, k * BLOCK)
-        for i in range(lanes):
-            new = kind.limit.within(
-                kind.law(law, block, i), kind.vector(block, Z + i, LANES)
-            )
-            scatter(block, Z + i, LANES, new)
-
-
-@kernel
-def _bring_back_pull(
-    kind: BlockFunctions, law: LawNumbers, w: Doubles, blocks: int, lanes: int
-) -> Vector:
-    """Carry the cotangents of bristles back over `_bring_back`; return the cotangents of sigma_0 and mu_s."""
-    total = (0.0, 0.0)
-    for k in range(blocks):
-        block = at(w, k * BLOCK)
-        for i in range(lanes):
-            _, tape = kind.limit.forth(
-                kind.law(law, block, i), kind.vector(block, Z + i, LANES)
-            )
-            bars = kind.limit.back(tape, kind.vector(block, BAR + i, LANES))
-            scatter(block, BAR + i, LANES, bars[0])
-            total = plus(total, 1.0, bars[1:])
-    return total
-
-
 class IntervalWithChanges(NamedTuple):
-    """A step of bristles of a law with the stiffness at its load, and the changes of its inputs."""
+    """A step of bristles, and the changes of its inputs."""
 
     law: LawNumbers
     d_law: tuple
@@ -158,21 +118,6 @@ class IntervalWithChanges(NamedTuple):
     load: float
     d_load: float
     dt: float
-
-
-@kernel
-def _bring_back_push(
-    kind: BlockFunctions, interval: IntervalWithChanges, block: Doubles, lanes: int
-) -> None:
-    """Bring bristles back onto their limits, with their changes."""
-    for i in range(lanes):
-        z = kind.vector(block, Z + i, LANES)
-        change = kind.vector(block, BAR + i, LANES)
-        law = kind.law(interval.law, block, i)
-        changes = (interval.d_law[0], interval.d_law[4])
-        z, change = kind.limit.pushed(law, z, change, *changes)
-        scatter(block, Z + i, LANES, z)
-        scatter(block, BAR + i, LANES, change)
 
 
 # ---------------------------------------------------------------------- rollouts
@@ -208,15 +153,12 @@ def _roll(
         if load == 0.0:
             _forget(w, blocks, Z, kind.size)
         else:
-            stiff = stiffened(law, inputs.reference, load)
-            if inputs.reference > 0.0:
-                _bring_back(kind, stiff, w, blocks, lanes)
             total = (0.0, 0.0, 0.0)
             for k in range(blocks):
                 total = plus(
                     total,
                     1.0,
-                    kind.advance(stiff, twist, (dt,), at(w, k * BLOCK), lanes),
+                    kind.advance(law, twist, (dt, load), at(w, k * BLOCK), lanes),
                 )
             add(wrench[t], times(load, total))
 
@@ -275,28 +217,12 @@ def _pull(
         load = loads[t]
         twist = three(twists[t])
         shared = inputs.dt[t], load, 0.0 if load == 0.0 else 1.0, *three(pulls[t])
-        stiff = stiffened(law, inputs.reference, load)
-        by_stiff = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        if inputs.reference > 0.0:
-            _bring_back(kind, stiff, w, blocks, lanes)
         for k in range(blocks):
-            sums = kind.retreat(stiff, twist, shared, at(w, k * BLOCK), lanes)
+            sums = kind.retreat(law, twist, shared, at(w, k * BLOCK), lanes)
             add(twist_bar[t], sums[:3])
             load_bar[t] += sums[3]
-            by_stiff = plus(by_stiff, 1.0, sums[4:])
-        if inputs.reference > 0.0:
-            _write(w, Z, states[t], n, kind.size)
-            spring, limit = _bring_back_pull(kind, stiff, w, blocks, lanes)
-            by_stiff = plus(
-                by_stiff, 1.0, (spring, 0.0, 0.0, 0.0, limit, 0.0, 0.0, 0.0)
-            )
-            load_bar[t] += by_stiff[0] * softening(stiff, inputs.reference, load)
-        by_law = plus(
-            by_law,
-            1.0,
-            (by_stiff[0] * factor_at(inputs.reference, load), *by_stiff[1:]),
-        )
-    return by_law
+            by_law = plus(by_law, 1.0, sums[4:])
+    return inputs.springs * by_law[0], *by_law[1:]
 
 
 @kernel
@@ -349,12 +275,9 @@ def shares(
             shared = (inputs.dt[t], loads[t], 1.0, *three(pulls[t]))
             if load == 0.0:
                 continue
-            stiff = stiffened(law, inputs.reference, load)
             _write(w, Z, before[t], n, kind.size)
-            if inputs.reference > 0.0:
-                _bring_back(kind, stiff, w, blocks, lanes)
             for k in range(blocks):
-                kind.shares(stiff, twist, shared, at(w, k * BLOCK), lanes)
+                kind.shares(law, twist, shared, at(w, k * BLOCK), lanes)
         _read(w, OUT, out[b], n, 1)
 
 
@@ -374,13 +297,13 @@ def _push_one(
     change = kind.vector(block, BAR + i, LANES)
     u = lever.seen(one, interval.twist)
     d_u = lever.seen(one, interval.d_twist)
-    law = kind.law(interval.law, block, i)
+    law = kind.law(interval.law, block, i, load)
+    heavier = (weight + load * block[BY_LOAD + i]) * interval.d_load
     (new, traction), (d_new, d_traction) = kind.pushed(
-        law, z, u, interval.dt, change, d_u, *interval.d_law
+        law, z, u, interval.dt, change, d_u, interval.d_law, heavier
     )
     scatter(block, Z + i, LANES, new)
     scatter(block, BAR + i, LANES, d_new)
-    heavier = (weight + load * block[BY_LOAD + i]) * interval.d_load
     change = plus(times(load * weight, d_traction), heavier, traction)
     scatter(
         block,
@@ -431,17 +354,13 @@ def tangent(
                 last = which[t]
                 _weigh(w, blocks, lanes, weights[last], all_by_load[last])
             load = loads[t]
-            stiff = stiffened(law, inputs.reference, load)
-            stiffer = d_law.sigma_0 * factor_at(inputs.reference, load)
-            stiffer += pushes[t] * softening(stiff, inputs.reference, load)
+            stiffer = inputs.springs * d_law.sigma_0
             by_law = (stiffer, *d_law[1:7], d_law.breakaway_ratio)
             turn = three(turns[t])
             interval = IntervalWithChanges(
-                stiff, by_law, three(twists[t]), turn, load, pushes[t], inputs.dt[t]
+                law, by_law, three(twists[t]), turn, load, pushes[t], inputs.dt[t]
             )
             for k in range(blocks):
-                if inputs.reference > 0.0:
-                    _bring_back_push(kind, interval, at(w, k * BLOCK), lanes)
                 _push(kind, interval, at(w, k * BLOCK), lanes)
             add(wrenches[b, t], times(load, totals(w, blocks, OUT, lanes)))
             add(slopes[b, t], totals(w, blocks, OUT + 3 * LANES, lanes))

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.bristles.bristle_limit import factor_at, stiffened
 from planarfriction._engine.bristles.law import law_of
 from planarfriction._engine.cells.cell_blocks import (
     BLOCK,
@@ -58,13 +57,14 @@ _SIZE = _ALL + LANES * (1 - _ALL // LANES % 2)
 
 
 class Interval(NamedTuple):
-    """A step of bristles of a law with the stiffness at its load."""
+    """A step of bristles."""
 
     law: LawNumbers
     twist: Vector
     dt: float
-    stiffer: float
-    """Change of the stiffness at the load per change of `sigma_0`."""
+    load: float
+    springs: float
+    """See `rollouts.Inputs`."""
 
 
 @kernel
@@ -89,27 +89,13 @@ def _changes(kind: BlockFunctions, block: Doubles, i: int) -> tuple[Vector, ...]
 
 
 @kernel
-def _bring_back(
-    kind: BlockFunctions, interval: Interval, block: Doubles, lanes: int
-) -> None:
-    """Bring bristles back onto their limits (see `bristle_limit`), with their changes."""
-    for i in range(lanes):
-        z = kind.vector(block, Z + i, LANES)
-        (a, b, c, d, e, f) = _changes(kind, block, i)
-        bristles = kind.limit.pushed(
-            kind.law(interval.law, block, i), z, interval.stiffer, a, b, 1.0, c, d, e, f
-        )
-        scatter(block, Z + i, LANES, bristles[0])
-        scatter(block, _CHANGE + i, LANES, bristles[1:])
-
-
-@kernel
 def _push_one(kind: BlockFunctions, interval: Interval, block: Doubles, i: int) -> None:
     z = kind.vector(block, Z + i, LANES)
     u = kind.lever.seen(kind.lever.read(block, i, LANES), interval.twist)
     a, b, c, d, e, f = _changes(kind, block, i)
-    changes = interval.stiffer, a, 1.0, b, 1.0, c, 1.0, d, 1.0, e, 1.0, f, 1.0, 1.0
-    results = kind.pushed(kind.law(interval.law, block, i), z, u, interval.dt, *changes)
+    changes = interval.springs, a, 1.0, b, 1.0, c, 1.0, d, 1.0, e, 1.0, f, 1.0, 1.0
+    law = kind.law(interval.law, block, i, interval.load)
+    results = kind.pushed(law, z, u, interval.dt, *changes)
     (new, traction) = results[0]
     d = results[1:]
     scatter(block, Z + i, LANES, new)
@@ -191,11 +177,7 @@ def _follow(
         if load == 0.0:
             _forget(block)
             continue
-        stiff = stiffened(law, inputs.reference, load)
-        stiffer = factor_at(inputs.reference, load)
-        interval = Interval(stiff, three(twists[t]), inputs.dt[t], stiffer)
-        if inputs.reference > 0.0:
-            _bring_back(kind, interval, block, lanes)
+        interval = Interval(law, three(twists[t]), inputs.dt[t], load, inputs.springs)
         _push(kind, interval, block, lanes)
         add(wrench[t], _total(kind, block, lanes, load, 0))
         for d in range(out.columns.shape[0]):
@@ -227,16 +209,8 @@ def sensitivities(
         _read(w, Z, z[b], n, kind.size, _SIZE)
 
 
-def bound(functions: BlockFunctions, kind: CellKind, path: str) -> Any:
-    """Return the entry point of a kind of cells; `path` leads to the law of one."""
-    by = [(f"{path}.{each}", "z")[: 1 + (each in _MOVING)] for each in PARAMETERS]
-    limited = [
-        (f"{path}.{each}", "z")[each not in ("sigma_0", "mu_s") :] for each in _MOVING
-    ]
-    limit = functions.limit._replace(
-        pushed=forwards(kind.element.within, limited, kind.lengths)
-    )
-    functions = functions._replace(
-        pushed=forwards(kind.element.step, by, kind.lengths), limit=limit
-    )
+def bound(functions: BlockFunctions, kind: CellKind) -> Any:
+    """Return the entry point of a kind of cells."""
+    by = [(f"{kind.path}.{each}", "z")[: 1 + (each in _MOVING)] for each in PARAMETERS]
+    functions = functions._replace(pushed=forwards(kind.element.step, by, kind.lengths))
     return entry_of(sensitivities, functions, kind.name, _SIZE)

@@ -332,18 +332,22 @@ def _put_cell(
 
 def slopes(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
-    linearise: Any, read: Any, whole: bool,
+    linearise: Any, read: Any, pad: bool, whole: bool,
 ) -> None:  # fmt: skip
     """Step with the slopes of the wrench, or with all derivatives."""
     record = read(contact)
     twist = three(v)
+    load = v[3] if pad else 0.0
     total = (0.0, 0.0, 0.0)
     n = record.count
     by_twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
         cell = lever.read(record.cells, i, n)
         linear = linearise(
-            lever.law(record, i), bristle.vector(z, i, n), lever.seen(cell, twist), dt
+            lever.law(record, i, load),
+            bristle.vector(z, i, n),
+            lever.seen(cell, twist),
+            dt,
         )
         scatter(new, i, n, linear.new)
         total = plus(total, record.weights[i], lever.wrench(cell, linear.traction))

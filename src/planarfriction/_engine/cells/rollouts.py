@@ -40,8 +40,8 @@ class Inputs(NamedTuple):
     """[T]"""
     which: np.ndarray
     """Index of the load of each step among the L loads, int [B or 1, T]; one for all where the shape is fixed."""
-    reference: float = 0.0
-    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
+    springs: float = 1.0
+    """Share of a change of `sigma_0` that is one of the springs: 0 of a pad with a stiffness of its own."""
 
 
 class Derivatives(NamedTuple):

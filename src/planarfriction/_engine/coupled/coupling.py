@@ -40,6 +40,7 @@ from planarfriction._engine.coupled.coupling_rows import (
     read,
 )
 from planarfriction._engine.coupled.coupling_steps import step_all, write_load_slopes
+from planarfriction._engine.coupled.face import hang, unhang
 from planarfriction._engine.coupled.following import follow
 
 DOWNHILL = 0.5
@@ -436,6 +437,7 @@ def solve(patches_at: Place, problem_at: Place) -> None:
         return
     follow(patches, p, problem_at)
     again = p.again[0] > 0.0
+    hang(patches, p)
     best, accepted = find(patches, p, ROUNDING, int(p.most[0]), again)
     for i in range(3 * patches.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
@@ -445,6 +447,7 @@ def solve(patches_at: Place, problem_at: Place) -> None:
                 p.new[i] = 0.0
     if best > accepted and again:
         _restrain(patches, p)
+    unhang(patches, p)
     p.residual[0] = best
     p.converged[0] = 1.0 if best <= accepted else 0.0
 

@@ -63,7 +63,7 @@ class ContactSolve(NamedTuple):
     unit: Doubles
     """Wrenches of the models per unit load, [3k]; this and all that follows is scratch."""
     unit_loaded: Doubles
-    """Slopes of the wrenches by the loads, [3k]: `unit` but for a fixed stiffness."""
+    """Slopes of the wrenches by the loads, [3k]: `unit` but for pads."""
     unit_slopes: Doubles
     """Slopes of the wrenches per unit load, [k, 9]."""
     slopes: Doubles
@@ -95,9 +95,11 @@ class ContactSolve(NamedTuple):
     step: Doubles
     """Result of a patch's step (see `protocol.StepFunctions`)."""
     seen: Doubles
-    """Twist that a patch sees, [3]."""
+    """Twist that a patch sees and its load, [4]."""
     turned: Doubles
     """Scratch of `leave_out_rising`, [2, 9]."""
+    host: Doubles
+    """Numbers of the host while faces of pads are in their place (see `face`), [k, 12]."""
     acting: Integers
     """Addresses of the records that act in this step, [k]."""
     shift: Doubles
@@ -132,13 +134,13 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
         "copies": copies,
         "support": 7 * patches,
     }
-    shapes |= dict.fromkeys(("state", "new"), states)
+    shapes |= dict.fromkeys(("state", "new"), states) | {"host": 12 * k}
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(
         ("response", "matrix"), n * n
     )
     return Layout(
         ContactSolve,
-        **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 3},
+        **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18, "seen": 4},
     )
 
 
@@ -172,10 +174,12 @@ class Patches(NamedTuple):
     """First state of each patch, and behind the last the number of all, [k + 1]."""
     radius: Doubles
     """Lever arms of the patches that turn spins into speeds [m], [k]."""
-    reference: Doubles
-    """Reference loads [N] of laws whose stiffness does not grow with the load; 0 of others, [k]."""
-    bristle: Integers
-    """Components of the bristles of patches with such laws, [k]."""
+    pad: Integers
+    """1 of pads, whose bristles see their loads; 0 of others, [k]."""
+    compliance: Doubles
+    """Common compliances of pads, [k, 9] (see `face`)."""
+    lag: Doubles
+    """Lags [s] of these, [k]; 0 where the face is the back."""
     followers: Followers
     row: Offsets
 

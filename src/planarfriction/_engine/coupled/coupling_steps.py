@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from planarfriction._engine.bristles.bristle_limit import factor_at
-from planarfriction._engine.cells.fixed_stiffness import stepped
-from planarfriction._engine.codegen.vectors import clear
+from planarfriction._engine.codegen.vectors import clear, copy
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.calls import call
 from planarfriction._engine.compiler.memory import Doubles, Integers, at
 from planarfriction._engine.coupled.coupling_rows import ContactSolve, Patches
 
 LOAD_STEP = 1e-6
-"""Share of a load over which wrenches of a fixed stiffness are compared for their slope."""
+"""Share of a load over which wrenches of a pad are compared for their slope."""
 
 
 @kernel
@@ -30,49 +28,22 @@ def step_patch(
     patches: Patches, p: ContactSolve, functions: Integers, k: int, load: float
 ) -> None:
     """Step patch k under a load, at the twist that it sees."""
+    p.seen[3] = load
     first = patches.firsts[k]
-    reference = patches.reference[k]
-    if reference > 0.0:
-        states = patches.firsts[k + 1] - first
-        factor = factor_at(reference, load)
-        bristles = patches.bristle[k], states, factor, at(p.state, first)
-        stepped(
-            functions[k],
-            p.acting[k],
-            *bristles,
-            p.seen,
-            p.dt[0],
-            at(p.new, first),
-            p.step,
-        )
-    else:
-        call(
-            functions[k],
-            (
-                p.acting[k],
-                at(p.state, first),
-                p.seen,
-                p.dt[0],
-                at(p.new, first),
-                p.step,
-            ),
-        )
+    bristles = at(p.state, first), p.seen, p.dt[0], at(p.new, first)
+    call(functions[k], (p.acting[k], *bristles, p.step))
 
 
 @kernel
 def write_load_slopes(patches: Patches, p: ContactSolve) -> None:
-    """Write the slopes of the wrenches by the loads; where stiffness is fixed, by a step under another load."""
+    """Write the slopes of the wrenches by the loads; of a pad, by a step under another load."""
     for k in range(patches.count):
         one = 3 * k
         load = p.load[k]
         for i in range(3):
             p.unit_loaded[one + i] = p.unit[one + i]
-        if patches.reference[k] > 0.0 and p.acting[k] != 0 and load > 0.0:
-            p.seen[0], p.seen[1], p.seen[2] = (
-                p.twist[one],
-                p.twist[one + 1],
-                p.twist[one + 2],
-            )
+        if patches.pad[k] != 0 and p.acting[k] != 0 and load > 0.0:
+            copy(at(p.twist, one), p.seen, 3)
             step_patch(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
             for i in range(3):
                 p.unit_loaded[one + i] += (p.step[i] - p.unit[one + i]) / LOAD_STEP

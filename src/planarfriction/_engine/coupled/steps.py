@@ -17,18 +17,15 @@ import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 
-from planarfriction._engine.bristles.bristle_limit import factor_at
-from planarfriction._engine.cells.fixed_stiffness import stepped, unscale
 from planarfriction._engine.codegen.vectors import clear, copy, plus, put, three, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel
 from planarfriction._engine.compiler.calls import call, pointer
 from planarfriction._engine.compiler.memory import Doubles, Place, at, reader
 from planarfriction._engine.protocol import SLOPES
-from planarfriction.formulas import LIGHTEST
 
 NUDGE = 1e-5
-"""Share of the load over which steps of a fixed stiffness are compared for their slopes."""
+"""Share of the load over which steps of a pad are compared for their slopes."""
 
 
 class Stepped(NamedTuple):
@@ -46,10 +43,8 @@ class Stepped(NamedTuple):
     """Address of the first of the R records, which lie one behind the other."""
     words: int
     """Number of words of a record."""
-    reference: float = 0.0
-    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
-    size: int = 2
-    """Components of a bristle, for such a law."""
+    pad: int = 0
+    """1 of a pad, whose bristles see the load; 0 of others."""
 
 
 _read = reader(Stepped)
@@ -76,26 +71,11 @@ def _positive(load: float, dt: float) -> bool:
 
 @kernel
 def _step(
-    table: Stepped, b: int, z: Doubles, twist: Doubles, load: float, dt: float, new: Doubles, wrench: Doubles,
-    unit: Doubles,
+    table: Stepped, b: int, z: Doubles, twist: Doubles, dt: float, new: Doubles, wrench: Doubles, unit: Doubles,
 ) -> None:  # fmt: skip
-    """Step contact b; `unit` [3] is scratch."""
-    if table.reference > 0.0:
-        factor = factor_at(table.reference, load)
-        stepped(
-            table.function,
-            _record(table, b),
-            table.size,
-            table.states,
-            factor,
-            z,
-            twist,
-            dt,
-            new,
-            unit,
-        )
-    else:
-        call(table.function, (_record(table, b), z, twist, dt, new, unit))
+    """Step contact b, whose load stands behind its `twist`; `unit` [3] is scratch."""
+    load = twist[3]
+    call(table.function, (_record(table, b), z, twist, dt, new, unit))
     if load > 0.0:
         put(wrench, times(load, three(unit)))
     else:
@@ -116,7 +96,7 @@ def step_one(
 ) -> bool:
     """Step one contact; `stepped` are the words of `Stepped`, `z` [S].
 
-    New state and wrench go into the first of `result` [S + 9], whose last six are scratch. Called from Python: every
+    New state and wrench go into the first of `result` [S + 10], whose last seven are scratch. Called from Python: every
     argument costs a quarter of a microsecond on the way in.
     """
     table = _read(stepped)
@@ -134,7 +114,8 @@ def step_one(
     wrench = at(out, n)
     twist = at(out, n + 3)
     put(twist, (vx, vy, omega))
-    _step(table, 0, pointer(z), twist, load, dt, out, wrench, at(out, n + 6))
+    twist[3] = load
+    _step(table, 0, pointer(z), twist, dt, out, wrench, at(out, n + 7))
     return True
 
 
@@ -143,7 +124,7 @@ def step_many(
     stepped: np.ndarray, z: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray, new: np.ndarray,
     wrench: np.ndarray, scratch: np.ndarray,
 ) -> bool:  # fmt: skip
-    """Step B contacts: `z`, `new` [B, S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [3]."""
+    """Step B contacts: `z`, `new` [B, S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [7]."""
     table = _read(stepped)
     (count, n) = z.shape
     loads = load.shape[0]
@@ -161,79 +142,38 @@ def step_many(
     twists = pointer(twist)
     ends = pointer(new)
     wrenches = pointer(wrench)
+    seen = pointer(scratch)
     for b in range(count):
-        load_b = load[b if loads > 1 else 0]
+        copy(at(twists, 3 * b), seen, 3)
+        seen[3] = load[b if loads > 1 else 0]
         dt_b = dt[b if steps > 1 else 0]
         into = at(ends, n * b), at(wrenches, 3 * b)
-        _step(
-            table,
-            b,
-            at(states, n * b),
-            at(twists, 3 * b),
-            load_b,
-            dt_b,
-            *into,
-            pointer(scratch),
-        )
+        _step(table, b, at(states, n * b), seen, dt_b, *into, at(seen, 4))
     return True
 
 
 @kernel
-def _step_fixed(
-    table: Stepped,
-    b: int,
-    z: Doubles,
-    inputs: Doubles,
-    new: Doubles,
-    by_load: Doubles,
-    wrench_load: Doubles,
-) -> None:
-    """Step contact b with a fixed stiffness: slopes behind `new` as for other laws, and slopes by the load.
+def _write_load_slopes(
+    table: Stepped, b: int, z: Doubles, inputs: Doubles, by_load: Doubles, unit: Doubles, new: Doubles
+) -> None:  # fmt: skip
+    """Write slopes of the new state and of the wrench by the load of a pad: central differences.
 
-    Slopes by the load are central differences.
+    `new` and all behind it are scratch.
     """
     s = table.states
     load = inputs[3]
-    dt = inputs[4]
     record = _record(table, b)
-    unit = at(new, s)
-    more = factor_at(table.reference, load * (1.0 + NUDGE))
-    less = load * (1.0 - NUDGE)
-    stepped(table.function, record, table.size, s, more, z, inputs, dt, new, unit)
-    above = three(unit)
-    copy(new, by_load, s)
-    stepped(
-        table.function,
-        record,
-        table.size,
-        s,
-        factor_at(table.reference, less),
-        z,
-        inputs,
-        dt,
-        new,
-        unit,
-    )
-    change = times(0.5 / NUDGE, plus(above, -1.0, three(unit)))
-    for i in range(s):
-        by_load[i] = (
-            (by_load[i] - new[i])
-            * (0.5 / NUDGE)
-            / xp.maximum(load, table.reference * LIGHTEST)
-        )
-    factor = factor_at(table.reference, load)
-    stepped(table.function, record, table.size, s, factor, z, inputs, dt, new, unit)
-    put(wrench_load, plus(three(unit), 1.0, change))
-    by_twist = at(unit, SLOPES)
-    unscale(
-        record,
-        table.size,
-        z,
-        factor,
-        by_twist,
-        at(by_twist, 3 * s),
-        at(by_twist, 6 * s),
-    )
+    wrench = at(new, s)
+    clear(by_load, s)
+    put(unit, (0.0, 0.0, 0.0))
+    for side in (-1.0, 1.0):
+        inputs[3] = load * (1.0 + side * NUDGE)
+        per = side * 0.5 / (NUDGE * load) if load > 0.0 else 0.0
+        call(table.function, (record, z, inputs, inputs[4], new, wrench))
+        for i in range(s):
+            by_load[i] += per * new[i]
+        put(unit, plus(three(unit), per * inputs[3], three(wrench)))
+    inputs[3] = load
 
 
 @kernel
@@ -246,14 +186,16 @@ def _jacobians(
     dt = inputs[4]
     unit = at(new, s)
     loaded = 1.0 if load > 0.0 else 0.0
+    record = _record(table, b)
     by_twist = at(out, table.square)
     by_load = at(by_twist, 3 * s)
     of_wrench = at(by_twist, 4 * s)
     wrench_twist = at(by_twist, 7 * s)
-    if table.reference > 0.0:
-        _step_fixed(table, b, z, inputs, new, by_load, at(wrench_twist, 9))
+    if table.pad > 0 and load > 0.0:
+        _write_load_slopes(table, b, z, inputs, by_load, at(wrench_twist, 9), new)
+        call(table.function, (record, z, inputs, dt, new, unit))
     else:
-        call(table.function, (_record(table, b), z, inputs, dt, new, unit))
+        call(table.function, (record, z, inputs, dt, new, unit))
         clear(by_load, s)
         copy(unit, at(wrench_twist, 9), 3)
     for m in range(9):

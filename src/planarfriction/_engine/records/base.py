@@ -77,6 +77,12 @@ class CompiledModel:
 
     depends_on_load: bool
     """True if the load changes the shape of the patch."""
+    of_pad = False
+    """True if the bristles are pieces of a pad, which see the load."""
+    compliance: np.ndarray | None = None
+    """Common compliance of a pad about the origin `[3, 3]` (see `coupled.face`)."""
+    lag = 0.0
+    """Lag of a pad with a common compliance [s]."""
 
     def __init__(
         self,
@@ -85,6 +91,12 @@ class CompiledModel:
         square_shape: tuple[int, ...],
     ) -> None:
         self.functions = functions
+        self._prepare(state_shape, square_shape)
+
+    def _prepare(
+        self, state_shape: tuple[int, ...], square_shape: tuple[int, ...]
+    ) -> None:
+        """Set the places of the numbers of a step's results."""
         self.state_shape = state_shape
         self._size = math.prod(state_shape)
         self._square = math.prod(square_shape)
@@ -93,7 +105,7 @@ class CompiledModel:
         n = self._size
         self._new = slice(n)
         self._wrench = slice(n, n + 3)
-        self._result = n + 9
+        self._result = n + 10
         self._table = None
         shapes = (
             square_shape,
@@ -224,7 +236,7 @@ class CompiledModel:
             new = _EMPTY((count, self._size))
             wrench = _EMPTY((count, 3))
             if not step_many(
-                table, rows, twist, normal_force, dt, new, wrench, _EMPTY(3)
+                table, rows, twist, normal_force, dt, new, wrench, _EMPTY(7)
             ):
                 return None
         except _REFUSED:
@@ -307,7 +319,7 @@ class CompiledModel:
             table = self.step_table(contact)
             seen = _seen(v[rows], offset)
             ready(step_many)(
-                table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(3)
+                table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(7)
             )
             new[rows], wrench[rows] = end, _pull(pull, offset)
         return new.reshape(state.shape), wrench.reshape(twist.shape)

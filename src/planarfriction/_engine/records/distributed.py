@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction._engine.bristles.discs import KAPPA
-from planarfriction._engine.cells.cell_steps import fixed_rates_of, functions_of_cells
+from planarfriction._engine.cells.cell_loops import LEANS, PAD, PLAIN
+from planarfriction._engine.cells.cell_steps import functions_of_cells
 from planarfriction._engine.cells.cells import CellsContact
 from planarfriction._engine.cells.general_cells import LINEAR, MATRICES, A, C, E, F
 from planarfriction._engine.cells.moment_pressure import tilted
@@ -30,35 +31,45 @@ LOAD_STEP = 1e-5
 
 
 class CompiledDistributed(CompiledModel):
-    """Machine form of a `DistributedModel` with a law on a patch."""
+    """Machine form of a `DistributedModel` with a law on a patch, whose pieces may be those of a pad."""
 
-    def __init__(self, law: Any, patch: Any) -> None:
+    def __init__(self, law: Any, patch: Any, pad: Any = None) -> None:
         self.law = law
+        self.pad = pad
         self.patch = patch
         self.depends_on_load = patch.depends_on_load
         self.size = patch.bristles
         """Number of bristles of a cell: two of a point, three of a disc."""
-        self.reference = 0.0 if law.reference_load is None else law.reference_load
-        """Load [N] of `reference_load`, or 0."""
+        self.springs = 1.0 if pad is None or pad.springs_of_law else 0.0
+        """See `cells.rollouts.Inputs`."""
+        self.stiff = None
+        """`elastic.Elastic.stiff` [N] of the pieces of the pad `[N]`; None without one."""
+        if pad is not None:
+            self.stiff = pad.pieces(patch, law) / law.numbers.sigma_0
+            self.of_pad = True
         self._contact, functions = self._functions()
-        if self.reference > 0.0:
-            self._contact = fixed_rates_of(
-                self.size, patch.anisotropic, patch.asymmetric
-            )
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
     def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
-        return functions_of_cells(
-            self.size, self.patch.anisotropic, self.patch.asymmetric
-        )
+        return functions_of_cells(self.size, self.patch.anisotropic, self.sort)
+
+    @property
+    def sort(self) -> str:
+        """Sort of bristles (see `cells.cell_loops.KINDS`)."""
+        if self.stiff is not None:
+            return PAD
+        return LEANS if self.patch.asymmetric else PLAIN
 
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
-        matrices = MATRICES if self.reference > 0.0 else LINEAR
-        lean = numbers[-2 if self.patch.asymmetric else len(numbers) :]
+        matrices = MATRICES if self.sort == PAD else LINEAR
+        behind = {PLAIN: 0, LEANS: 2, PAD: 1}[self.sort]
+        rows = numbers[len(numbers) - behind :]
+        lean = rows if self.sort == LEANS else rows[:0]
+        stiff = rows if self.sort == PAD else rows[:0]
         return CellsContact(
-            self.law.numbers, numbers.shape[1], numbers, lean, weights
+            self.law.numbers, numbers.shape[1], numbers, lean, stiff, weights
         ), matrices * self.size**2
 
     # ------------------------------------------------------------------ at given loads
@@ -81,7 +92,7 @@ class CompiledDistributed(CompiledModel):
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
         size = size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
-        return self.patch.positions[: 0 if self.reference > 0.0 else None], size
+        return self.patch.positions, size
 
     def linearisation(
         self, state: np.ndarray, twist: np.ndarray, load: np.ndarray
@@ -177,23 +188,29 @@ class CompiledDistributed(CompiledModel):
             np.hypot(distances, KAPPA * self.patch.lever_radii[chosen]).mean()
         )
         rows = rows_of(record, len(weights), weights=places_of(weights))
-        scale = self.law.largest_deflection
+        scale = np.full(count, self.law.largest_deflection)
+        stiff = 0.0
+        if self.stiff is not None:  # at the load `stiff`
+            stiff = float(self.stiff.sum())
+            scale = scale * weights.max(axis=0) * stiff / self.stiff[chosen]
         return PackedModel(
-            self._contact, rows, states, per_cell * count, np.full(states, scale), radius, (weights, numbers), chosen,
-            reference=self.reference, bristle=self.size,
+            self._contact, rows, states, per_cell * count, np.tile(scale, self.size), radius, (weights, numbers), chosen,
+            stiff=stiff,
         )  # fmt: skip
 
     def numbers(self, chosen: Any = slice(None)) -> np.ndarray:
         """Return the numbers `[numbers, n]` of cells, chosen or all, as levers (see `cells.cells`) read them."""
         levers = self.patch.levers()[chosen]
         spin = levers[:, 2:, 2].T
-        if not self.patch.anisotropic:
-            return np.ascontiguousarray(
-                np.vstack([self.patch.positions[chosen].T, spin])
-            )
-        asymmetry = self.patch.asymmetries()[chosen]
-        turned = [levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))]
-        return np.array([*turned, *spin, *asymmetry.T])
+        lever = self.patch.positions[chosen].T
+        behind: Any = []
+        if self.patch.anisotropic:
+            places = (0, 0), (0, 1), (1, 1), (0, 2), (1, 2)
+            lever = np.array([levers[:, i, j] for i, j in places])
+            behind = self.patch.asymmetries()[chosen].T
+        if self.stiff is not None:
+            behind = [self.stiff[chosen]]
+        return np.array([*lever, *spin, *behind])
 
     @functools.cached_property
     def lever(self) -> np.ndarray:

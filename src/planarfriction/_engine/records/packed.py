@@ -12,7 +12,6 @@ from planarfriction._engine.compiler.calls import address_of
 from planarfriction._engine.compiler.memory import place_of, row_of
 from planarfriction._engine.coupled.steps import Stepped, linearise_many, rates_many
 from planarfriction._support.equality import by_parts
-from planarfriction.formulas import LIGHTEST
 
 MAX_PACK_BYTES = 64e6
 """Bytes of shapes that a model packs at a time, if that is more than one shape."""
@@ -52,25 +51,20 @@ class PackedModel(NamedTuple):
     noise, and a patch that just holds could give way, or the other way round.
     """
 
-    reference: float = 0.0
-    """Reference load [N] of a law whose stiffness does not grow with the load; 0 of others."""
-    bristle: int = 2
-    """Components of a bristle, for such a law."""
+    stiff: float = 0.0
+    """Load [N] at which the law alone would be as stiff as the pad; 0 without one."""
 
     def table(self, function: Any, square: int) -> np.ndarray:
         """Return the words of `coupled.steps.Stepped`, which hold as long as the records; `square` as there."""
         loads, words = self.records.shape
         address = address_of(function)
         fields = address, self.states, square, loads, place_of(self.records), words
-        return row_of(Stepped(*fields, self.reference, self.bristle))
+        return row_of(Stepped(*fields, int(self.stiff > 0.0)))
 
 
 def driven(contact: PackedModel, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """Return twists as rates read them: of a fixed stiffness with the factor on `sigma_0` behind, `[B, 4]`."""
-    if contact.reference == 0.0:
-        return twist
-    factor = contact.reference / np.maximum(load, LIGHTEST * contact.reference)
-    return np.concatenate([twist, factor[:, None]], axis=1)
+    """Return twists as rates read them: of a pad with the load behind, `[B, 4]`."""
+    return np.column_stack([twist, load]) if contact.stiff > 0.0 else twist
 
 
 def rates(

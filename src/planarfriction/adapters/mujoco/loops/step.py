@@ -33,6 +33,7 @@ from planarfriction._engine.coupled.coupling import shortening_of, too_far
 from planarfriction._engine.coupled.coupling_rows import ContactSolve
 from planarfriction._engine.coupled.coupling_rows import read as read_patches
 from planarfriction._engine.coupled.coupling_steps import step_all
+from planarfriction._engine.coupled.face import add_faces
 from planarfriction._engine.coupled.following import hold
 from planarfriction.adapters.mujoco.loops.centres import follow_centres
 from planarfriction.adapters.mujoco.loops.geometry import place
@@ -149,6 +150,7 @@ def _slope(own, patches):
     problem = own.problem
     n = 3 * own.host.count
     copy(problem.free_twist, problem.twist, n)
+    add_faces(patches, problem, problem.guess, problem.twist)
     copy(problem.free_load, problem.load, own.host.count)
     step_all(patches, problem, patches.steps)
     total = 0.0

@@ -1,0 +1,75 @@
+"""Patches of a step in contact space, as `coupled.coupling` reads them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction._engine.compiler.calls import address_of
+from planarfriction._engine.compiler.memory import Layout, StructBuffer, places_of
+from planarfriction._engine.coupled.coupling import solve
+from planarfriction._engine.coupled.coupling_rows import Followers, Patches, layout
+from planarfriction._engine.records.base import CompiledModel
+from planarfriction._engine.records.packed import PackedModel
+
+
+class PackedPatches(NamedTuple):
+    """Patches as compiled code sees them."""
+
+    patches: StructBuffer
+    """`Patches` of compiled code."""
+    layout: Layout
+    """Layout of the row of a problem."""
+    records: np.ndarray
+    """Addresses of the patches' records, int `[k]`; 0 of those that follow their loads."""
+    sizes: np.ndarray
+    """Words of the patches' records, int `[k]`; 0 of those that follow their loads."""
+    following: list[int]
+    """Patches whose shapes follow their loads."""
+    kept: list[PackedModel | None]
+    """Objects behind the addresses, which have to be kept alive."""
+
+
+def packed_patches(
+    models: Sequence[CompiledModel], levers: Sequence[float]
+) -> PackedPatches:
+    """Pack patches whose lever arms [m] turn spins into speeds."""
+    fixed = [each.fixed for each in models]
+    records = np.array(
+        [0 if each is None else places_of(each.records)[0] for each in fixed], np.int64
+    )
+    sizes = np.array(
+        [0 if each is None else each.records.shape[1] for each in fixed], np.int64
+    )
+    places, words = zip(*(each.points() for each in models), strict=True)
+    x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
+    followers = Followers(
+        x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64)
+    )
+    bounds = np.cumsum([0, *(math.prod(each.state_shape) for each in models)])
+    rows = layout(
+        len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum())
+    )
+    none = np.zeros((3, 3))
+    soft = [none if each.compliance is None else each.compliance for each in models]
+    patches = Patches(
+        count=len(models),
+        states=int(bounds[-1]),
+        solve=address_of(solve),
+        steps=np.array([address_of(each.functions.step) for each in models], np.int64),
+        slopes=np.array(
+            [address_of(each.functions.slopes) for each in models], np.int64
+        ),
+        firsts=bounds.astype(np.int64),
+        radius=np.array(levers),
+        pad=np.array([each.of_pad for each in models], np.int64),
+        compliance=np.ravel(soft),
+        lag=np.array([each.lag for each in models]),
+        followers=followers,
+        row=rows.offsets,
+    )
+    following = [p for p, each in enumerate(fixed) if each is None]
+    return PackedPatches(StructBuffer(patches), rows, records, sizes, following, fixed)

@@ -1,0 +1,191 @@
+"""Few discs that stand for a pad: chosen by its stiffness, and fitted to the model of all its pieces.
+
+The discs of a cluster of pieces have its load, with the centre and the second moment of that, and its stiffness. Under
+a shift or a spin that grows from rest, all that a disc stands for slips at once, while its pieces slip one after the
+other; so the logarithms of the stiffnesses (one for discs that are images of each other) and of the common compliance
+are fitted, by least squares, to the wrenches of all pieces at the ends of straight paths.
+"""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.laws import FrictionLaw, LuGre
+from planarfriction.models.distributed import DistributedModel
+from planarfriction.pads import Pad, Pieces
+from planarfriction.patch import ContactPatch
+from planarfriction.patch.discs import clusters_of
+from planarfriction.patch.pressure import PerCell
+
+SHIFTS = 0.05, 0.2, 0.5, 0.8
+"""Lengths of paths along an axis, as shares of about that at which a patch slips as a whole."""
+
+SPINS = 0.05, 0.3, 0.7, 1.2
+"""Angles of paths of rotation, alike."""
+
+TOGETHER = (0.3, 0.0, 0.3), (0.5, 0.3, 0.5), (0.3, 0.0, 0.8)
+"""Paths along which a patch is shifted and turned."""
+
+STEPS = 40
+"""Steps of a path."""
+
+FULL = 1.5
+"""Displacement at which a Hertz contact slips as a whole, over that of the stuck one under the same force."""
+
+HELD = 1e-3
+"""Weight of a change of a logarithm beside an error of a wrench, of its limit."""
+
+FARTHEST = 2.5
+"""Largest change of a logarithm."""
+
+EVALUATIONS = 12
+"""Steps of the fit at most."""
+
+ALIKE = 1e-6
+"""Relative difference of sizes, loads, stiffnesses and distances from the middle of discs that are images."""
+
+
+def discs_of(
+    patch: ContactPatch, law: FrictionLaw, pad: Pad, n: int
+) -> tuple[ContactPatch, Pad]:
+    """Return up to n discs that stand for a patch on a pad, and the pad of the discs."""
+    if patch.cells <= n or patch.depends_on_load or pad.springs_of_law:
+        return patch.discs(n), pad
+    return _fitted(patch, pad, n)
+
+
+@functools.lru_cache(8)
+def _fitted(patch: ContactPatch, pad: Pad, n: int) -> tuple[ContactPatch, Pad]:
+    law = LuGre(mu_c=1.0, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+    all_pieces = DistributedModel(patch, law, pad=pad)
+    few, stiffness = _gathered(patch, pad.pieces(patch, law), pad.shares(patch), n)
+    return few, _fit(all_pieces, few, stiffness)
+
+
+def _gathered(
+    patch: ContactPatch, stiffness: np.ndarray, shares: np.ndarray, n: int
+) -> tuple[ContactPatch, np.ndarray]:
+    """Return discs of clusters of cells by their `shares`, and their stiffness."""
+    members = clusters_of(patch, shares, n)
+    weights = patch.weights()
+    load = members.sums(weights)
+    places = np.array([members.sums(weights * each) for each in patch.positions.T])
+    places = (places / load).T
+    sizes = np.diff([*members.begins, len(members.cells)])
+    away = patch.positions[members.cells] - np.repeat(places, sizes, axis=0)
+    squares = (away**2).sum(axis=1) + (patch.cell_extents() ** 2).sum(axis=1)[
+        members.cells
+    ] / 12.0
+    second = np.add.reduceat(
+        weights[members.cells] * members.parted * squares, members.begins
+    )
+    areas = members.sums(patch.areas)
+    with warnings.catch_warnings(action="ignore"):  # of the size, said before
+        few = type(patch)(
+            places,
+            areas,
+            PerCell(load / areas),
+            None,
+            patch.name,
+            radii=np.sqrt(2.0 * second / load),
+        )
+    return few, members.sums(stiffness)
+
+
+class _Frame(NamedTuple):
+    """Principal axes of a pad, about its middle."""
+
+    turn: np.ndarray
+    """Twist in these axes by the twist about the origin, `[3, 3]`."""
+    common: np.ndarray | None
+    """Common compliances in shift along the axes and in rotation `[3]`, or None."""
+
+    def twists(self, seen: np.ndarray) -> np.ndarray:
+        """Return the twists about the origin `[..., 3]` of those in these axes."""
+        return seen @ np.linalg.inv(self.turn).T
+
+    def wrenches(self, given: np.ndarray) -> np.ndarray:
+        """Return the wrenches in these axes `[..., 3]` of those about the origin."""
+        return given @ np.linalg.inv(self.turn)
+
+
+def _frame(pad: Pad, patch: ContactPatch) -> _Frame:
+    middle = patch.areas @ patch.positions / patch.areas.sum()
+    turn = np.eye(3)
+    turn[:2, 2] = -middle[1], middle[0]
+    compliance = pad.compliance(patch)
+    if compliance is None:
+        return _Frame(turn, None)
+    about_middle = turn @ compliance @ turn.T
+    turn[:2] = np.linalg.eigh(about_middle[:2, :2])[1].T @ turn[:2]
+    return _Frame(turn, np.diag(turn @ compliance @ turn.T))
+
+
+def _fit(whole: DistributedModel, few: ContactPatch, stiffness: np.ndarray) -> Pad:
+    """Return the pad of the discs whose wrenches are nearest to those of all pieces."""
+    from scipy.optimize import least_squares
+
+    frame = _frame(whole.pad, whole.patch)  # pyright: ignore[reportArgumentType]
+    patch = whole.patch
+    middle = patch.centre_of_pressure()
+    arm = float(patch.weights() @ np.hypot(*(patch.positions - middle).T))
+    unit = np.array([1.0, 1.0, arm])
+    paths = _paths(whole, frame, unit)
+    wanted = _ends(whole, frame, paths)
+    kinds = _kinds(few, stiffness, middle)
+    count = kinds.max() + 1
+
+    def pieces(x: np.ndarray) -> Pieces:
+        each = stiffness * np.exp(x[:count])[kinds]
+        if frame.common is None:
+            return Pieces(each)
+        back = np.linalg.inv(frame.turn)
+        common = frame.common * np.exp(x[count:])
+        return Pieces(each, back * common @ back.T, whole.pad.lag)  # pyright: ignore
+
+    def misfit(x: np.ndarray) -> np.ndarray:
+        model = DistributedModel(few, whole.law, pad=pieces(x))
+        errors = (_ends(model, frame, paths) - wanted) / unit
+        return np.concatenate([errors.ravel(), HELD * x])
+
+    start = np.zeros(count + (0 if frame.common is None else 3))
+    bounds = (-FARTHEST, FARTHEST)
+    fit = least_squares(
+        misfit, start, diff_step=1e-2, max_nfev=EVALUATIONS, bounds=bounds
+    )
+    return pieces(fit.x)
+
+
+def _paths(whole: DistributedModel, frame: _Frame, unit: np.ndarray) -> np.ndarray:
+    """Return straight paths `[P, 3]` in principal axes, under a load of 1 N."""
+    patch = whole.patch
+    pieces = whole.pad.pieces(patch, whole.law)  # pyright: ignore
+    seen = patch.levers() @ np.linalg.inv(frame.turn)
+    soft = 1.0 / np.einsum("n,nij,nij->j", pieces, seen, seen)
+    if frame.common is not None:
+        soft = soft + frame.common
+    single = [SHIFTS, SHIFTS, SPINS]
+    along = [length * row for row, all_of in zip(np.eye(3), single, strict=True) for length in all_of]  # fmt: skip
+    return FULL * unit * soft * np.array([*along, *TOGETHER])
+
+
+def _ends(model: DistributedModel, frame: _Frame, paths: np.ndarray) -> np.ndarray:
+    """Return the wrenches `[P, 3]` of friction at the ends of paths from rest, in principal axes."""
+    twists = frame.twists(paths)
+    state = model.rest(len(paths))
+    wrench = np.zeros(twists.shape)
+    for _ in range(STEPS):
+        state, wrench = model.step(state, twists, 1.0, 1.0 / STEPS)
+    return frame.wrenches(wrench)
+
+
+def _kinds(few: ContactPatch, stiffness: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Return the number `[n]` of the kind of each disc: images of each other are of one kind."""
+    distances = np.hypot(*(few.positions - middle).T)
+    told = np.stack([distances, few.radii, few.weights(), stiffness], -1)
+    alike = np.round(told / (ALIKE * told.max(axis=0)))
+    return np.unique(alike, axis=0, return_inverse=True)[1].reshape(-1)
