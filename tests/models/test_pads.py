@@ -299,13 +299,19 @@ def test_at_its_load_derivatives_of_rollouts_are_the_published(patch, kind, give
         (getattr(each, name) for each in (found, wanted))
         for name in ("state", "twist", "parameters")
     ):
+        if got.shape == (8,):  # all but sigma_1: damping is along the velocity
+            got, want = np.delete(got, 1), np.delete(want, 1)
         np.testing.assert_allclose(got, want, rtol=1e-9, atol=1e-9 * np.abs(want).max())
     slopes = (
-        rollout_jacobian(model, state, twists, REFERENCE, 1e-3).d_wrenches
+        np.delete(
+            rollout_jacobian(model, state, twists, REFERENCE, 1e-3).d_wrenches, 1, -1
+        )
         for model in (fixed, published)
     )
     np.testing.assert_allclose(*slopes, rtol=1e-9, atol=1e-9)
-    turned = RolloutTangent(state, twists, parameters=parameters_of(fixed))
+    turned = RolloutTangent(
+        state, twists, parameters=parameters_of(fixed) * (np.arange(8) != 1)
+    )
     changes = (
         rollout_jvp(model, state, twists, REFERENCE, 1e-3, turned).wrenches_dot
         for model in (fixed, published)
@@ -355,13 +361,15 @@ def _loss(model, axis, size, count=200):
     """Return the energy lost in the second cycle of a displacement."""
     state = model.rest()
     work = 0.0
+    before = np.zeros(3)
     quarter = np.ones(count // 4)
     signs = np.concatenate([quarter, -quarter, -quarter, quarter])
     for k, sign in enumerate(np.tile(signs, 2)):
         step = np.zeros(3)
         step[axis] = sign * 4.0 * size / count
         state, pull = model.step(state, step, 1.0, 1.0)
-        work -= float(pull @ step) if k >= count else 0.0
+        work -= 0.5 * float((before + pull) @ step) if k >= count else 0.0
+        before = pull
     return work
 
 
@@ -511,7 +519,7 @@ def test_a_moment_moves_the_load_and_not_the_stiffness():
         model.step(model.rest(), small, 3.0, 1e-3, moments=m)[1]
         for m in ((0.0, 0.0), (4e-3, 6e-3))
     ]
-    np.testing.assert_allclose(*held, rtol=1e-12)
+    np.testing.assert_allclose(*held, rtol=1e-12, atol=1e-18)
     slips = [
         each.step(each.rest(), [0.1, 0.0, 3.0], 3.0, 10.0, moments=(4e-3, 6e-3))[1]
         for each in (model, plain)
@@ -521,7 +529,9 @@ def test_a_moment_moves_the_load_and_not_the_stiffness():
 
 LEANING = dataclasses.replace(_DISC, asymmetry=(0.3, -0.2))
 TURNED = dataclasses.replace(_DISC, metric=METRIC)
-SOFT = ContactPatch.disc(0.01, cells=9, pressure=SoftFinger(c=0.004, k=2.0))
+SOFT = ContactPatch.disc(
+    0.01, cells=9, pressure=SoftFinger(c=0.004, n=1.0 / 3.0, k=2.0)
+)
 L_SHAPE = ContactPatch.polygon(
     [(0, 0), (0.02, 0), (0.02, 0.01), (0.01, 0.01), (0.01, 0.02), (0, 0.02)], cells=12
 )

@@ -66,6 +66,7 @@ class FrictionModel(ByValue):
     """Units of the state: one for all components, or one for each."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if not isinstance(self.law, FrictionLaw):
             raise InvalidValueError(
