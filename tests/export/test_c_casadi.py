@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from tests.support.c_libraries import PADS, MODELS, STRICT, samples
+from tests.support.c_libraries import MODELS, PADS, STRICT, samples
 
 ca = pytest.importorskip("casadi", reason="needs the extra [casadi]")
 pytestmark = [

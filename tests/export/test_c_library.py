@@ -13,10 +13,10 @@ import planarfriction as pf
 from planarfriction.derivatives import parameter_names, parameters_of, rollout_vjp
 from tests.support.c_libraries import (
     DISC,
-    PADS,
     KINDS,
     LAW,
     MODELS,
+    PADS,
     STRICT,
     VECTOR,
     library,

@@ -70,8 +70,8 @@ def test_slopes_by_load_and_parameters_are_differences(name):
 def test_no_load_and_hardly_any(name, precision):
     """Without load bristles are forgotten; under 1e-30 N, and from states of metres, steps are those of Python.
 
-    Single precision begins at 1e-6 of the load at which law and pad are as stiff. Reversals are numbers: to which side rounding lets bristles
-    go that stretch back in a step without end is open.
+    Single precision begins at 1e-6 of the load at which law and pad are as stiff. Reversals are numbers: to which side
+    rounding lets bristles go that stretch back in a step without end is open.
     """
     made = library(name, precision)
     rng = np.random.default_rng(1)

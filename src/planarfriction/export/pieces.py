@@ -103,7 +103,7 @@ class Pieces(NamedTuple):
     """Constant arrays by name; `share` [count] is that in the load, `place_x` and `place_y` are those of its parts,
     which in single precision nothing else reads."""
     step: Block
-    """New states, then the wrench per unit load, from `p`, `k`, `z`, `v`, `dt`; of a `pad` `normal_force`, `shares` too."""
+    """New states, then the wrench per unit load, from `p`, `k`, `z`, `v`, `dt`; of a pad `shares`, `normal_force`."""
     parameters: dict[str, float]
     """Numbers of the law that may change at run time."""
     steady: Block
@@ -221,9 +221,15 @@ def _with(function: Any, **others: Any) -> Any:
 
 
 LIGHTEST = 1e-6
-"""Share of `elastic.Elastic.stiff` below which loads count as that in single precision: its range of numbers is short."""
+"""Takes the place of `formulas.LIGHTEST` for pads in single precision, whose range of numbers is short."""
 
-_LIGHTER = _with(elastic.factor, formulas=SimpleNamespace(LIGHTEST=LIGHTEST))
+STILL = 1e-18
+"""Takes the place of `elastic.STILL` in single precision, where squares of smaller ones leave the range."""
+
+_SINGLE = {
+    "factor": _with(elastic.factor, formulas=SimpleNamespace(LIGHTEST=LIGHTEST)),
+    "traction": _with(elastic.traction, STILL=STILL),
+}
 
 
 def _cell(size: int, pad: bool, precision: str) -> tuple[Any, Any, Any]:
@@ -238,7 +244,7 @@ def _cell(size: int, pad: bool, precision: str) -> tuple[Any, Any, Any]:
             sliding = _sliding_of_disc
             moved = _with(moved, sliding=sliding)
             plain = _with(plain, moved=moved)
-        step = _with(step, moved=moved, factor=_LIGHTER)
+        step = _with(step, moved=moved, **_SINGLE)
     return step if pad else plain, plain, sliding
 
 
@@ -249,13 +255,13 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     numbers = model.compiled.numbers()
     law = model.law.numbers
     size = model.compiled.size
-    sort = model.compiled.sort
-    kind = KINDS[size, model.patch.anisotropic, sort]
+    kind = KINDS[size, model.patch.anisotropic, model.compiled.sort]
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
     cell, plain, sliding = _cell(size, kind.pad, precision)
     # Pads whose stiffness is their own do not feel sigma_0.
     constant = () if model.compiled.springs else ("sigma_0",)
+    parameters = _parameters(law, constant)
     by = cells_rollout.by_of(kind.path, kind.pad)
     lever = twin(kind.lever)
     names = ["place_x", "place_y"] if precision == "double" else ["lever_x", "lever_y"]
@@ -300,8 +306,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
             back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()
         ]
         bars += [back(tape, (tuple(unit), none)) for unit in np.eye(size).tolist()]
-        names = _parameters(law, constant)
-        kept = [cells_rollout.PARAMETERS.index(name) for name in names]
+        kept = [cells_rollout.PARAMETERS.index(name) for name in parameters]
         kept += [-1] * kind.pad
         rows = tuple(
             (by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept))
@@ -332,7 +337,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         size,
         tables,
         traced(step),
-        _parameters(law, constant),
+        parameters,
         traced(steady),
         lambda: traced(slopes),
         rungs,

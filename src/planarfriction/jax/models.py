@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections import namedtuple
 from dataclasses import dataclass
+
 import jax
 import jax.numpy as jnp
 
@@ -40,8 +41,9 @@ class DistributedModel(FrictionPytree, CellsModel):
     """The distributed model (`planarfriction.DistributedModel`) as a pytree, for small patches.
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
-    positions, the digits of these that single precision leaves out, the stiffness of a `pad`, and weights. A patch whose
-    shape depends on the load keeps that of `normal_force` [N]; the stiffness of `Pad.at_load` follows the weights.
+    positions, the digits of these that single precision leaves out, the stiffness of a `pad`, and weights. A patch
+    whose shape depends on the load keeps that of `normal_force` [N]; the stiffness of `Pad.at_load` follows the
+    weights.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """

@@ -23,7 +23,7 @@ class Cells(NamedTuple):
     """A patch as arrays."""
 
     levers: Any
-    """Numbers of the cells as their levers read them: see `cells.cells.Lever`, with an asymmetry behind, `[numbers, N]`."""
+    """Numbers of the cells as levers read them (see `cells.cells.Lever`), any asymmetry behind, `[numbers, N]`."""
     weights: Any
     """Share of the load that each cell carries [-], `[N]`."""
     remainder: Any

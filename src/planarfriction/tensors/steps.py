@@ -116,7 +116,7 @@ class TensorModel:
         moments: Any = None,
         parameters: Any = None,
     ) -> Any:
-        """Return the rate of the state, of its shape; `moments` as in `step`. Without a pad the load does not change it."""
+        """Return the rate of the state, of its shape; `moments` as in `step`. Only on a pad the load changes it."""
         return self._evaluated(state, twist, normal_force, parameters, moments)[0]
 
     def wrench(

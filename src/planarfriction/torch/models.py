@@ -35,8 +35,8 @@ class DistributedModel(FrictionModule, CellsModel):
 
     `trainable` names the parameters of the law that are `nn.Parameter`s. With `"weights"` the pressure is trainable
     too: the weights `w_i` of the cells are the softmax of a raw parameter, so that they stay positive and add up to 1.
-    If the shape of the patch depends on the load, the shape at `normal_force` [N] is kept. The stiffness of a `pad` is a
-    buffer; that of `Pad.at_load` follows the weights, with other pads these are not trainable.
+    If the shape of the patch depends on the load, the shape at `normal_force` [N] is kept. The stiffness of a `pad` is
+    a buffer; that of `Pad.at_load` follows the weights, which are not trainable with other pads.
 
     Raises InvalidValueError for a parameter that breaks its rule.
 

@@ -39,8 +39,8 @@ class Model:
         Index of the model of each contact [contacts], if there are several.
     parameters
         Numbers of the law for each contact, by name (see `names`): a number, or an array [contacts]. `scale` is the
-        size of the patch as a multiple of the model's: lengths of patch and lever arms, not of bristles, nor stiffnesses
-        of a pad. What is not given is the model's.
+        size of the patch as a multiple of the model's: lengths of patch and lever arms, not of bristles, nor the
+        stiffness of a pad. What is not given is the model's.
     device
         Warp device, by default Warp's current one.
     dtype
