@@ -23,12 +23,7 @@ from planarfriction.models import ReducedModel as Reference
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
-from planarfriction.tensors.models import (
-    CellsModel,
-    PublishedModel,
-    few_discs,
-    reference_of,
-)
+from planarfriction.tensors.models import CellsModel, PublishedModel, reference_of
 from planarfriction.tensors.steps import LAW
 
 
@@ -65,8 +60,7 @@ class DistributedModel(FrictionPytree, CellsModel):
         cells = distributed.cells_of(model, normal_force, jnp.result_type(float))
         self.parameters = record_of(LawParameters, law.numbers._asdict())
         self.positions, self.weights, self.remainder = map(jnp.asarray, cells[:3])
-        stiffness = distributed.stiffness_of(model)
-        self.stiffness = None if stiffness is None else jnp.asarray(stiffness)
+        self.stiffness = None if pad is None else jnp.asarray(cells.stiff)
         self.kind = cells.kind
         self.of_law = pad is None or pad.springs_of_law
 
@@ -159,5 +153,5 @@ class ReducedModel(DistributedModel):
         cells: int = Reference.cells,
         pad: Pad | None = None,
     ) -> None:
-        few = few_discs("jax.ReducedModel", patch, law, pad, cells)
+        few = reference_of("jax.ReducedModel", patch, law, pad, cells)
         super().__init__(few.patch, law, normal_force, pad=few.pad)

@@ -37,20 +37,20 @@ class Cells(NamedTuple):
 def cells_of(
     model: DistributedModel, normal_force: float | None, precision: Any
 ) -> Cells:
-    """Return the cells of a model at a load [N] as NumPy arrays, for levers of a number type of NumPy."""
+    """Return the cells of a model at a load [N] as NumPy arrays, for levers of a number type of NumPy.
+
+    `stiff` are the stiffnesses of the pieces of a pad [N/m], or the load [N] of a `Pad.at_load`.
+    """
     compiled = model.compiled
     kind = model.patch.bristles, model.patch.anisotropic, compiled.sort
     numbers = compiled.numbers()[: KINDS[kind].rows - KINDS[kind].pad]
     levers = numbers.astype(precision)
     remainder = model.patch.positions.T - positions_of(np, levers.astype(float))
-    return Cells(levers, model.patch.weights(normal_force), remainder, kind=kind)
-
-
-def stiffness_of(model: DistributedModel) -> np.ndarray | None:
-    """Return the stiffness of the pieces of a pad [N/m], of `Pad.at_load` its load [N], or None without a pad."""
-    if isinstance(model.pad, AtLoad):
-        return np.array(model.pad.normal_force)
-    return model.pad and model.pad.pieces(model.patch, model.law)
+    pad: Any = model.pad
+    stiff = pad and pad.pieces(model.patch, model.law)
+    if isinstance(pad, AtLoad):
+        stiff = np.array(pad.normal_force)
+    return Cells(levers, model.patch.weights(normal_force), remainder, stiff, kind)
 
 
 def positions_of(xp, levers):

@@ -74,30 +74,27 @@ class PublishedModel(TensorModel):
     """Numbers of the limit surface: `kind`, `size` and `data` (see `planarfriction._engine.published.surfaces`)."""
     root: Any
     """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
+    stiffness = None
+    """No pad."""
 
     def _shape(self, values: Mapping[str, Any]) -> published.PublishedNumbers:
         return published.numbers_of(self.xp, values, self.surface, self.root)
 
 
 def reference_of(
-    name: str, patch: ContactPatch, law: FrictionLaw, pad: Pad | None
+    name: str,
+    patch: ContactPatch,
+    law: FrictionLaw,
+    pad: Pad | None,
+    cells: int | None = None,
 ) -> models.DistributedModel:
-    """Return the distributed model that the model `name` computes.
+    """Return the distributed model that the model `name` computes, of few discs if their number is given.
 
     Raises InvalidValueError for a patch, a law or a pad that the model cannot be made of.
     """
     TensorModel.refuse(patch, law, name)
     model = models.DistributedModel(patch, law, pad=pad)
     refuse_common(model, name)
-    return model
-
-
-def few_discs(
-    name: str, patch: ContactPatch, law: FrictionLaw, pad: Pad | None, cells: int
-) -> models.DistributedModel:
-    """Return the distributed model of the discs on which the reduced model `name` is that.
-
-    Raises InvalidValueError as `reference_of` does.
-    """
-    reference_of(name, patch, law, pad)
+    if cells is None:
+        return model
     return models.ReducedModel(patch, law, cells=cells, pad=pad).reduction

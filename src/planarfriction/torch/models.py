@@ -17,12 +17,7 @@ from planarfriction.models import ReducedModel as Reference
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
-from planarfriction.tensors.models import (
-    CellsModel,
-    PublishedModel,
-    few_discs,
-    reference_of,
-)
+from planarfriction.tensors.models import CellsModel, PublishedModel, reference_of
 from planarfriction.tensors.steps import LAW
 from planarfriction.torch.base import TRAINABLE, FrictionModule
 
@@ -66,10 +61,10 @@ class DistributedModel(FrictionModule, CellsModel):
         self.kind = cells.kind
         self.pad = pad
         self.of_law = pad is None or pad.springs_of_law
-        stiffness = distributed.stiffness_of(model)
-        if stiffness is not None:
-            stiffness = torch.tensor(stiffness, **kind)
-        self.register_buffer("stiffness", stiffness)
+        stiff = cells.stiff
+        if stiff is not None:
+            stiff = torch.tensor(stiff, **kind)
+        self.register_buffer("stiffness", stiff)
         numbers = law.numbers._asdict()
         chosen = tuple(trainable)
         if "weights" in chosen and not self.of_law:
@@ -212,7 +207,7 @@ class ReducedModel(DistributedModel):
         pad: Pad | None = None,
         **options: Any,
     ):
-        few = few_discs("torch.ReducedModel", patch, law, pad, cells)
+        few = reference_of("torch.ReducedModel", patch, law, pad, cells)
         super().__init__(few.patch, law, normal_force, pad=few.pad, **options)
         self.patch = patch
         self.pad = pad
