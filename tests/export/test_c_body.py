@@ -12,7 +12,7 @@ from tests.support.c_libraries import library, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
-NAMES = "few", "distributed", "table", "ellipsoid", "soft", "fixed discs"
+NAMES = "few", "distributed", "table", "ellipsoid", "soft", "discs at a load"
 NOT_CONVERGED = 4
 BLOCK = 0.2, 1e-5, 0.0, 0.0, 0.0
 """Mass and inertia of a block above the middle of its patch."""
@@ -66,7 +66,7 @@ def problems(made, count, hard, patches=1):
         *((name, "float", 1) for name in ("few", "table")),
         *(
             (name, "double", 3)
-            for name in ("few", "distributed", "soft", "fixed discs")
+            for name in ("few", "distributed", "soft", "discs at a load")
         ),
         ("few", "float", 3),
     ],

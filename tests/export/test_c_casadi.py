@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from tests.support.c_libraries import FIXED, MODELS, STRICT, samples
+from tests.support.c_libraries import MODELS, PADS, STRICT, samples
 
 ca = pytest.importorskip("casadi", reason="needs the extra [casadi]")
 pytestmark = [
@@ -16,10 +16,10 @@ pytestmark = [
 ]
 
 
-@pytest.fixture(scope="module", params=["few", "table", "fixed discs"])
+@pytest.fixture(scope="module", params=["few", "table", "discs at a load"])
 def loaded(request, tmp_path_factory):
     """Return a model, its function in CasADi, inputs and the model's parameters."""
-    model = (MODELS | FIXED)[request.param]()
+    model = (MODELS | PADS)[request.param]()
     folder = tmp_path_factory.mktemp("casadi")
     pf.export_c(model, folder, casadi=True)
     command = [

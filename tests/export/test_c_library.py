@@ -13,10 +13,10 @@ import planarfriction as pf
 from planarfriction.derivatives import parameter_names, parameters_of, rollout_vjp
 from tests.support.c_libraries import (
     DISC,
-    FIXED,
     KINDS,
     LAW,
     MODELS,
+    PADS,
     STRICT,
     VECTOR,
     library,
@@ -50,7 +50,7 @@ def misfit(name, precision, count, seed=0):
 
 
 @pytest.mark.parametrize("precision", KINDS)
-@pytest.mark.parametrize("name", [*NAMES, *FIXED])
+@pytest.mark.parametrize("name", [*NAMES, *PADS])
 def test_steps(name, precision):
     of_states, of_wrenches = misfit(name, precision, 3000)
     assert of_states < (1e-11 if precision == "double" else 1e-3)
@@ -135,7 +135,7 @@ def by_cell(name, derivative, shape):
     return derivative.reshape(shape)
 
 
-@pytest.mark.parametrize("name", [*NAMES, *FIXED])
+@pytest.mark.parametrize("name", [*NAMES, *PADS])
 def test_slopes(name):
     """Off the bound of slip, where derivatives are one-sided; to 1e-9 of the largest per load."""
     made = library(name)
@@ -149,7 +149,7 @@ def test_slopes(name):
     exact = made.model.step_jacobians(*inputs)
     per_load = 1.0 / np.maximum(inputs[2], 1e-9)
     for field in exact._fields:
-        if field == "state_load" and name not in FIXED:  # zero, and not exported
+        if field == "state_load" and name not in PADS:  # zero, and not exported
             continue
         own = slopes[field]
         scale = (
@@ -160,7 +160,7 @@ def test_slopes(name):
         scale = scale.reshape(-1, *[1] * (own.ndim - 1))
         wanted = by_cell(field, getattr(exact, field), own.shape) * scale
         # Python has differences there.
-        near = 1e-6 if name in FIXED and field.endswith("_load") else 1e-9
+        near = 1e-6 if name in PADS and field.endswith("_load") else 1e-9
         assert np.abs(own * scale - wanted).max() < near * np.abs(wanted).max(), field
 
 

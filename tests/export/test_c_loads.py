@@ -30,10 +30,13 @@ def misfit(made, given):
     ).max()
 
 
-@pytest.mark.parametrize("precision", ["double", "float"])
-def test_steps(precision):
+@pytest.mark.parametrize(
+    ("name", "precision"),
+    [("soft", "double"), ("soft", "float"), ("soft layer", "double")],
+)
+def test_steps(name, precision):
     """On rungs, steps are those of the model; between them, shapes are interpolated."""
-    made = library("soft", precision)
+    made = library(name, precision)
     rng = np.random.default_rng(0)
     rungs = ladder(made).rungs
     rungs = rungs[(rungs > 1e-2) & (rungs < 100.0)]
@@ -63,8 +66,9 @@ def test_measured_maps():
         np.testing.assert_allclose(*wrenches, rtol=1e-9)
 
 
-def test_slopes_by_the_load():
-    made = library("soft")
+@pytest.mark.parametrize("name", ["soft", "soft layer"])
+def test_slopes_by_the_load(name):
+    made = library(name)
     given = inputs(made, np.random.default_rng(2).uniform(0.5, 5.0, 200))
     *_, slopes = run(made, given, slopes=True)
     step = 1e-6

@@ -11,7 +11,7 @@ from tests.support.c_libraries import TURNED, library, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
-NAMES = "few", "distributed", "ellipsoid", "soft"
+NAMES = "few", "distributed", "ellipsoid", "soft", "soft layer"
 QUICK = "few", "feet on a line"
 COUNT = 200
 

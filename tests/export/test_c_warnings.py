@@ -21,7 +21,6 @@ LAWS = {
     "gamma": pf.LuGre(mu_s=1.2, gamma=1.3),
     "dahl": Dahl(),
     "creep": CoulombStribeck(),
-    "fixed": pf.LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=2.0),
 }
 MODELS = {
     "reduced": lambda law: pf.ReducedModel(FEW, law),
@@ -32,12 +31,14 @@ MODELS = {
     "soft": lambda law: pf.ReducedModel(SOFT, law, cells=8),
     "table": lambda law: pf.ReducedModelPublished(FEW, law),
     "ellipsoid": lambda law: pf.ReducedModelPublished(FEW, law, surface=ELLIPSOID),
+    "pad": lambda law: pf.DistributedModel(FEW, law, pad=pf.Pad.at_load(2.0)),
+    "soft layer": lambda law: pf.ReducedModel(
+        SOFT, law, cells=8, pad=pf.Pad.layer(1e6, 2e-3)
+    ),
 }
-UNKNOWN = {
-    (model, law) for model in ("table", "ellipsoid") for law in ("creep", "fixed")
-} | {("soft", "fixed")}
+UNKNOWN = {("table", "creep"), ("ellipsoid", "creep")}
 """Models that do not take a law."""
-QUICK, SLOW = ("points", "ellipsoid"), pytest.mark.slow
+QUICK, SLOW = ("points", "ellipsoid", "pad"), pytest.mark.slow
 WARNINGS = *STRICT, "-Wconversion", "-Wshadow"
 
 

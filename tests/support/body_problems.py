@@ -45,7 +45,7 @@ def models(seed: int) -> list[pf.models.FrictionModel]:
     """Return a model of each kind, with laws that are soft and stiff, damped and not, with and without breakaway."""
     generator = np.random.default_rng(seed)
     laws = [random_law(generator) for _ in range(6)]
-    fixed = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
+    law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
     return [
         *(pf.ReducedModel(SHAPES[i % 3], laws[i]) for i in range(3)),
         pf.ReducedModel(pf.ContactPatch.disc(radius=0.003), pf.LuGre(0.3, 0.4)),
@@ -53,7 +53,7 @@ def models(seed: int) -> list[pf.models.FrictionModel]:
         pf.DistributedModel(_METRIC, laws[4]),
         pf.ReducedModelPublished(SHAPES[0], laws[5]),
         pf.ReducedModelPublished(_FEW, laws[2], pf.LimitSurfaceEllipsoid(_FEW)),
-        pf.ReducedModel(SHAPES[0], fixed, pad=pf.Pad.at_load(2.0)),
+        pf.ReducedModel(SHAPES[0], law, pad=pf.Pad.at_load(2.0)),
     ]
 
 

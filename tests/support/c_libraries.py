@@ -60,15 +60,17 @@ TURNED = {
     for name in ("three feet", "feet on a line", "many points")
 }
 """Models with cells along lines, of which some lie along no axis."""
-_FIXED_LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, reference_load=2.0)
-FIXED = {
-    "fixed discs": lambda: pf.ReducedModel(DISC, _FIXED_LAW),
-    "fixed points": lambda: pf.DistributedModel(
-        FEW, pf.LuGre(mu_s=1.2, reference_load=2.0)
-    ),
-    "fixed metric": lambda: pf.DistributedModel(METRIC, _FIXED_LAW),
+_AT_LOAD, _LAYER = pf.Pad.at_load(2.0), pf.Pad.layer(12e6, 2e-3)
+"""As stiff as bristles under 2 N, the layer of a disc of 1 cm."""
+PADS = {
+    "discs at a load": lambda: pf.ReducedModel(DISC, LAW, pad=_AT_LOAD),
+    "layer of points": lambda: pf.DistributedModel(FEW, pf.LuGre(mu_s=1.2), pad=_LAYER),
+    "metric at a load": lambda: pf.DistributedModel(METRIC, LAW, pad=_AT_LOAD),
 }
-"""Models whose stiffness does not grow with the load."""
+"""Models on elastic pads."""
+FOLLOWING["soft layer"] = lambda: pf.ReducedModel(
+    FOLLOWING["soft"]().patch, LAW, pad=_LAYER
+)
 REDUCED = [name for name in MODELS if name != "distributed"]
 KINDS = {"double": np.float64, "float": np.float32}
 STRICT = "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"
@@ -137,7 +139,7 @@ def library(
     name: str, precision: str = "double", *options: str, patches: int = 1
 ) -> Library:
     """Compile the model called `name` once, without a warning, and load it."""
-    model = (MODELS | FOLLOWING | TURNED | FIXED)[name]()
+    model = (MODELS | FOLLOWING | TURNED | PADS)[name]()
     folder = Path(_folder().name) / "-".join([name, precision, str(patches), *options])
     pf.export_c(model, folder, precision=precision, patches=patches)
     (folder / "driver.c").write_text(DRIVER)
@@ -190,12 +192,13 @@ def slopes_type(model: Any, kind: type) -> np.dtype:
     """Return the record of derivatives of a model."""
     states = int(np.prod(model.state_shape))
     own = model.state_shape[0]
-    count = 7 if model.law.elasto_plastic else 6
+    pad = getattr(model, "pad", None)
+    count = 6 + bool(model.law.elasto_plastic) - (pad == _LAYER)
     shapes = {
         "wrench_state": (3, states), "wrench_twist": (3, 3), "wrench_load": (3,), "wrench_params": (3, count),
         "state_state": (states, own), "state_twist": (states, 3), "state_params": (states, count),
     }  # fmt: skip
-    shapes |= {} if model.law.reference_load is None else {"state_load": (states,)}
+    shapes |= {} if pad is None else {"state_load": (states,)}
     return np.dtype([(name, kind, shape) for name, shape in shapes.items()])
 
 

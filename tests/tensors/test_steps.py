@@ -29,12 +29,9 @@ def contact_of(kind):
     """Return the equations of a model, its contact over NumPy, and the model itself."""
     numbers = LAW_OF_TEST.numbers
     if kind == "distributed":
-        cells = distributed.cells_of(PATCH, LAW_OF_TEST, None, float)
-        return (
-            distributed,
-            ContactArrays(numbers, cells),
-            pf.DistributedModel(PATCH, LAW_OF_TEST),
-        )
+        model = pf.DistributedModel(PATCH, LAW_OF_TEST)
+        cells = distributed.cells_of(model, None, float)
+        return distributed, ContactArrays(numbers, cells), model
     shape = published.shape_of(PATCH, LAW_OF_TEST, None)
     values = {
         name: np.array([[value]])

@@ -1,7 +1,5 @@
 """Gradients of compiled rollouts to the weights of cells in PyTorch and JAX, and patches of trained weights."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ LAW = LAWS["elasto-plastic"]
 CASES = {
     "points": ("points", LAW),
     "leaning discs": ("leaning discs", LAW),
-    "fixed stiffness": ("turned discs", dataclasses.replace(LAW, reference_load=1.5)),
+    "at a load": ("turned discs", LAW, pf.Pad.at_load(1.5)),
 }
 
 
@@ -58,10 +56,10 @@ def power(front, model, twists, loads, bars, method):  # noqa: F811
     return of
 
 
-def weighed(front, kind, law):  # noqa: F811
-    options = (
-        {"trainable": ("mu_c", "mu_s", "weights")} if front.name == "torch" else {}
-    )
+def weighed(front, kind, law, pad=None):  # noqa: F811
+    options = {"pad": pad}
+    if front.name == "torch":
+        options["trainable"] = ("mu_c", "mu_s", "weights")
     model = front.model(patch(kind), law, **options)
     return model, (
         model.raw_weights.detach() if front.name == "torch" else model.weights

@@ -149,26 +149,26 @@ def test_single():
     assert np.quantile(error[both > 0], 0.9) < 1e-4
 
 
-FIXED = CoupledPatches(
+PADS = CoupledPatches(
     [
-        pf.ReducedModel(SHAPES[0], dataclasses.replace(LAW, reference_load=3.0)),
-        pf.DistributedModel(SHAPES[2], LAW),
+        pf.ReducedModel(SHAPES[0], LAW, pad=pf.Pad.at_load(3.0)),
+        pf.DistributedModel(SHAPES[2], LAW, pad=pf.Pad.layer(12e6, 2e-3)),
     ]
 )
 
 
-def test_fixed_stiffness():
-    """Loads follow the wrenches of a body that is high, and stiffness of one patch does not follow the loads."""
+def test_pads():
+    """Loads follow the wrenches of a body that is high, and stiffnesses of pads do not follow the loads."""
     worst = []
     rounds = []
     moved = 0.0
     for expected, found, host, *_ in compared(
-        FIXED, wp.float64, both_runs(FIXED, WORLDS, 8), 1e-13
+        PADS, wp.float64, both_runs(PADS, WORLDS, 8), 1e-13
     ):
         assert (found.converged > 0).mean() > 0.98 and expected.converged.mean() > 0.98
         same = expected.converged & (found.converged > 0)
-        force = np.abs(expected.wrench / levers(FIXED)).max((1, 2))
-        off = np.abs((found.wrench - expected.wrench) / levers(FIXED)).max(
+        force = np.abs(expected.wrench / levers(PADS)).max((1, 2))
+        off = np.abs((found.wrench - expected.wrench) / levers(PADS)).max(
             (1, 2)
         ) / np.maximum(force, 1e-9)
         worst.append(off[same])
@@ -179,22 +179,6 @@ def test_fixed_stiffness():
         and moved > 0.1
         and np.mean(rounds) < 0.1
     )
-    with pytest.raises(
-        pf.FrictionError,
-        match="follows must be False for a law with a reference_load, got True of",
-    ):
-        front.CoupledPatches(FIXED.models, worlds=1, follows=[True, True], device="cpu")
-    kernel = front.CoupledPatches(FIXED.models, worlds=1, device="cpu")
-    host = HostStep(
-        *(
-            np.zeros((1, *shape))
-            for shape in ((2, 3), (2,), (2, 3), (6, 6), (2, 6), (2, 2))
-        )
-    )
-    with pytest.raises(
-        pf.FrictionError, match="moments must be None for a law with a reference_load"
-    ):
-        kernel.step(kernel.rest(), given(wp.float32, host), 1e-3, kernel.results())
 
 
 def test_lost():

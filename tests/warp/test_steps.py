@@ -26,8 +26,11 @@ MODELS = {
     ),
     "turned discs": lambda: pf.DistributedModel(METRIC.discs(12), LAW),
     "distributed": lambda: pf.DistributedModel(METRIC, LAW),
-    "fixed": lambda: pf.ReducedModel(
-        DISC, dataclasses.replace(LAW, reference_load=2.0)
+    "at a load": lambda: pf.ReducedModel(DISC, LAW, pad=pf.Pad.at_load(2.0)),
+    "layer": lambda size=0.01: pf.DistributedModel(
+        pf.ContactPatch.disc(size, cells=5),
+        LAW,
+        pad=pf.Pad.layer(12e6 * (0.01 / size) ** 2, 2e-3),
     ),
     "published": lambda size=0.01: pf.ReducedModelPublished(
         pf.ContactPatch.disc(size), LAW
@@ -110,7 +113,7 @@ def test_parameters():
         assert wrench.numpy()[i] == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", ["few", "discs", "published"])
+@pytest.mark.parametrize("name", ["few", "discs", "layer", "published"])
 def test_moments(name):
     """The pressure of a patch follows moments, in a patch of another size too."""
     scale = np.array([1.0, 2.0, 0.5, 1.0])

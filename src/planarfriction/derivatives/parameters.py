@@ -131,6 +131,8 @@ def pack(model: Any, parameters: Any = None) -> PackedRollout:
         packed.rows, (*values.shape[:-1], packed.rows.shape[-1])
     ).copy()
     rows[..., packed.family.columns] = values
+    if packed.springs == 0.0:  # `sigma_0` cancels at that of the pieces' `stiff`
+        rows[..., 0] = packed.rows[..., 0]
     return packed._replace(rows=rows)
 
 
@@ -221,30 +223,40 @@ def pack_surface(
 
 
 def pack_cells(
+    kind: tuple[int, bool, str],
     elasto_plastic: bool,
+    of_law: bool,
     weights: np.ndarray,
-    positions: np.ndarray,
-    reference: Any = 0.0,
+    levers: np.ndarray,
+    stiffness: Any = None,
 ) -> PackedRollout:
     """Return a `DistributedModel` by its cells and their weights `[..., N]`, for rollouts at given parameters.
 
-    `positions` are `[2, N]`, levers `[5, N]`, or these with an asymmetry behind them `[7, N]`; of discs `[3, N]`,
-    `[6, N]` or `[8, N]`, with `kappa a` before the asymmetry. `reference` is a `LuGre.reference_load` [N], or 0.
+    `kind` is a key of `cell_loops.KINDS`, `levers` are the numbers of the cells `[numbers, N]`. Of a pad `stiffness` is
+    that of its pieces `[N]` [N/m], or if it is that `of_law`, the load [N] at which it is.
+
+    Raises InvalidValueError for contacts with different weights on a pad with the stiffness of the law.
     """
-    levers = np.asarray(positions, dtype=float)
     weights = np.asarray(weights, dtype=float)
-    count = len(positions)
+    levers = np.asarray(levers, dtype=float)
     rows = weights.reshape(-1, weights.shape[-1])
-    inner = (3 if count in (3, 6, 8) else 2, weights.shape[-1])
     same = len(rows) > 0 and (rows == rows[0]).all()
-    if 3 < count < 7:
-        levers = np.vstack([levers, np.zeros((2, levers.shape[1]))])  # no asymmetry
-    family = _cells(inner[0], count > 3, count > 6)
-    shapes = cells_by_load(levers, rows[:1] if same else rows, None)
-    law = np.array(_any_law(elasto_plastic))
-    batch = () if same else weights.shape[:-1]
+    if same:
+        rows = rows[:1]
+    if stiffness is not None:
+        if of_law and len(rows) > 1:
+            rule = "be those of all contacts, on a pad with the stiffness of the law (or method='eager')"
+            raise InvalidValueError("weights", rule, f"{len(rows)} different ones")
+        # at a `sigma_0` of 1
+        stiff = stiffness * rows[0] if of_law else stiffness
+        levers = np.vstack([levers, stiff])
     return PackedRollout(
-        family, law, shapes, inner=inner, reference=float(reference), batch=batch
+        _cells(*kind),
+        np.array(_any_law(elasto_plastic)),
+        cells_by_load(levers, rows, None),
+        inner=(kind[0], weights.shape[-1]),
+        springs=1.0 if stiffness is None or of_law else 0.0,
+        batch=() if same else weights.shape[:-1],
     )
 
 

@@ -221,10 +221,9 @@ def _texts(
 
     writer = Writer(precision)
     slip = slip_of(model.patch, writer)
-    functions = _functions(writer, pieces)
-    functions |= {} if pieces.fixed else {"tilt": tilt_of(pieces.count)}
+    functions = _functions(writer, pieces) | {"tilt": tilt_of(pieces.count)}
     read = "\n".join(functions.values())
-    always = ("share", "rungs", *(() if pieces.fixed else ("place_x", "place_y")))
+    always = "share", "rungs", "place_x", "place_y"
     tables = {
         table: each
         for table, each in pieces.tables.items()

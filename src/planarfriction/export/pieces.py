@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from types import FunctionType
+from types import CellType, FunctionType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction._engine.bristles import discs, points
-from planarfriction._engine.bristles.bristle_limit import within
+from planarfriction._engine.bristles import discs, elastic, points
+from planarfriction._engine.bristles.elastic import Elastic
 from planarfriction._engine.bristles.law import inverse_deflection
-from planarfriction._engine.cells import cells, cells_rollout
+from planarfriction._engine.cells import cells_rollout
+from planarfriction._engine.cells.cell_loops import KINDS
 from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.rebinding import Rewriting
@@ -32,7 +33,6 @@ from planarfriction._engine.codegen.trace import (
     traced,
 )
 from planarfriction._engine.codegen.vectors import norm, times
-from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.published import published_contact, published_step
 from planarfriction._engine.published.published_contact import (
     PublishedContact,
@@ -44,6 +44,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.models.base import refuse_common
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.shared import loads_of_change
 
@@ -102,7 +103,7 @@ class Pieces(NamedTuple):
     """Constant arrays by name; `share` [count] is that in the load, `place_x` and `place_y` are those of its parts,
     which in single precision nothing else reads."""
     step: Block
-    """New states, then the wrench per unit load, from `p`, `k`, `z`, `v`, `dt`, and `normal_force` if it is `fixed`."""
+    """New states, then the wrench per unit load, from `p`, `k`, `z`, `v`, `dt`; of a pad `shares`, `normal_force`."""
     parameters: dict[str, float]
     """Numbers of the law that may change at run time."""
     steady: Block
@@ -110,18 +111,18 @@ class Pieces(NamedTuple):
     slopes: Callable[[], Block]
     """Trace new states, wrench and derivatives: rows of the wrench, then of states.
 
-    Derivatives are by states, twist, parameters and, of a fixed stiffness, by the load."""
+    Derivatives are by states, twist, parameters and, of a pad, by the load of the cell, which is `carried`."""
     rungs: int = 0
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
-    fixed: bool = False
-    """True for a stiffness that does not grow with the load."""
+    pad: bool = False
+    """True for pieces of a pad, which see their loads."""
     moves: bool = False
     """True if the patch moves where pressures that follow moments cannot be had by other shares."""
 
     @property
     def columns(self) -> int:
         """Number of derivatives of a number of a cell."""
-        return self.states + 3 + len(self.parameters) + self.fixed
+        return self.states + 3 + len(self.parameters) + self.pad
 
 
 def pieces_of(
@@ -133,7 +134,8 @@ def pieces_of(
     others without load follow.
 
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
-    depends on the load, friction that differs from cell to cell in other ways than by a metric.
+    depends on the load, friction that differs from cell to cell in other ways than by a metric, pads with a common
+    compliance.
     """
     whole = model.reduction if isinstance(model, ReducedModel) else model
     law = getattr(model, "law", None)
@@ -161,17 +163,18 @@ def pieces_of(
 # ---------------------------------------------------------------------- what they are traced with
 
 
-def _law(trace: Trace, numbers: LawNumbers) -> LawNumbers:
+def _law(trace: Trace, numbers: LawNumbers, more: tuple[str, ...] = ()) -> LawNumbers:
     symbols: dict[str, Any] = {
         name: Number(trace, f"p->{name}")
         for name in LawNumbers._fields
-        if name not in FIXED
+        if name not in FIXED + more
     }
     return numbers._replace(**symbols)
 
 
-def _parameters(numbers: LawNumbers) -> dict[str, float]:
-    names = [name for name in LawNumbers._fields if name not in FIXED]
+def _parameters(numbers: LawNumbers, more: tuple[str, ...] = ()) -> dict[str, float]:
+    """Return the numbers of a law that are not constants of the source, `more` of which are."""
+    names = [name for name in LawNumbers._fields if name not in FIXED + more]
     if not numbers.elasto_plastic:
         names.remove("breakaway_ratio")
     return {name: float(getattr(numbers, name)) for name in names}
@@ -208,91 +211,103 @@ def _sliding_of_disc(u: Any) -> Any:
 
 
 def _with(function: Any, **others: Any) -> Any:
-    """Return a function that calls others in place of those of its module."""
+    """Return a function that calls others in place of those of its module or of those around it."""
     own = function.py_func
-    return FunctionType(own.__code__, own.__globals__ | others, own.__name__)
+    around = zip(own.__code__.co_freevars, own.__closure__ or (), strict=True)
+    cells = [CellType(others.get(name, cell.cell_contents)) for name, cell in around]
+    return FunctionType(
+        own.__code__, own.__globals__ | others, own.__name__, None, tuple(cells)
+    )
 
 
-LIGHTEST = {"double": formulas.LIGHTEST, "float": 1e-6}
-"""Share of a reference load below which loads count as that, by precision: the range of numbers is short."""
+LIGHTEST = 1e-6
+"""Takes the place of `formulas.LIGHTEST` for pads in single precision, whose range of numbers is short."""
+
+STILL = 1e-18
+"""Takes the place of `elastic.STILL` in single precision, where squares of smaller ones leave the range."""
+
+_SINGLE = {
+    "factor": _with(elastic.factor, formulas=SimpleNamespace(LIGHTEST=LIGHTEST)),
+    "traction": _with(elastic.traction, STILL=STILL),
+}
 
 
-def _settled(cell: Any, reference: float, lightest: float) -> Any:
-    """Return the step of a cell with a fixed stiffness under a load (see `bristles.bristle_limit`)."""
-
-    def settled(law: Any, z: Any, u: Any, dt: Any, load: Any) -> Any:
-        factor = reference / xp.maximum(load, lightest)
-        new, traction = cell(law, within(law, times(factor, z)), u, factor * dt)  # pyright: ignore[reportCallIssue]
-        return times(1.0 / factor, new), traction  # pyright: ignore[reportCallIssue]
-
-    return settled
+def _cell(size: int, pad: bool, precision: str) -> tuple[Any, Any, Any]:
+    """Return the step of a cell, of a piece of a pad if it is one, that of the law alone, and `discs.sliding`."""
+    module = discs if size == 3 else points
+    sliding = _sliding if size == 2 else discs.sliding
+    moved = module.moved
+    plain = module.step
+    step = elastic.step_disc if size == 3 else elastic.step
+    if precision == "float":
+        if size == 3:
+            sliding = _sliding_of_disc
+            moved = _with(moved, sliding=sliding)
+            plain = _with(plain, moved=moved)
+        step = _with(step, moved=moved, **_SINGLE)
+    return step if pad else plain, plain, sliding
 
 
 def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
+    refuse_common(model, "source code")
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
     numbers = model.compiled.numbers()
     law = model.law.numbers
     size = model.compiled.size
+    kind = KINDS[size, model.patch.anisotropic, model.compiled.sort]
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
-    levers = (cells.POSITIONS, cells.LEVERS)
-    cell = points.step
-    sliding = _sliding
-    if size == 3:
-        sliding = discs.sliding if precision == "double" else _sliding_of_disc
-        levers = (cells.DISC_POSITIONS, cells.DISC_LEVERS)
-        cell = _with(discs.step, sliding=sliding)
-    reference = model.compiled.reference
-    by = cells_rollout.by_of("law")
-    fixed = reference > 0.0
-    moved, by = (
-        (_settled(cell, reference, LIGHTEST[precision] * reference), (*by, "load"))
-        if fixed
-        else (cell, by)
-    )
-    given = ("dt", "normal_force") if fixed else ("dt",)
-    lever = twin(levers[model.patch.anisotropic])
+    cell, plain, sliding = _cell(size, kind.pad, precision)
+    # Pads whose stiffness is their own do not feel sigma_0.
+    constant = () if model.compiled.springs else ("sigma_0",)
+    parameters = _parameters(law, constant)
+    by = cells_rollout.by_of(kind.path, kind.pad)
+    lever = twin(kind.lever)
     names = ["place_x", "place_y"] if precision == "double" else ["lever_x", "lever_y"]
     if model.patch.anisotropic:
         names = ["lever_xx", "lever_xy", "lever_yy", "lever_x", "lever_y"]
     names += ["gyration"] * (size == 3)
 
-    def step(trace: Trace) -> Any:
+    def given(trace: Trace, load: str) -> tuple[Any, Any, Any]:
+        """Return the numbers of the lever, the law of the cell under a load, and its velocity."""
         own = _vector(trace, *(f"{name}[k]" for name in names))
-        u = lever.seen(own, _vector(trace, *_TWIST))
-        new, traction = twin(moved)(
-            _law(trace, law), _state(trace, size, n), u, *_vector(trace, *given)
-        )
+        found: Any = _law(trace, law, constant)
+        if kind.pad:
+            found = Elastic(found, *_vector(trace, "stiff[k]", load))
+        return own, found, lever.seen(own, _vector(trace, *_TWIST))
+
+    def step(trace: Trace) -> Any:
+        own, found, u = given(trace, "normal_force")
+        if kind.pad:
+            found = found._replace(load=Number(trace, "shares[k]") * found.load)
+        dt = Number(trace, "dt")
+        new, traction = twin(cell)(found, _state(trace, size, n), u, dt)
         return new, lever.wrench(own, traction)
 
     def steady(trace: Trace) -> Any:
-        own = _vector(trace, *(f"{name}[k]" for name in names))
-        given = _law(trace, law)
-        u = lever.seen(own, _vector(trace, *_TWIST))
+        own, found, u = given(trace, "normal_force")
+        found = found.law if kind.pad else found
         speed, pull = twin(sliding)(u)[2:]
         z = twin(times)(
-            twin(ratio)(1.0, speed * twin(inverse_deflection)(given, speed)), pull
+            twin(ratio)(1.0, speed * twin(inverse_deflection)(found, speed)), pull
         )
-        return lever.wrench(own, twin(cell)(given, z, u, 0.0)[1])
+        return lever.wrench(own, twin(plain)(found, z, u, 0.0)[1])
 
     def slopes(trace: Trace) -> Any:
-        own = _vector(trace, *(f"{name}[k]" for name in names))
-        written = derive(moved, by, {"z": size, "u": size})
+        own, found, u = given(trace, "carried")
+        written = derive(cell, by, {"z": size, "u": size})
         forth = twin(written.forth)
         back = twin(written.back)
-        u = lever.seen(own, _vector(trace, *_TWIST))
         none = (0.0,) * size
-        (new, traction), tape = forth(
-            _law(trace, law), _state(trace, size, n), u, *_vector(trace, *given)
-        )
+        dt = Number(trace, "dt")
+        (new, traction), tape = forth(found, _state(trace, size, n), u, dt)
         bars = [
             back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()
         ]
         bars += [back(tape, (tuple(unit), none)) for unit in np.eye(size).tolist()]
-        kept = [cells_rollout.PARAMETERS.index(name) for name in _parameters(law)] + [
-            -1
-        ] * fixed
+        kept = [cells_rollout.PARAMETERS.index(name) for name in parameters]
+        kept += [-1] * kind.pad
         rows = tuple(
             (by_z, lever.wrench(own, by_u), *(by_law[i] for i in kept))
             for by_z, by_u, *by_law in bars
@@ -304,7 +319,12 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         (*model.patch.positions.T, *numbers),
         strict=False,
     )
-    tables = {name: np.pad(each, (0, more), mode="edge") for name, each in places}
+    tables = dict(places)
+    if kind.pad:
+        tables["stiff"] = model.compiled.stiff
+    tables = {
+        name: np.pad(each, (0, more), mode="edge") for name, each in tables.items()
+    }
     rungs = 0
     if model.patch.depends_on_load:
         ladder = ladder_of(model.patch)
@@ -317,11 +337,11 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         size,
         tables,
         traced(step),
-        _parameters(law),
+        parameters,
         traced(steady),
         lambda: traced(slopes),
         rungs,
-        fixed,
+        kind.pad,
     )
 
 

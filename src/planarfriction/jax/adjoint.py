@@ -71,7 +71,7 @@ class HostRollout(NamedTuple):
     strict: bool
     """True if a derivative that the adjoint does not have is an error, and not left to operations of JAX."""
     cells: bool
-    """True for a model of cells, whose last leaf are weights."""
+    """True for a model of cells whose weights, its last leaf, are an input."""
     weighs: bool = False
     """True if the cotangent of the weights is wanted."""
     like = 1
@@ -209,7 +209,8 @@ def rollout(
     """Return the last state and the wrenches `[..., T, 3]`; state, twist and normal_force have the same batch axes."""
     leaves, structure = jax.tree.flatten(model)
     count = len(model.parameters)
-    cells = "weights" in model.leaves
+    # Stiffnesses of a pad that are its own hold whatever the weights are, which has no adjoint.
+    cells = "weights" in model.leaves and model.of_law
     operation = HostRollout(
         structure, count, len(model.state_shape), model.leaves[1], strict, cells
     )

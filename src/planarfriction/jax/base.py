@@ -24,9 +24,9 @@ class FrictionPytree(TensorModel):
 
     xp = xp
     leaves: ClassVar[tuple[str, ...]]
-    """Attributes that JAX maps over and differentiates.
-
-    `elasto_plastic` and `reference_load` are fixed when a function is compiled."""
+    """Attributes that JAX maps over and differentiates."""
+    fixed: ClassVar[tuple[str, ...]] = ("elasto_plastic",)
+    """Attributes that are fixed when a function is compiled."""
     parameters: Any
     """Physical parameters by name, scalars."""
 
@@ -37,7 +37,6 @@ class FrictionPytree(TensorModel):
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         self.refuse(patch, law, f"jax.{type(self).__name__}")
         self.elasto_plastic = law.numbers.elasto_plastic > 0.0
-        self.reference_load = law.reference_load
 
     def replace(self, **leaves: Any) -> Self:
         """Return a model with other `parameters`, or other leaves by name."""
@@ -59,15 +58,13 @@ class FrictionPytree(TensorModel):
 
     def _flatten(self):
         keys = map(jax.tree_util.GetAttrKey, self.leaves)
-        return [(key, getattr(self, key.name)) for key in keys], (
-            self.elasto_plastic,
-            self.reference_load,
-        )
+        fixed = tuple(getattr(self, name) for name in self.fixed)
+        return [(key, getattr(self, key.name)) for key in keys], fixed
 
     @classmethod
-    def _unflatten(cls, fixed: tuple[bool, float | None], leaves) -> Self:
+    def _unflatten(cls, fixed: tuple[Any, ...], leaves) -> Self:
         model = object.__new__(cls)  # JAX also puts in what a model cannot be made of
-        names = *cls.leaves, "elasto_plastic", "reference_load"
+        names = *cls.leaves, *cls.fixed
         vars(model).update(zip(names, (*leaves, *fixed), strict=True))
         return model
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections import namedtuple
 from dataclasses import dataclass
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -21,9 +20,10 @@ from planarfriction.jax.base import FrictionPytree, record_of
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import ReducedModel as Reference
+from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
-from planarfriction.tensors.models import CellsModel, PublishedModel, few_discs
+from planarfriction.tensors.models import CellsModel, PublishedModel, reference_of
 from planarfriction.tensors.steps import LAW
 
 
@@ -36,27 +36,38 @@ class DistributedModel(FrictionPytree, CellsModel):
     """The distributed model (`planarfriction.DistributedModel`) as a pytree, for small patches.
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
-    positions, the digits of these that single precision leaves out, and weights. A patch whose shape depends on the
-    load keeps that of `normal_force` [N].
+    positions, the digits of these that single precision leaves out, the stiffness of a `pad`, and weights. A patch
+    whose shape depends on the load keeps that of `normal_force` [N]; the stiffness of `Pad.at_load` follows the
+    weights.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
 
-    leaves = ("parameters", "positions", "remainder", "weights")
+    leaves = ("parameters", "positions", "remainder", "stiffness", "weights")
+    fixed = ("elasto_plastic", "kind", "of_law")
     parameters: LawParameters
 
     def __init__(
-        self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None
+        self,
+        patch: ContactPatch,
+        law: FrictionLaw,
+        normal_force: float | None = None,
+        *,
+        pad: Pad | None = None,
     ) -> None:
         super().__init__(patch, law)
-        cells = distributed.cells_of(patch, law, normal_force, jnp.result_type(float))
+        model = reference_of(f"jax.{type(self).__name__}", patch, law, pad)
+        cells = distributed.cells_of(model, normal_force, jnp.result_type(float))
         self.parameters = record_of(LawParameters, law.numbers._asdict())
-        self.positions, self.weights, self.remainder = map(jnp.asarray, cells)
+        self.positions, self.weights, self.remainder = map(jnp.asarray, cells[:3])
+        self.stiffness = None if pad is None else jnp.asarray(cells.stiff)
+        self.kind = cells.kind
+        self.of_law = pad is None or pad.springs_of_law
 
     def compiled(self) -> PackedRollout:
         """Return the model as compiled rollouts take it."""
-        reference = self.reference_load or 0.0
-        return pack_cells(self.elasto_plastic, self.weights, self.positions, reference)  # pyright: ignore
+        kind = self.kind, self.elasto_plastic, self.of_law
+        return pack_cells(*kind, self.weights, self.positions, self.stiffness)  # pyright: ignore
 
 
 @by_parts
@@ -140,11 +151,7 @@ class ReducedModel(DistributedModel):
         normal_force: float | None = None,
         *,
         cells: int = Reference.cells,
-        **options: Any,
+        pad: Pad | None = None,
     ) -> None:
-        super().__init__(
-            few_discs("jax.ReducedModel", patch, law, cells),
-            law,
-            normal_force,
-            **options,
-        )
+        few = reference_of("jax.ReducedModel", patch, law, pad, cells)
+        super().__init__(few.patch, law, normal_force, pad=few.pad)

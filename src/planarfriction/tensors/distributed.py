@@ -10,66 +10,47 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.bristles import (
-    asymmetric_cells,
-    bristle_limit,
-    discs,
-    points,
-)
 from planarfriction._engine.bristles.asymmetric_cells import Leaning
-from planarfriction._engine.cells import cells
+from planarfriction._engine.bristles.elastic import Elastic
+from planarfriction._engine.cells.cell_loops import KINDS, CellKind
 from planarfriction.formulas import LawNumbers
 from planarfriction.models import DistributedModel
-from planarfriction.patch import ContactPatch
+from planarfriction.pads import AtLoad
 from planarfriction.tensors.elements import Vector, joined, split
-
-
-class CellType(NamedTuple):
-    """Functions of a kind of cell, in numbers as `kernels` has them."""
-
-    bristles: int
-    lever: cells.Lever
-    evaluate: Any
-    step: Any
-
-
-KINDS = {
-    2: CellType(2, cells.POSITIONS, points.evaluate, points.step),
-    3: CellType(3, cells.DISC_POSITIONS, discs.evaluate, discs.step),
-    5: CellType(2, cells.LEVERS, points.evaluate, points.step),
-    6: CellType(3, cells.DISC_LEVERS, discs.evaluate, discs.step),
-    7: CellType(2, cells.LEVERS, asymmetric_cells.evaluate, asymmetric_cells.step),
-    8: CellType(
-        3, cells.DISC_LEVERS, asymmetric_cells.evaluate_disc, asymmetric_cells.step_disc
-    ),
-}
-"""Kinds of cells by how many numbers each has: points, discs, both with a friction metric, and with asymmetry too.
-
-Numbers are those of the lever, with the asymmetry behind them.
-"""
 
 
 class Cells(NamedTuple):
     """A patch as arrays."""
 
     levers: Any
-    """Numbers of the cells as their levers read them: see `cells.cells.Lever`, `[numbers, N]`."""
+    """Numbers of the cells as levers read them (see `cells.cells.Lever`), any asymmetry behind, `[numbers, N]`."""
     weights: Any
     """Share of the load that each cell carries [-], `[N]`."""
     remainder: Any
     """Digits of the positions, x then y [m], that the numbers of `levers` have no room for, `[2, N]`."""
+    stiff: Any = None
+    """`elastic.Elastic.stiff` [N] of the pieces of a pad; None without one."""
+    kind: Any = None
+    """Key of `cell_loops.KINDS`."""
 
 
 def cells_of(
-    patch: ContactPatch, law: Any, normal_force: float | None, precision: Any
+    model: DistributedModel, normal_force: float | None, precision: Any
 ) -> Cells:
-    """Return the cells of a patch at a load [N] as NumPy arrays, for levers of a number type of NumPy."""
-    numbers = DistributedModel(patch, law).compiled.numbers()
-    if patch.anisotropic and not patch.asymmetric:
-        numbers = numbers[:-2]
+    """Return the cells of a model at a load [N] as NumPy arrays, for levers of a number type of NumPy.
+
+    `stiff` are the stiffnesses of the pieces of a pad [N/m], or the load [N] of a `Pad.at_load`.
+    """
+    compiled = model.compiled
+    kind = model.patch.bristles, model.patch.anisotropic, compiled.sort
+    numbers = compiled.numbers()[: KINDS[kind].rows - KINDS[kind].pad]
     levers = numbers.astype(precision)
-    remainder = patch.positions.T - positions_of(np, levers.astype(float))
-    return Cells(levers, patch.weights(normal_force), remainder)
+    remainder = model.patch.positions.T - positions_of(np, levers.astype(float))
+    pad: Any = model.pad
+    stiff = pad and pad.pieces(model.patch, model.law)
+    if isinstance(pad, AtLoad):
+        stiff = np.array(pad.normal_force)
+    return Cells(levers, model.patch.weights(normal_force), remainder, stiff, kind)
 
 
 def positions_of(xp, levers):
@@ -80,33 +61,23 @@ def positions_of(xp, levers):
     return xp.stack([xx * y - xy * x, xy * y - yy * x], 0) / (xx * yy - xy * xy)
 
 
-def _numbers(shape: Cells) -> tuple[Any, Any]:
-    """Return the numbers of the levers of the cells, and their asymmetry or None."""
-    count = len(shape.levers)
-    lever = tuple(shape.levers[k] for k in range(count if count < 7 else count - 2))
-    return lever, None if count < 7 else Vector(shape.levers[-2:])
+def _lever(shape: Cells) -> tuple[CellKind, tuple[Any, ...]]:
+    """Return the kind of the cells, and the numbers of their levers."""
+    kind = KINDS[shape.kind]
+    return kind, tuple(shape.levers[k] for k in range(kind.numbers))
 
 
-def _bristle(xp, name: str, law: Any, shape: Cells, z, u, *dt):
+def _bristle(xp, name: str, law: Any, shape: Cells, z, u, load, *dt):
     """Return two arrays `[..., d, N]`, the results of a function of the bristles."""
-    kind = KINDS[len(shape.levers)]
-    (_, asymmetry) = _numbers(shape)
+    kind = KINDS[shape.kind]
     # The source of discs names components.
-    vector = Vector if kind.bristles == 2 else split
-    law = law if asymmetry is None else Leaning(law, asymmetry)
-    found = xp.over(getattr(kind, name))(law, vector(z), vector(u), *dt)
+    vector = Vector if kind.element.size == 2 else split
+    if kind.leans:
+        law = Leaning(law, Vector(shape.levers[-2:]))
+    elif kind.pad:
+        law = Elastic(law, shape.stiff, shape.weights * load)
+    found = xp.over(getattr(kind.element, name))(law, vector(z), vector(u), *dt)
     return tuple(joined(xp, each) for each in found)
-
-
-def middle(xp, law: LawNumbers, shape: Cells):
-    """Return the middle of the limit of every bristle at rest `[..., d, N]`, or 0.0 (see `bristles.bristle_limit`)."""
-    _, asymmetry = _numbers(shape)
-    if asymmetry is None:
-        return 0.0
-    lean = asymmetry.array
-    if KINDS[len(shape.levers)].bristles == 3:
-        lean = xp.concatenate([lean, 0.0 * lean[:1]], -2)
-    return law.mu_s / law.sigma_0 * lean
 
 
 # ---------------------------------------------------------------------- steps
@@ -123,29 +94,23 @@ narrow = wide
 
 def drive(xp, law: LawNumbers, shape: Cells, twist) -> tuple[Any]:
     """Return the velocities that the cells see at a twist `[..., d, N]`, as a tuple of this array."""
-    seen = xp.over(KINDS[len(shape.levers)].lever.seen)
-    return (joined(xp, seen(_numbers(shape)[0], split(twist[..., None]))),)
+    kind, lever = _lever(shape)
+    seen = xp.over(kind.lever.seen)(lever, split(twist[..., None]))
+    return (joined(xp, seen),)
 
 
-def limited(xp, law: LawNumbers, shape: Cells, z):
-    """Return bristles brought back onto their limits (see `bristles.bristle_limit`)."""
-    seen_from = middle(xp, law, shape)
-    return seen_from + xp.over(bristle_limit.within)(law, Vector(z - seen_from)).array
-
-
-def evaluate(xp, law: LawNumbers, shape: Cells, z, by):
+def evaluate(xp, law: LawNumbers, shape: Cells, z, by, load):
     """Return the rates of the bristles, and the tractions per unit load."""
-    return _bristle(xp, "evaluate", law, shape, z, *by)
+    return _bristle(xp, "evaluate", law, shape, z, *by, load)
 
 
-def advance(xp, law: LawNumbers, shape: Cells, z, by, dt):
+def advance(xp, law: LawNumbers, shape: Cells, z, by, load, dt):
     """Return the bristles after `dt` of a constant twist, and the tractions per unit load."""
-    return _bristle(xp, "step", law, shape, z, *by, dt)
+    return _bristle(xp, "step", law, shape, z, *by, load, dt)
 
 
 def wrench(xp, shape: Cells, pull):
     """Return the wrench about the origin per unit load `[..., 3]`."""
-    found = xp.over(KINDS[len(shape.levers)].lever.wrench)(
-        _numbers(shape)[0], split(shape.weights * pull)
-    )
+    kind, lever = _lever(shape)
+    found = xp.over(kind.lever.wrench)(lever, split(shape.weights * pull))
     return xp.concatenate([each.sum(-1) for each in found], -1)

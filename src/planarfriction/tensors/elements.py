@@ -15,7 +15,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from planarfriction import formulas
-from planarfriction._engine.bristles import bristle_step
+from planarfriction._engine.bristles import bristle_step, elastic
 from planarfriction._engine.codegen import ratios, vectors
 from planarfriction._engine.codegen.rebinding import Rewriting
 from planarfriction._engine.compiler import compiled_math
@@ -135,6 +135,17 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         per = 1.0 / xp.stop_gradient(slide + spin + math.sqrt(rest))
         return formulas.disc_friction_above(per * slide, per * spin, rest * per * per)
 
+    def traction(law: Any, y: Any, rate: Any, u: Any) -> Any:
+        """Return `elastic.traction` in a unit of speed that keeps squares and their slopes in range."""
+        speed = xp.stop_gradient(xp.root(dot(u, u)))
+        moves = speed > 0.0
+        unit = 1.0 / xp.where(moves, speed, 1.0)
+        heading = times(unit, u)
+        along = xp.where(moves, dot(times(unit, rate), heading), 1.0)
+        along = along / xp.where(moves, dot(heading, heading), 1.0)
+        damping = law.sigma_1 * xp.clip(along, 0.0, 1.0) + law.sigma_2
+        return plus(times(-law.sigma_0, y), -damping, u)
+
     return [
         (compiled_math, xp),
         (
@@ -148,6 +159,7 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         (vectors.dot, dot),
         (vectors.square, lambda a: dot(a, a)),
         (formulas.disc_friction, disc_friction),
+        (elastic.traction, traction),
         (surfaces.place, functools.partial(_place, xp)),
         (published_contact.through, through),
         (ratios.per, per),

@@ -10,6 +10,8 @@ from planarfriction import models
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
+from planarfriction.models.base import refuse_common
+from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
 from planarfriction.tensors.steps import TensorModel
@@ -25,11 +27,17 @@ class CellsModel(TensorModel):
     """Share of the load that each cell carries [-], `[N]`."""
     remainder: Any
     """Digits of the positions that the number type of `positions` has no room for (see `tensors.distributed.Cells`)."""
+    stiffness: Any
+    """Stiffness of the pieces of a pad `[N]` [N/m]; of `Pad.at_load` its load [N]; None without a pad."""
+    kind: tuple[int, bool, str]
+    """Key of `cell_loops.KINDS`."""
+    of_law: bool
+    """True if the stiffness of the pieces is that of the law, by their weights, and not their own."""
 
     @property
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
-        return distributed.KINDS[len(self.positions)].bristles, self.positions.shape[1]
+        return self.kind[0], self.positions.shape[1]
 
     def weighted(self, patch: ContactPatch) -> ContactPatch:
         """Return the `patch` of the model's cells, or its discs if there are fewer, with the present weights.
@@ -48,7 +56,14 @@ class CellsModel(TensorModel):
         )
 
     def _shape(self, values: Mapping[str, Any]) -> distributed.Cells:
-        return distributed.Cells(self.positions, self.weights, self.remainder)
+        stiff = self.stiffness
+        if stiff is not None and self.of_law:
+            stiff = stiff * self.xp.where(self.weights > 0.0, self.weights, 1.0)
+        elif stiff is not None:
+            stiff = stiff / values["sigma_0"]
+        return distributed.Cells(
+            self.positions, self.weights, self.remainder, stiff, self.kind
+        )
 
 
 class PublishedModel(TensorModel):
@@ -59,17 +74,27 @@ class PublishedModel(TensorModel):
     """Numbers of the limit surface: `kind`, `size` and `data` (see `planarfriction._engine.published.surfaces`)."""
     root: Any
     """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
+    stiffness = None
+    """No pad."""
 
     def _shape(self, values: Mapping[str, Any]) -> published.PublishedNumbers:
         return published.numbers_of(self.xp, values, self.surface, self.root)
 
 
-def few_discs(
+def reference_of(
     name: str,
     patch: ContactPatch,
     law: FrictionLaw,
-    cells: int,
-) -> ContactPatch:
-    """Return the discs on which the reduced model `name` is the distributed one."""
+    pad: Pad | None,
+    cells: int | None = None,
+) -> models.DistributedModel:
+    """Return the distributed model that the model `name` computes, of few discs if their number is given.
+
+    Raises InvalidValueError for a patch, a law or a pad that the model cannot be made of.
+    """
     TensorModel.refuse(patch, law, name)
-    return models.ReducedModel(patch, law, cells=cells).reduction.patch
+    model = models.DistributedModel(patch, law, pad=pad)
+    refuse_common(model, name)
+    if cells is None:
+        return model
+    return models.ReducedModel(patch, law, cells=cells, pad=pad).reduction

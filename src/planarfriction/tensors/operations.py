@@ -77,13 +77,13 @@ class RolloutOperation(NamedTuple):
         *_, end, wrenches = derivatives.rollout_jvp(
             self.pack(*weights, *held[1:]), *given, tangent, **more
         )
-        if self.cells and changes[4].any():
-            wrenches = (
-                wrenches
-                + derivatives.rollout(
-                    self.pack(changes[4], *held[1:]), *given, **more
-                ).wrenches
-            )
+        if self.cells:
+            for sign in (1.0, -1.0):  # weights are not negative
+                share = np.maximum(sign * changes[4], 0.0)
+                if share.any():
+                    model = self.pack(share, *held[1:])
+                    roll = derivatives.rollout(model, *given, **more)
+                    wrenches = wrenches + sign * roll.wrenches
         return end, wrenches
 
     def pull(self, held: Arrays, inputs: Arrays, bars: Arrays, kept: Arrays) -> Arrays:

@@ -135,6 +135,6 @@ def follow(xp: Any, equations: Any, contact: Any, centre: Any) -> Pressed:
     """Return a model with its pressure about `centre` `[..., 2]` [m]: cells share the load, another patch moves."""
     shape = contact.shape
     if isinstance(shape, Cells):
-        weights = xp.in_double(partial(_shared, xp), *shape, centre)[..., None, :]
+        weights = xp.in_double(partial(_shared, xp), *shape[:3], centre)[..., None, :]
         return Pressed(contact._replace(shape=shape._replace(weights=weights)), None)
     return Pressed(contact, centre - xp.stack(equations.centre(shape), -1))

@@ -132,7 +132,7 @@ def drive(xp, law: LawNumbers, own: PublishedNumbers, twist) -> Drive:
     return Drive(u, speed, per_h, xp.over(inverse_deflection)(law, speed), viscous)
 
 
-def evaluate(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive):
+def evaluate(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive, load):
     """Return the rate of the bristle, and its pull (see `wrench`)."""
     z = scaled(xp, own, z)
     rate = (
@@ -145,7 +145,7 @@ def evaluate(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive):
     return raw(xp, own, rate), formulas.traction(z, rate, by.viscous, law)
 
 
-def advance(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive, dt):
+def advance(xp, law: LawNumbers, own: PublishedNumbers, z, by: Drive, load, dt):
     """Return the bristle after `dt` of a constant twist, and its pull (see `wrench`)."""
     z = scaled(xp, own, z)
     new, k = xp.over(bristle_step.step)(

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
-from planarfriction._engine.bristles import bristle_limit
 from planarfriction._support import validation
 from planarfriction.derivatives.parameters import PARAMETERS, check_range
 from planarfriction.errors import InvalidValueError
@@ -14,7 +13,6 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep, refuse_rate_law
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors.elements import Vector
 from planarfriction.tensors.namespace import (
     Namespace,
     broadcast,
@@ -35,28 +33,16 @@ class ContactArrays(NamedTuple):
     """Broadcasts with the components of bristles."""
     shape: Any
     """Numbers of the patch as the model's equations know them."""
-    reference_load: Any = None
-    """Load [N] of a stiffness that does not grow with the load, or None."""
 
 
 def evaluate(
     xp: Any, equations: Any, contact: ContactArrays, state: Any, twist: Any, load: Any
 ) -> tuple[Any, Any]:
     """Return the rate of the state, and the wrench `[..., 3]`."""
-    by = equations.drive(xp, *contact[:2], twist)
-    law, shape, reference = contact
+    by = equations.drive(xp, *contact, twist)
+    law, shape = contact
     z = equations.wide(state)
-    if reference is None:
-        rate, pull = equations.evaluate(xp, law, shape, z, by)
-    else:
-        z = xp.over(bristle_limit.factor_at)(reference, inner(load)) * z
-        rate, pull = equations.evaluate(xp, law, shape, z, by)
-        out = z - equations.middle(xp, law, shape)
-        back = (
-            xp.over(bristle_limit.recovery)(law, Vector(out), xp.norm(by[0], -2)) * out
-        )
-        rate = rate - back
-        pull = pull + law.sigma_1 * back
+    rate, pull = equations.evaluate(xp, law, shape, z, by, inner(load))
     return equations.narrow(rate), load[..., None] * equations.wrench(xp, shape, pull)
 
 
@@ -72,7 +58,7 @@ def step(
     """Return the state after `dt` [s] of a constant twist, and the wrench at the end; without load bristles relax."""
     given = (contact.law.sigma_0, state, twist)
     z = equations.wide(xp.widened(state))
-    by = equations.drive(xp, *contact[:2], xp.widened(twist))
+    by = equations.drive(xp, *contact, xp.widened(twist))
     new, pull = advance(xp, equations, contact, z, by, load, dt)
     wrench = load[..., None] * equations.wrench(xp, contact.shape, pull)
     return xp.narrowed(equations.narrow(new), *given), xp.narrowed(wrench, *given)
@@ -81,23 +67,10 @@ def step(
 def advance(
     xp: Any, equations: Any, contact: ContactArrays, z: Any, by: Any, load: Any, dt: Any
 ) -> tuple[Any, Any]:
-    """Return the bristles `[..., d, N]` after `dt`, zeros of contacts without load, and the tractions per unit load.
-
-    With a fixed stiffness the step is the published one of another deflection and time (see `bristles.bristle_limit`).
-    """
-    (law, shape, reference) = contact
-    loaded = inner(load > 0.0)
-    dt = inner(dt)
-    if reference is None:
-        new, pull = equations.advance(xp, law, shape, z, by, dt)
-    else:
-        factor = xp.over(bristle_limit.factor_at)(
-            reference, xp.where(loaded, inner(load), reference)
-        )
-        z = equations.limited(xp, law, shape, factor * z)
-        new, pull = equations.advance(xp, law, shape, z, by, factor * dt)
-        new = new / factor
-    return xp.where(loaded, new, 0.0), pull
+    """Return the bristles `[..., d, N]` after `dt`, zeros of contacts without load, and the tractions per unit load."""
+    load = inner(load)
+    new, pull = equations.advance(xp, *contact, z, by, load, inner(dt))
+    return xp.where(load > 0.0, new, 0.0), pull
 
 
 def inner(value: Any) -> Any:
@@ -121,8 +94,6 @@ class TensorModel:
     equations: ClassVar[ModuleType]
     """Module of the model's `drive`, `evaluate`, `advance` and `wrench`."""
     elasto_plastic: bool
-    reference_load: Any
-    """Load [N] of a stiffness that does not grow with the load (`LuGre.reference_load`), or None."""
 
     @staticmethod
     def refuse(patch: ContactPatch, law: FrictionLaw, name: str) -> None:
@@ -145,7 +116,7 @@ class TensorModel:
         moments: Any = None,
         parameters: Any = None,
     ) -> Any:
-        """Return the rate of the state, of its shape; of the load it depends on the moments alone, as in `step`."""
+        """Return the rate of the state, of its shape; `moments` as in `step`. Only on a pad the load changes it."""
         return self._evaluated(state, twist, normal_force, parameters, moments)[0]
 
     def wrench(
@@ -242,7 +213,7 @@ class TensorModel:
             **{name: wide[name] for name in LAW},
             elasto_plastic=float(self.elasto_plastic),
         )
-        return ContactArrays(law, self._shape(wide), self.reference_load)
+        return ContactArrays(law, self._shape(wide))
 
     def _evaluated(
         self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any
@@ -262,10 +233,6 @@ class TensorModel:
         z, v, load = self._inputs(state, twist, normal_force)
         if moments is None:
             return (z, v, load), Pressed(self._contact_at(parameters), None)
-        if self.reference_load is not None:
-            raise InvalidValueError(
-                "moments", "be None for a law with a reference_load", "moments"
-            )
         held = finite(
             self.xp,
             "moments",

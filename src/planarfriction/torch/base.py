@@ -38,14 +38,12 @@ class FrictionModule(TensorModel, nn.Module):
     """1 for elasto-plastic bristles, else 0; a state dict of the other kind is refused."""
     lever: Tensor
     """Lever arm [m]: the ratio of torques to forces."""
-    reference_load: Tensor | None
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         nn.Module.__init__(self)
         self.refuse(patch, law, f"torch.{type(self).__name__}")
         self.patch = patch
         self.elasto_plastic = bool(law.numbers.elasto_plastic)
-        self.register_buffer("reference_load", None)
 
     def _adopt(
         self,
@@ -99,12 +97,7 @@ class FrictionModule(TensorModel, nn.Module):
         """Return the law with the present values."""
         now = self._law_values()
         breakaway = ElastoPlastic(now.pop("breakaway_ratio"))
-        fixed = None if self.reference_load is None else self.reference_load.item()
-        return LuGre(
-            **now,
-            elasto_plastic=breakaway if self.elasto_plastic else None,
-            reference_load=fixed,
-        )
+        return LuGre(**now, elasto_plastic=breakaway if self.elasto_plastic else None)
 
     def _law_values(self) -> dict[str, float]:
         now = dict(zip(self.names, self.physical().tolist(), strict=True))
@@ -160,7 +153,7 @@ class FrictionModule(TensorModel, nn.Module):
             for values in (vector, vector[..., None, :])
         )
         z = equations.wide(xp.widened(state))
-        by = equations.drive(xp, *contact[:2], xp.widened(twist))
+        by = equations.drive(xp, *contact, xp.widened(twist))
         drives = zip(*(value.unbind(-3) for value in by), strict=True)
         pulls = []
         for drive, now in zip(drives, normal_force.unbind(-1), strict=True):

@@ -14,9 +14,10 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import ReducedModel as Reference
+from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed, published
-from planarfriction.tensors.models import CellsModel, PublishedModel, few_discs
+from planarfriction.tensors.models import CellsModel, PublishedModel, reference_of
 from planarfriction.tensors.steps import LAW
 from planarfriction.torch.base import TRAINABLE, FrictionModule
 
@@ -29,7 +30,8 @@ class DistributedModel(FrictionModule, CellsModel):
 
     `trainable` names the parameters of the law that are `nn.Parameter`s. With `"weights"` the pressure is trainable
     too: the weights `w_i` of the cells are the softmax of a raw parameter, so that they stay positive and add up to 1.
-    If the shape of the patch depends on the load, the shape at `normal_force` [N] is kept.
+    If the shape of the patch depends on the load, the shape at `normal_force` [N] is kept. The stiffness of a `pad` is
+    a buffer; that of `Pad.at_load` follows the weights, which are not trainable with other pads.
 
     Raises InvalidValueError for a parameter that breaks its rule.
 
@@ -38,6 +40,7 @@ class DistributedModel(FrictionModule, CellsModel):
 
     positions: Tensor
     remainder: Tensor
+    stiffness: Tensor | None
 
     def __init__(
         self,
@@ -45,18 +48,28 @@ class DistributedModel(FrictionModule, CellsModel):
         law: FrictionLaw,
         normal_force: float | None = None,
         *,
+        pad: Pad | None = None,
         trainable: Iterable[str] = TRAINABLE,
         dtype: torch.dtype | None = None,
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
+        model = reference_of(f"torch.{type(self).__name__}", patch, law, pad)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         precision = float if kind["dtype"] == torch.float64 else "f4"
-        cells = distributed.cells_of(patch, law, normal_force, precision)
-        if law.reference_load is not None:
-            self.reference_load = torch.tensor(law.reference_load, **kind)
+        cells = distributed.cells_of(model, normal_force, precision)
+        self.kind = cells.kind
+        self.pad = pad
+        self.of_law = pad is None or pad.springs_of_law
+        stiff = cells.stiff
+        if stiff is not None:
+            stiff = torch.tensor(stiff, **kind)
+        self.register_buffer("stiffness", stiff)
         numbers = law.numbers._asdict()
         chosen = tuple(trainable)
+        if "weights" in chosen and not self.of_law:
+            rule = "not contain weights for a pad with a stiffness of its own"
+            raise InvalidValueError("trainable", rule, chosen)
         lever = float(patch.contact_radius(normal_force))
         physical = [name for name in chosen if name != "weights"]
         self._adopt({name: numbers[name] for name in LAW}, physical, lever, **kind)
@@ -81,12 +94,13 @@ class DistributedModel(FrictionModule, CellsModel):
 
     def compiled(self) -> tuple[Any, tuple[Tensor, ...], tuple[Tensor, ...]]:
         """Return the model as compiled rollouts take it (see `FrictionModule.compiled`)."""
-        reference = () if self.reference_load is None else (self.reference_load,)
-        return (
-            functools.partial(pack_cells, self.elasto_plastic),
-            (self.positions, *reference),
-            (self.weights,),
+        cells = () if self.stiffness is None else (self.stiffness,)
+        cells = self.positions, *cells
+        weights = (self.weights,)
+        pack = functools.partial(
+            pack_cells, self.kind, self.elasto_plastic, self.of_law
         )
+        return (pack, cells, weights) if self.of_law else (pack, weights + cells, ())
 
 
 class SurfaceBuffers(nn.Module):
@@ -190,12 +204,10 @@ class ReducedModel(DistributedModel):
         normal_force: float | None = None,
         *,
         cells: int = Reference.cells,
+        pad: Pad | None = None,
         **options: Any,
     ):
-        super().__init__(
-            few_discs("torch.ReducedModel", patch, law, cells),
-            law,
-            normal_force,
-            **options,
-        )
+        few = reference_of("torch.ReducedModel", patch, law, pad, cells)
+        super().__init__(few.patch, law, normal_force, pad=few.pad, **options)
         self.patch = patch
+        self.pad = pad

@@ -38,8 +38,7 @@ class CoupledPatches:
     worlds
         Number of worlds.
     follows
-        True for each patch whose pressure follows the moments of a host, by default all; False for laws with a
-        `reference_load`.
+        True for each patch whose pressure follows the moments of a host, by default all.
     parameters
         Numbers of the laws by name, and `scale`, the size of a patch as a multiple of its model's: a number, or arrays
         [worlds] or [worlds, k]. What is not given is the models'.
@@ -78,17 +77,9 @@ class CoupledPatches:
                 "follows", f"hold one for each of {len(which)} models", len(follows)
             )
         pieces = [pieces_of(model, precision) for model in known]
-        can = [not pieces[kind].fixed for kind in which]
-        for p, follow in enumerate(follows or ()):
-            if follow and not can[p]:
-                raise InvalidValueError(
-                    "follows",
-                    "be False for a law with a reference_load",
-                    f"True of model {p}",
-                )
-        self._follows = follows is not None or all(can)
+        follows = follows or [True] * len(which)
         radii = [lever_of(model) or 1.0 for model in self.models]
-        source = coupled_source_of(pieces, which, follows or can, radii, precision)
+        source = coupled_source_of(pieces, which, follows, radii, precision)
         self.state_shape = (sum(math.prod(model.state_shape) for model in self.models),)
         """Shape of the state of the patches of a world."""
         self.names = tuple((*pieces[kind].parameters, "scale") for kind in which)
@@ -171,10 +162,6 @@ class CoupledPatches:
                 "load_response", host.load_response, k, 3 * k
             )
         if host.moments is not None:
-            if not self._follows:
-                raise InvalidValueError(
-                    "moments", "be None for a law with a reference_load", "moments"
-                )
             one.moments = self._address("moments", host.moments, k, 2)
         if skip is not None:
             one.skip = self._address("skip", skip, dtype=wp.int32)

@@ -39,8 +39,8 @@ class Model:
         Index of the model of each contact [contacts], if there are several.
     parameters
         Numbers of the law for each contact, by name (see `names`): a number, or an array [contacts]. `scale` is the
-        size of the patch as a multiple of the model's: lengths of patch and lever arms, not of bristles. What is not
-        given is the model's.
+        size of the patch as a multiple of the model's: lengths of patch and lever arms, not of bristles, nor the
+        stiffness of a pad. What is not given is the model's.
     device
         Warp device, by default Warp's current one.
     dtype
@@ -74,7 +74,6 @@ class Model:
             for each in models
         ]
         sources = [source_of(each, precision) for each in pieces]
-        self._fixed = pieces[0].fixed
         if any(each.text != sources[0].text for each in sources):
             raise InvalidValueError(
                 "model",
@@ -186,10 +185,6 @@ class Model:
         wrench: Any,
         moments: Any,
     ) -> None:
-        if moments is not None and self._fixed:
-            raise InvalidValueError(
-                "moments", "be None for a law with a reference_load", "moments"
-            )
         along = (*steps, self.contacts)
         batch = Batch()
         batch.contacts, batch.steps, batch.rows = (

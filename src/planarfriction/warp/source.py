@@ -72,7 +72,7 @@ def coupled_source_of(
         starts=starts,
         radii=[writer.constant(each) for each in radii],
         follows=follows,
-        loaded="loaded" if any(each.fixed for each in pieces) else "unit",
+        loaded="loaded" if any(each.pad for each in pieces) else "unit",
         rounding=list(map(writer.constant, ROUNDING[precision])),
         shortening="\n".join(
             writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)
@@ -145,7 +145,7 @@ def _described(
 
 
 def _slopes_by_twist(pieces: Pieces) -> Block:
-    """Return the step with the slopes of the wrench by the twist, row by row, and of a fixed stiffness by the load."""
+    """Return the step with the slopes of the wrench by the twist, row by row, and of a pad by the loads of cells."""
     block = pieces.slopes()
     first = pieces.states + 3
     rows = [
@@ -156,7 +156,7 @@ def _slopes_by_twist(pieces: Pieces) -> Block:
         (row[pieces.states : pieces.states + 3] for row in rows), block.results[:first]
     )
     return Block(
-        block.operations, results + tuple(row[-1] for row in rows if pieces.fixed)
+        block.operations, results + tuple(row[-1] for row in rows if pieces.pad)
     )
 
 

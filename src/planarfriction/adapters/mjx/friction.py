@@ -490,8 +490,8 @@ class Friction:
         ]
 
     def _unit(self, own: _Own, pressed, shift, states, dt) -> newton.UnitLoadFriction:
-        """Return the friction of steps, per unit load; that of a fixed stiffness depends on the loads."""
-        by_load = any(model.reference_load is not None for model in own.models)
+        """Return the friction of steps, per unit load; that of pads depends on the loads."""
+        by_load = any(model.stiffness is not None for model in own.models)
 
         def wrench(twist, load):
             load = jnp.maximum(load, LIGHTEST) if by_load else jnp.ones_like(load)
@@ -572,7 +572,7 @@ def _in_jax(model: models.FrictionModel) -> FrictionPytree:
     if isinstance(model, models.ReducedModelPublished):
         return ReducedModelPublished(model.patch, model.law, model.surface)
     if isinstance(model, models.DistributedModel):
-        return DistributedModel(model.patch, model.law)
+        return DistributedModel(model.patch, model.law, pad=model.pad)
     raise InvalidValueError(
         "model", "be one that planarfriction.jax has", type(model).__name__
     )
