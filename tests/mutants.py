@@ -33,7 +33,7 @@ SWAPS = {
 MIRRORS = {
     "_engine/codegen": "_engine test_golden.py export/test_c_library.py",
     "_engine/body": "test_sliding_body.py solvers scenes derivatives",
-    "_engine/coupled": "test_coupling.py test_sliding_body.py test_coupling_fixed_stiffness.py test_coupling_hard.py",
+    "_engine/coupled": "test_coupling.py test_sliding_body.py test_coupling_pads.py test_coupling_hard.py",
     "_engine/compiler": "_engine/compiler",
     "_engine": "_engine test_golden.py models derivatives limit_surface patch test_coupling.py",
     "models": "models test_golden.py derivatives",

@@ -32,7 +32,7 @@ LAWS = {
         mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.6)
     ),
     "dahl": pf.Dahl(0.6),
-    "fixed": pf.LuGre(mu_c=0.8, mu_s=1.0, reference_load=1.7),
+    "fixed": pf.LuGre(mu_c=0.8, mu_s=1.0),
 }
 X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
 TIP = pf.ContactPatch.from_pressure(
@@ -79,10 +79,11 @@ def models():
     made = {}
     for law_name, law in LAWS.items():
         fixed = law_name == "fixed"
+        pad = pf.Pad.at_load(1.7) if fixed else None
         for name, patch in PATCHES.items():
             if not fixed or not ("leaning" in name or "load" in name):
-                made[f"{name}, {law_name}"] = pf.DistributedModel(patch, law)
-        made[f"reduced, {law_name}"] = pf.ReducedModel(ROUND, law, cells=9)
+                made[f"{name}, {law_name}"] = pf.DistributedModel(patch, law, pad=pad)
+        made[f"reduced, {law_name}"] = pf.ReducedModel(ROUND, law, cells=9, pad=pad)
         for name, surface in {} if fixed else SURFACES.items():
             made[f"published {name}, {law_name}"] = pf.ReducedModelPublished(
                 PLAIN, law, surface=surface(PLAIN)

@@ -110,6 +110,16 @@ LAWS = Family(
     },
 )
 
+PADS = Family(
+    "pad",
+    {
+        "layer": ("a thin layer bonded to a rigid back", "pads:Layer"),
+        "half-space": ("a body that is thick beside the patch", "pads:HalfSpace"),
+        "measured": ("by the stiffness of a stuck patch", "pads:Measured"),
+        "at-load": ("with the stiffness of the law under a load", "pads:AtLoad"),
+    },
+)
+
 SURFACES = Family(
     "limit surface",
     {

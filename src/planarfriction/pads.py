@@ -115,6 +115,9 @@ class Pad(ByValue):
         if patch.anisotropic and not self.springs_of_law:
             rule = "have no friction metric for a pad with a stiffness of its own"
             raise InvalidValueError("patch", rule, "a metric")
+        if law.numbers.sigma_1 > 0.0 and self.compliance(patch) is not None:
+            rule = "be 0 for a pad with a common compliance, whose lag damps"
+            raise InvalidValueError("sigma_1", rule, law.numbers.sigma_1)
 
     def pieces(self, patch: ContactPatch, law: FrictionLaw) -> np.ndarray:
         """Return the stiffness of the pieces of the pad `[N]` [N/m]."""
@@ -176,19 +179,7 @@ class AtLoad(Pad):
 
 
 @dataclass(frozen=True, eq=False)
-class _Soft(Pad):
-    """Pad whose pieces may have a compliance in common."""
-
-    def check(self, patch: ContactPatch, law: FrictionLaw) -> None:
-        """See `Pad.check`."""
-        super().check(patch, law)
-        if law.numbers.sigma_1 > 0.0 and self.compliance(patch) is not None:
-            rule = "be 0 for a pad with a common compliance, whose lag damps"
-            raise InvalidValueError("sigma_1", rule, law.numbers.sigma_1)
-
-
-@dataclass(frozen=True, eq=False)
-class Measured(_Soft):
+class Measured(Pad):
     """Pad by the stiffness of a stuck patch (see `Pad.measured`)."""
 
     stiffness: float = checked(validation.positive)
@@ -209,7 +200,7 @@ class Measured(_Soft):
 
 
 @dataclass(frozen=True, eq=False)
-class HalfSpace(_Soft):
+class HalfSpace(Pad):
     """Body that is thick beside the patch (see `Pad.half_space`)."""
 
     shear_modulus: float = checked(validation.positive)

@@ -104,13 +104,12 @@ def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness():
     """Press with 3 N +- 20 % at 2 Hz: the published law lets the part swing by more."""
     swings = []
     for reference in (3.0, None):
-        law = dataclasses.replace(
-            LAW, sigma_0=1e4, sigma_1=20.0, reference_load=reference
-        )
+        law = dataclasses.replace(LAW, sigma_0=1e4, sigma_1=20.0)
+        pad = reference and pf.Pad.at_load(reference)
         builder, plant, scene_graph, press = gripper("point", 2e-3)
         patches = [
             PatchContact(
-                PAD.with_law(law),
+                dataclasses.replace(PAD, law=law, pad=pad),
                 frame=side,
                 geometries=(side + " pad", "block"),
                 centre="contact",

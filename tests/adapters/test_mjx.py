@@ -195,12 +195,11 @@ def test_the_lever_arm_of_a_patch_counts_the_radii_of_its_discs():
 
 
 def test_a_stiffness_that_ignores_the_load_does_what_it_does_in_mujoco():
-    law = pf.LuGre(
-        mu_c=0.4, mu_s=0.5, sigma_0=1e5, elasto_plastic=0.9, reference_load=1.5
-    )
+    law = pf.LuGre(mu_c=0.4, mu_s=0.5, sigma_0=1e5, elasto_plastic=0.9)
+    patch = pf.ContactPatch.disc(radius=0.05, cells=5)
     scene = disc(0.05, 1.0)
     m, d, patches = made(
-        scene, pf.DistributedModel(pf.ContactPatch.disc(radius=0.05, cells=5), law)
+        scene, pf.DistributedModel(patch, law, pad=pf.Pad.at_load(1.5))
     )
     d.qvel[:] = scene.start
     friction = Friction(m, patches)
@@ -342,7 +341,7 @@ def test_a_grip_beside_the_centre_of_mass_holds_as_in_mujoco():
 def in_operations(patches):
     """`CoupledPatches.step` in operations of JAX, for a batch of problems."""
     models = [_in_jax(model) for model in patches.models]
-    by_load = any(model.reference_load is not None for model in models)
+    by_load = any(model.pad is not None for model in models)
     radius = jnp.array(
         [np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models]
     )
@@ -385,19 +384,12 @@ def in_operations(patches):
     return step
 
 
-def compare_with_compiled(seed, kinds, steps, bodies, reference_load=None):
+def compare_with_compiled(seed, kinds, steps, bodies, pad=None):
     generator = np.random.default_rng(seed)
     patches = random_patches(generator, 2, kinds)
-    if reference_load is not None:
-        laws = [
-            dataclasses.replace(model.law, reference_load=reference_load)
-            for model in patches.models
-        ]
+    if pad is not None:
         patches = CoupledPatches(
-            [
-                model.with_law(law)
-                for model, law in zip(patches.models, laws, strict=True)
-            ]
+            [dataclasses.replace(model, pad=pad) for model in patches.models]
         )
     radius = np.array(
         [np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models]
@@ -422,9 +414,9 @@ def compare_with_compiled(seed, kinds, steps, bodies, reference_load=None):
     assert rounds / both < 0.2
 
 
-@pytest.mark.parametrize("reference_load", [None, 1.5])
-def test_the_step_in_contact_space_is_the_compiled_one(reference_load):
-    compare_with_compiled(1, (pf.DistributedModel,), 40, 64, reference_load)
+@pytest.mark.parametrize("pad", [None, pf.Pad.at_load(1.5)])
+def test_the_step_in_contact_space_is_the_compiled_one(pad):
+    compare_with_compiled(1, (pf.DistributedModel,), 40, 64, pad)
 
 
 @pytest.mark.slow
@@ -433,13 +425,11 @@ def test_the_step_in_contact_space_is_the_compiled_one_for_all_models(kind):
     compare_with_compiled(3, (kind,), 100, 64)
 
 
-@pytest.mark.parametrize("reference_load", [None, 1.5])
-def test_derivatives_of_the_step_in_contact_space_are_differences(reference_load):
+@pytest.mark.parametrize("pad", [None, pf.Pad.at_load(1.5)])
+def test_derivatives_of_the_step_in_contact_space_are_differences(pad):
     """A patch slides and spins under a changing load: derivatives to the host's numbers and to friction."""
-    law = pf.LuGre(mu_s=1.2, reference_load=reference_load)
-    model = _in_jax(
-        pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law)
-    )
+    patch = pf.ContactPatch.disc(radius=0.01, cells=5)
+    model = _in_jax(pf.DistributedModel(patch, pf.LuGre(mu_s=1.2), pad=pad))
     response = 0.01 * np.array([[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1e4]])
     load_response = np.array([[0.2, -0.1, 3.0]])
 

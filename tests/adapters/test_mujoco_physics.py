@@ -55,9 +55,8 @@ def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(
         control=lambda t: tuple(press * (1.0 + 0.2 * np.sin(4.0 * np.pi * t))),
         time=1.0,
     )
-    model = scene.model.with_law(
-        dataclasses.replace(scene.model.law, reference_load=reference)
-    )
+    pad = reference and pf.Pad.at_load(reference)
+    model = dataclasses.replace(scene.model, pad=pad)
     m, d, friction = scene.ours(2e-3, model=model)
     path = scene.run(m, d, lambda: step_checked(friction, d, 1e-8))
     assert low < np.ptp(path[len(path) // 2 :, :3], axis=0).max() < high

@@ -194,8 +194,8 @@ def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(
     scene = dataclasses.replace(
         scene, control=lambda t: tuple(press * (1.0 + 0.2 * np.sin(4.0 * np.pi * t)))
     )
-    law = dataclasses.replace(scene.model.law, reference_load=reference)
-    both = Both(scene, model=scene.model.with_law(law))
+    pad = reference and pf.Pad.at_load(reference)
+    both = Both(scene, model=dataclasses.replace(scene.model, pad=pad))
     speeds = []
     for i in range(round(1.0 / DT)):
         both.control(i * DT)

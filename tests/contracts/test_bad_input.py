@@ -434,8 +434,8 @@ def test_a_choice_is_a_text(name, call):
             "cell_size must be >= 0, got -0.001",
         ),
         (
-            lambda: pf.DistributedModel(FINGER, pf.LuGre(reference_load=2.0)),
-            "for a law with a reference_load, got disc",
+            lambda: pf.DistributedModel(FINGER, pf.LuGre(), pad=pf.Pad.at_load(2.0)),
+            "patch must have a shape that does not depend on the load, for this pad",
         ),
         (
             lambda: SQUARE.weights(2.0, moments=np.zeros((10**7, 2))),

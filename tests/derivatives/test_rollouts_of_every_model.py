@@ -110,28 +110,21 @@ SOFT = {
     "soft cells, metric": distributed(TIP.with_friction_metric(METRIC), "wide"),
     "soft cells, few": Case(lambda: pf.ReducedModel(TIP, LAWS["wide"], cells=9)),
 }
-REFERENCED = {
-    name: dataclasses.replace(law, reference_load=LOAD) for name, law in LAWS.items()
-}
+PAD = pf.Pad.at_load(LOAD)
 STIFF = {
     **{
-        f"fixed stiffness, {law}": Case(
-            lambda law=law: pf.DistributedModel(PATCH, REFERENCED[law])
+        f"pad, {law}": Case(
+            lambda law=law: pf.DistributedModel(PATCH, LAWS[law], pad=PAD)
         )
         for law in LAWS
     },
-    **{
-        f"fixed stiffness, {name}": Case(
-            lambda name=name: pf.DistributedModel(DIRECTED[name], REFERENCED["wide"])
-        )
-        for name in ("metric", "leaning", "leaning discs")
-    },
-    "fixed stiffness, many": Case(
-        lambda: pf.DistributedModel(MANY, REFERENCED["elasto-plastic"])
+    "pad, metric": Case(
+        lambda: pf.DistributedModel(DIRECTED["metric"], LAWS["wide"], pad=PAD)
     ),
-    "fixed stiffness, few": Case(
-        lambda: pf.ReducedModel(MANY, REFERENCED["wide"], cells=20)
+    "pad, many": Case(
+        lambda: pf.DistributedModel(MANY, LAWS["elasto-plastic"], pad=PAD)
     ),
+    "pad, few": Case(lambda: pf.ReducedModel(MANY, LAWS["wide"], cells=20, pad=PAD)),
 }
 """Loads fall below those that hold what bristles carry."""
 CASES = FIXED | SOFT | STIFF

@@ -42,12 +42,8 @@ def model_of(kind, mu=1.0, r=1.0, law=LAW):
     if kind == "table" or "reduced" in kind:
         patch = pf.ContactPatch.disc(r * 0.012, cells=9)
     if "reduced" in kind:
-        law = (
-            dataclasses.replace(law, reference_load=2.0)
-            if kind == "fixed reduced"
-            else law
-        )
-        return pf.ReducedModel(patch, law, cells=20)
+        pad = pf.Pad.at_load(2.0) if kind == "fixed reduced" else None
+        return pf.ReducedModel(patch, law, cells=20, pad=pad)
     return (
         pf.DistributedModel(patch, law)
         if kind == "distributed"

@@ -251,8 +251,8 @@ def test_two_loads_tell_if_the_stiffness_grows_with_them(fixed):
     }
     logs = [line(law=law, load=load) for load, law in laws.items()]
     found = fitted(logs, FEW, model="distributed", starts=1)
-    assert (found.law.reference_load is not None) == fixed
-    wanted = 3000.0 * (2.0 / found.law.reference_load if fixed else 1.0)
+    assert (found.model.pad is not None) == fixed
+    wanted = 3000.0 * (2.0 / found.model.pad.normal_force if fixed else 1.0)
     assert found.estimates["sigma_0"] == pytest.approx(
         wanted, abs=4.0 * found.errors["sigma_0"]
     )
@@ -263,9 +263,9 @@ def test_two_loads_tell_if_the_stiffness_grows_with_them(fixed):
 def test_a_load_that_varies_within_a_log_tells_it_too(fixed):
     """One log, whose load swings from 2 to 6 N while bristles load and slide."""
     log = line()
-    law = dataclasses.replace(LAW, reference_load=4.0 if fixed else None)
+    pad = pf.Pad.at_load(4.0) if fixed else None
     loads = 4.0 + 2.0 * np.sin(2.0 * np.pi * 0.37 * log.time)
-    model = pf.DistributedModel(FEW, law)
+    model = pf.DistributedModel(FEW, LAW, pad=pad)
     wrench = pf.rollout(
         model, None, log.twist[1:], loads[1:], float(log.time[1])
     ).wrenches * [1.0, 0.0, 0.0]
@@ -283,8 +283,8 @@ def test_a_load_that_varies_within_a_log_tells_it_too(fixed):
         held=True,
     )
     found = fitted([log], FEW, model="distributed", starts=1)
-    assert (found.law.reference_load is not None) == fixed
-    wanted = LAW.sigma_0 * (4.0 / found.law.reference_load if fixed else 1.0)
+    assert (found.model.pad is not None) == fixed
+    wanted = LAW.sigma_0 * (4.0 / found.model.pad.normal_force if fixed else 1.0)
     assert found.estimates["sigma_0"] == pytest.approx(
         wanted, abs=4.0 * found.errors["sigma_0"]
     )
@@ -294,12 +294,13 @@ def test_a_load_that_varies_within_a_log_tells_it_too(fixed):
 def test_at_one_load_a_fixed_stiffness_is_one_per_load():
     """On which the fit of two loads rests; steps of the two are the same to rounding."""
     twists = 0.05 * np.sin(np.linspace(0.0, 9.0, 60))[:, None] * [1.0, 0.5, 60.0]
-    fixed = dataclasses.replace(LAW, reference_load=3.0)
-    own = dataclasses.replace(LAW, sigma_0=3000.0 * 3.0 / 5.0)
-    a, b = (
-        pf.rollout(pf.DistributedModel(PATCH, law), None, twists, 5.0, 2e-3).wrenches
-        for law in (fixed, own)
+    law = dataclasses.replace(LAW, sigma_1=0.0)
+    own = dataclasses.replace(law, sigma_0=3000.0 * 3.0 / 5.0)
+    models = (
+        pf.DistributedModel(PATCH, law, pad=pf.Pad.at_load(3.0)),
+        pf.DistributedModel(PATCH, own),
     )
+    a, b = (pf.rollout(each, None, twists, 5.0, 2e-3).wrenches for each in models)
     assert np.abs(a - b).max() < 1e-12 * np.abs(b).max()
 
 
@@ -308,9 +309,3 @@ def test_one_load_tells_only_their_product(found):
         "One load only: sigma_0 f_N = 5.99e+03 N/m is known"
         in found.summary().replace("\n", " ")
     )
-    whole = dataclasses.replace(LAW, reference_load=2.0)
-    with pytest.raises(
-        pf.FrictionError,
-        match="model must be 'reduced' or 'distributed' for a law with a reference",
-    ):
-        fitted(line(duration=1.0), PATCH, start=whole, **QUICK)

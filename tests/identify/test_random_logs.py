@@ -55,24 +55,21 @@ def random_case(seed, varying=False):
                     + 0.3 * np.sin(2 * np.pi * rates[1] * t)
                 )
             )
+    pad = None
     if varying:
         model = "reduced"
         rate = draw.uniform(0.2, 1.5)
         load = load * (
             1.0 + draw.uniform(0.3, 1.0) * (0.5 - 0.5 * np.cos(2.0 * np.pi * rate * t))
         )
-        law = dataclasses.replace(
-            law, reference_load=None if draw.random() < 0.5 else float(load.mean())
-        )
+        pad = None if draw.random() < 0.5 else pf.Pad.at_load(float(load.mean()))
     prediction = Prediction(
-        SIMULATORS[model](patch, law),
+        SIMULATORS[model](patch, law, pad=pad),
         Log(t, twist, np.ones_like(twist), load),
         twist,
         refine=16,
     )
-    vector = parameters_of(
-        pf.ReducedModelPublished(patch, dataclasses.replace(law, reference_load=None))
-    )
+    vector = parameters_of(pf.ReducedModelPublished(patch, law))
     if model != "reduced-published":
         vector[8] = patch.contact_radius()
     size = draw.choice([0.0, 0.0, 1.0, 6.0])
@@ -90,14 +87,14 @@ def random_case(seed, varying=False):
     )
     wrench = np.where(np.isin(np.arange(3), columns), wrench, 0.0)
     true = {
-        **truth(dataclasses.replace(law, reference_load=None), patch),
+        **truth(law, patch),
         **(
             {"contact_radius": float(patch.contact_radius())}
             if model != "reduced-published"
             else {}
         ),
     }
-    return Log(t, twist, wrench, load, f"{kind} {seed}"), patch, law, model, true, size
+    return Log(t, twist, wrench, load, f"{kind} {seed}"), patch, pad, model, true, size
 
 
 def judged(seed, model=None, varying=False):
@@ -138,8 +135,8 @@ def test_loads_that_vary_within_a_log_tell_the_kind_of_stiffness():
     off = []
     for seed in range(6):
         found, hits, away = judged(seed, varying=True)
-        law = random_case(seed, varying=True)[2]
-        assert (found.law.reference_load is None) == (law.reference_load is None), seed
+        pad = random_case(seed, varying=True)[2]
+        assert (found.model.pad is None) == (pad is None), seed
         inside += hits.values()
         off += away.values()
     assert len(inside) > 15

@@ -78,7 +78,7 @@ def test_a_slip_in_many_directions_determines_friction_and_radius():
 def test_stiffness_that_does_not_grow_with_the_load_changes_nothing():
     # sliding friction does not depend on bristles
     fixed = FrictionObserver(
-        pf.DistributedModel(PATCH, pf.LuGre(**vars(LAW) | {"reference_load": 3.0})),
+        pf.DistributedModel(PATCH, LAW, pad=pf.Pad.at_load(3.0)),
         surface=SURFACE,
     )
     ours = FrictionObserver(pf.DistributedModel(PATCH, LAW), surface=SURFACE)

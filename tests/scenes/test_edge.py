@@ -373,12 +373,8 @@ def test_what_an_edge_cannot_have_is_refused():
                 scene, body=dataclasses.replace(still, outline=np.ones((3, 2)))
             )
         )
-    fixed = dataclasses.replace(
-        PADS[-1], law=dataclasses.replace(LAW, reference_load=1.0)
-    )
-    with pytest.raises(
-        InvalidValueError, match="law must have no reference_load for an edge"
-    ):
+    fixed = dataclasses.replace(PADS[-1], pad=pf.Pad.at_load(1.0))
+    with pytest.raises(InvalidValueError, match="pad must be None for an edge"):
         pf.simulate(
             dataclasses.replace(scene, contacts=[dataclasses.replace(pad, model=fixed)])
         )

@@ -28,7 +28,9 @@ def read_model(file: Path, contact: str | None) -> Any:
         if contact is not None:
             raise InvalidValueError("--contact", "be given only for a scene", contact)
         return model_from_dict(
-            Section(table, "", str(file), file.parent).only(["model", "patch", "law"])
+            Section(table, "", str(file), file.parent).only(
+                ["model", "patch", "law", "pad"]
+            )
         )
     models = {
         each.name: each.model

@@ -26,6 +26,7 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
+from planarfriction.models.base import refuse_common
 from planarfriction.models.reduced_published import axes_of
 
 PARAMETERS = (
@@ -179,6 +180,7 @@ def _packed(model: Any) -> PackedRollout:
         raise InvalidValueError(*refusal)
     law = model.law.numbers
     if isinstance(model, DistributedModel):
+        refuse_common(model, "rollouts")
         at_loads = model.compiled.at_loads
         shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
         return PackedRollout(

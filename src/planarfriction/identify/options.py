@@ -68,7 +68,7 @@ class FitOptions(Checked):
     )
     """Kind of bristles, None for plain ones, unless a whole law is given as start. "auto" takes what fits better: plain
     ones or a breakaway ratio of 0.9; and for loads that clearly differ, a stiffness that grows with the load or one
-    that does not (`LuGre.reference_load`)."""
+    that does not (`Pad.at_load`)."""
     loss: str = checked(validation.choice, ("linear", "soft_l1"), default="linear")
     """Loss of a residual: its square, or "soft_l1" as SciPy has it. A fit with the latter ends without samples off by
     more than six times the noise, if these are fewer than a tenth."""

@@ -265,14 +265,14 @@ def fitted_law(law: LuGre, given: Mapping[str, float]) -> LuGre:
     return dataclasses.replace(law, **fields)
 
 
-def bristles_of(law: LuGre, names: Sequence[str]) -> str:
-    """Return the kind of bristles of a law in words, of which `names` are estimated."""
+def bristles_of(law: LuGre, pad: Any, names: Sequence[str]) -> str:
+    """Return the kind of bristles of a law, on a pad or None, in words; `names` are estimated."""
     kind = "plain bristles"
     if isinstance(law.elasto_plastic, ElastoPlastic):
         kind = "elasto-plastic bristles"
         if "breakaway_ratio" not in names:
             kind += f" ({law.elasto_plastic.breakaway_ratio:g})"
-    if law.reference_load is not None:
+    if pad is not None:
         kind += " of a stiffness that does not grow with the load"
     return kind
 
@@ -309,7 +309,7 @@ def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> Conta
 class VectorMap:
     """Map from values to the vector of the model at one load: the law directly, the shape through its constants.
 
-    A stiffness that holds at a `reference_load` is `sigma_0 reference_load/f_N` per unit load.
+    A stiffness that is `sigma_0` at the load `reference`, and does not grow with the load, is `sigma_0 reference/f_N`.
     """
 
     def __init__(

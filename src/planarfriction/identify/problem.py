@@ -36,6 +36,7 @@ from planarfriction.identify.simulators import (
 from planarfriction.identify.uncertainty import covariance, finite
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface.base import scaling
+from planarfriction.pads import AtLoad
 from planarfriction.patch import ContactPatch
 
 COARSE = 0.2
@@ -153,8 +154,10 @@ class LogProblem(LeastSquaresProblem):
         options: FitOptions,
         model: str = "reduced-published",
         progress: Callable[[str], Any] | None = None,
+        pad: AtLoad | None = None,
     ) -> None:
         self.logs = logs
+        self.pad = pad
         self.patch = patch
         self.names = names
         self.law = law
@@ -177,29 +180,27 @@ class LogProblem(LeastSquaresProblem):
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
         first = int(options.begins == "rest")
         self.used = [log.inner[first:] for log in logs]
-        own = self._per_load if self.kind.own_radius else law
-        self.simulator = self.kind(self.fixed_patch, own, options.surface)
+        self.simulator = self.kind(
+            self.fixed_patch,
+            law,
+            options.surface,
+            None if self.kind.own_radius else pad,
+        )
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)
         self._shown: Any = None
         self._slopes: Any = None
 
-    @property
-    def _per_load(self) -> LuGre:
-        """The law with a stiffness per load, as the published model takes it: that of the mean load of a log."""
-        return dataclasses.replace(self.law, reference_load=None)
-
     def _maps(self, loads: Sequence[float]) -> list[VectorMap]:
         """Make the map from values to the vector of the model at the load of each log."""
         patch = self.patch
         base = parameters_of(
-            PublishedSimulator.model(
-                self.fixed_patch, self._per_load, self.options.surface
-            )
+            PublishedSimulator.model(self.fixed_patch, self.law, self.options.surface)
         )
         self.base: dict[str, float] = dict(zip(PARAMETERS, base.tolist(), strict=True))
         own = self.kind.own_radius
-        reference = self.law.reference_load if own else None
+        # The published model takes the stiffness at the mean load of a log.
+        reference = self.pad.normal_force if self.pad and own else None
         maps = [VectorMap(self.names, base, patch, load, reference) for load in loads]
         for each in maps:
             if patch.depends_on_load and not self.fingers:

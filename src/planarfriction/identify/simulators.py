@@ -12,6 +12,7 @@ from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.identify.logs import EVEN, Linear, Log
 from planarfriction.identify.parameters import RADIUS, SHAPE
 from planarfriction.laws import LuGre
+from planarfriction.pads import Pad
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -55,12 +56,19 @@ class PublishedSimulator:
         patch: ContactPatch,
         law: LuGre,
         surface: type[LimitSurface] = LimitSurfaceTablePublished,
+        pad: Pad | None = None,
     ):
-        self._model = self.model(patch, law, surface)
+        self._model = self.model(patch, law, surface, pad)
 
     @classmethod
-    def model(cls, patch: ContactPatch, law: LuGre, surface: type[LimitSurface]) -> Any:
-        """Make the friction model of a patch and a law."""
+    def model(
+        cls,
+        patch: ContactPatch,
+        law: LuGre,
+        surface: type[LimitSurface],
+        pad: Pad | None = None,
+    ) -> Any:
+        """Make the friction model of a patch and a law; cells may be those of a pad."""
         return ReducedModelPublished(patch, law, surface=surface(patch))
 
     def wrenches(
@@ -91,16 +99,16 @@ class DistributedSimulator(PublishedSimulator):
     model_class: type = DistributedModel
     own_radius = False
 
-    def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
+    def __init__(self, patch, law, surface=LimitSurfaceTablePublished, pad=None):
         self._radius = patch.contact_radius()
         self._centre = patch.centre_of_pressure()
         if self.model_class is DistributedModel and patch.cells > CELLS:
             patch = patch.discs(DISCS)
-        self._model = self.model(patch, law, surface)
+        self._model = self.model(patch, law, surface, pad)
 
     @classmethod
-    def model(cls, patch, law, surface):
-        return cls.model_class(patch, law)
+    def model(cls, patch, law, surface, pad=None):
+        return cls.model_class(patch, law, pad=pad)
 
     def wrenches(self, twists, loads, dt, vector):
         own = vector[: len(LAW_NAMES)]

@@ -164,7 +164,7 @@ class Candidate(NamedTuple):
         u = self.uncertainty
         return ModelScore(
             problem.model,
-            bristles_of(problem.law, problem.names),
+            bristles_of(problem.law, problem.pad, problem.names),
             u.score,
             u.reduced_chi2,
             u.rejected,

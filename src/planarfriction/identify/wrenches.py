@@ -55,6 +55,7 @@ from planarfriction.identify.verdicts import (
     verdicts_on_turns,
 )
 from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.pads import AtLoad
 from planarfriction.patch import ContactPatch
 
 START_MU_S = 1.2
@@ -141,13 +142,8 @@ def identify_lugre(
         validation.choice("model", model, ("auto", *SIMULATORS)), patch, names
     )
     validation.instance("options", options, FitOptions, "a FitOptions record")
-    kinds, given = _start_laws(start, options.elasto_plastic, names)
-    if models == (LEAD,) and kinds[0].reference_load is not None:
-        raise InvalidValueError(
-            "model",
-            "be 'reduced' or 'distributed' for a law with a reference_load",
-            model,
-        )
+    laws, given = _start_laws(start, options.elasto_plastic, names)
+    kinds: list[tuple[LuGre, AtLoad | None]] = [(law, None) for law in laws]
     findings = check_logs(logs, patch)
     whole = logs
     size = size_of(logs[0], patch)
@@ -160,7 +156,7 @@ def identify_lugre(
         and load_ratio(logs) >= TWO_LOADS
     ):
         usual = float(np.median([mean_load(log) for log in logs]))
-        kinds += [dataclasses.replace(law, reference_load=usual) for law in kinds]
+        kinds += [(law, AtLoad(usual)) for law in laws]
     problems: list[LogProblem] = []
     guesses = []
     leads = []
@@ -172,12 +168,12 @@ def identify_lugre(
             if lead is not None:
                 sure = 2.0 * lead.cost < EXPLAINED * lead.problem.numbers
                 kinds = [
-                    fit.problem.law
+                    (fit.problem.law, fit.problem.pad)
                     for fit in leads
                     if fit.cost < WORSE * lead.cost or not (sure or fit.near)
                 ]
-            for law in kinds:
-                more = patch, names, law, options, name, progress
+            for law, pad in kinds:
+                more = patch, names, law, options, name, progress, pad
                 problem = LogProblem(logs, *more)
                 late = problem.work * USUAL_EVALUATIONS
                 if model == "auto" and name != LEAD and late > PATIENCE:
@@ -204,7 +200,7 @@ def identify_lugre(
                     fit = warm_start(problem, lead or leads[0], guesses, noise)
                 if name == LEAD:
                     leads.append(fit)
-                if name in models and (name != LEAD or law.reference_load is None):
+                if name in models and (name != LEAD or pad is None):
                     fit = refine(fit)
                     candidates.append(Candidate(fit, uncertainty(fit)))
         best = min(candidates, key=lambda each: each.uncertainty.score)
@@ -418,4 +414,4 @@ def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
         centre = np.array([given.get("centre_x", x), given.get("centre_y", y)])
         scale = given.get("contact_radius", radius) / radius
         patch = scaled_patch(patch, float(scale), centre)
-    return problem.kind.model(patch, law, surface)
+    return problem.kind.model(patch, law, surface, problem.pad)

@@ -17,6 +17,7 @@ from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, by_parts, unusual
 from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LIGHTEST
 from planarfriction.laws import FrictionLaw
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
@@ -65,6 +66,7 @@ class FrictionModel(ByValue):
     """Units of the state: one for all components, or one for each."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if not isinstance(self.law, FrictionLaw):
             raise InvalidValueError(
@@ -321,6 +323,17 @@ def refuse_pad(model: FrictionModel, by: str) -> None:
     if model.reduction.pad is not None:
         pad = type(model.reduction.pad).__name__
         raise InvalidValueError("pad", f"be None for {by}, which knows no pads", pad)
+
+
+def softening(model: FrictionModel, loads: np.ndarray) -> np.ndarray:
+    """Return `K_i/(sigma_0 N_i)` of the bristles of a model under `loads` `[...]` [N], `[..., N]`; 1 without a pad."""
+    pad = model.reduction.pad
+    patch = model.reduction.patch
+    if pad is None:
+        return np.ones((*np.shape(loads), patch.cells))
+    stiff = pad.pieces(patch, model.law) / model.law.numbers.sigma_0
+    borne = np.asarray(loads)[..., None] * patch.weights(loads)
+    return stiff / np.maximum(borne, LIGHTEST * stiff)
 
 
 def refuse_common(model: FrictionModel, by: str) -> None:

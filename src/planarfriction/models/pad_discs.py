@@ -21,10 +21,10 @@ from planarfriction.patch import ContactPatch
 from planarfriction.patch.discs import clusters_of
 from planarfriction.patch.pressure import PerCell
 
-SHIFTS = 0.05, 0.2, 0.5, 0.8
+SHIFTS = 0.05, 0.2, 0.35, 0.5, 0.75, 1.0
 """Lengths of paths along an axis, as shares of about that at which a patch slips as a whole."""
 
-SPINS = 0.05, 0.3, 0.7, 1.2
+SPINS = 0.05, 0.15, 0.3, 0.5, 0.8, 1.5
 """Angles of paths of rotation, alike."""
 
 TOGETHER = (0.3, 0.0, 0.3), (0.5, 0.3, 0.5), (0.3, 0.0, 0.8)

@@ -16,6 +16,7 @@ from planarfriction.limit_surface import (
     LimitSurfaceCells,
     LimitSurfaceExact,
 )
+from planarfriction.models.base import softening
 from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
 from planarfriction.scenes.contact import checked_model
@@ -215,5 +216,5 @@ def _slips(model: Any, body: Body, load: np.ndarray, grip: Signal) -> bool:
     dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(force))
     way = np.hypot(dx, dy) + model.patch.contact_radius(force) * abs(theta)
     numbers = model.law.numbers
-    bends = numbers.mu_s / (numbers.sigma_0 * model.law.stiffness_factor(force))
+    bends = numbers.mu_s / (numbers.sigma_0 * softening(model, force).min())
     return bool(way > bends + SLIP)

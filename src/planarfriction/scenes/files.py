@@ -39,7 +39,7 @@ _LONG_KEY = re.compile(
 BODY_KEYS = (*(field.name for field in dataclasses.fields(Body)), "size")
 CONTACT_KEYS = (
     *("name", "mounted_on", "position", "angle", "count", "pressure", "height", "edge"),
-    *("normal_force", "support_velocity", "model", "patch", "law"),
+    *("normal_force", "support_velocity", "model", "patch", "law", "pad"),
 )
 SPRING_KEYS = ("stiffness", "damping", "at", "torsion", "torsion_damping", "anchor")
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from planarfriction._support.reading import Section
 from planarfriction.errors import InvalidValueError
-from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
+from planarfriction.families import LAWS, MODELS, PADS, SHAPES, SURFACES, Family
 from planarfriction.laws import ElastoPlastic
 
-_GIVEN = ("patch", "law")
+_GIVEN = ("patch", "law", "pad")
 """Parameters of models and surfaces that are not keys of their tables."""
 
 _MISSING = object()
@@ -28,18 +28,20 @@ _MISSING = object()
 def model_to_dict(
     model: Any, of_patch: Callable[[Any], Any] = lambda patch: patch.to_dict()
 ) -> dict[str, Any]:
-    """Return `{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables.
+    """Return `{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables; with its "pad".
 
     `of_patch` makes the tables of patches.
     """
     table = _described(MODELS, model)
     if "surface" in table:
         table["surface"] = _surface_to_dict(model.surface, model.patch, of_patch)
-    return {
+    entries = {
         "model": table,
         "patch": of_patch(model.patch),
         "law": _described(LAWS, model.law),
     }
+    pad = getattr(model, "pad", None)
+    return entries if pad is None else {**entries, "pad": _described(PADS, pad)}
 
 
 def _surface_to_dict(
@@ -54,15 +56,22 @@ def _surface_to_dict(
 
 
 def model_from_dict(contact: Section) -> Any:
-    """Return the model of the table of a contact: `patch` and `law` are tables, `model` is a name or a table.
+    """Return the model of the table of a contact: `patch`, `law` and `pad` are tables, `model` is a name or a table.
 
-    The table of a model or of a law holds its `kind` and its parameters; `surface` is a name, or a table with `kind`,
+    The table of a model, a law or a pad holds its `kind` and its parameters; `surface` is a name, or a table with `kind`,
     its parameters, and `patch` where that is not the model's.
     """
     patch = patch_from_dict(contact.section("patch"))
     law = law_from_dict(contact.section("law"))
     table, make = _member(MODELS, contact, "model", "distributed")
-    return _made(table, make, (patch, law))
+    pad = {}
+    if "pad" in contact:
+        given = contact.section("pad")
+        pad["pad"] = _made(given, PADS[given.choice("kind", PADS)], ())
+        if "pad" not in inspect.signature(make).parameters:
+            rule = "be left out of a contact whose model knows none"
+            raise InvalidValueError("pad", rule, given.get("kind"))
+    return _made(table, functools.partial(make, **pad), (patch, law))
 
 
 def law_from_dict(table: Section) -> Any:

@@ -14,7 +14,7 @@ from planarfriction._engine.protocol import calls_of
 from planarfriction._engine.records.packed import PackedModel
 from planarfriction._engine.records.partial_contact import STATES, following, under_edge
 from planarfriction.errors import InvalidValueError
-from planarfriction.models.base import refuse_pad
+from planarfriction.models.base import refuse_common, refuse_pad
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between, displacement
 from planarfriction.scenes.start import first_slopes, first_states
@@ -42,6 +42,7 @@ def packed_contact(
 
     `outline` is that of the body, for contacts with an edge.
     """
+    refuse_common(contact.model, "scenes")
     packed = contact.model.packed(loads, between)
     if contact.edge:
         refuse_pad(contact.model, "an edge")

@@ -10,6 +10,7 @@ from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.geometry import twist_at
+from planarfriction.models.base import softening
 
 if TYPE_CHECKING:
     from planarfriction.models import DistributedModel
@@ -188,7 +189,7 @@ def slip_field(
     distance = np.zeros(count)
     slip = np.zeros(count)
     frame = 1
-    factor = bristles.law.stiffness_factor(np.maximum(loads, 0.0))
+    factor = softening(bristles, np.maximum(loads, 0.0))
     bent[0] = _bent(factor[0] * state, levers @ first, lean, law)
     for k, (step, dt) in enumerate(zip(displacements, np.diff(times), strict=True)):
         if not dt > 0.0:

@@ -16,7 +16,7 @@ import numpy as np
 
 from planarfriction._support import validation
 from planarfriction.errors import FrictionError, InvalidValueError, shown
-from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
+from planarfriction.families import LAWS, MODELS, PADS, SHAPES, SURFACES, Family
 from planarfriction.scenes import Scene
 from planarfriction.scenes.files import BODY_KEYS, CONTACT_KEYS, SCENE_KEYS, read_table
 
@@ -136,6 +136,7 @@ _BY_NAME = {"model": "kind", "surface": "kind", "law": "kind", "pressure": "law"
 _FAMILIES: dict[str, tuple[Family, str]] = {
     "law": (LAWS, "kind"),
     "model": (MODELS, "kind"),
+    "pad": (PADS, "kind"),
     "patch": (SHAPES, "shape"),
     "surface": (SURFACES, "kind"),
 }
@@ -269,7 +270,7 @@ def _keys(key: str, table: Any) -> list[str] | None:
     keys = [kind, *table]
     if make is not None:
         own = inspect.signature(make).parameters
-        keys[1:1] = [name for name in own if name not in ("patch", "law")]
+        keys[1:1] = [name for name in own if name not in ("patch", "law", "pad")]
     keys += ["metric", "asymmetry"] if key == "patch" else []
     return list(dict.fromkeys(keys))
 

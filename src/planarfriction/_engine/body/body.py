@@ -147,7 +147,7 @@ class SystemRecord(NamedTuple):
     rates: int
     """Address of `rates`, and of the functions below."""
     linearise: int
-    load: int
+    factor: int
     solve: int
 
 

@@ -44,10 +44,12 @@ class Elastic(NamedTuple):
 
 
 @kernel
-def factor(pad: Elastic) -> float:
-    """Return l: at most one over `LIGHTEST`, where there is no load."""
+def factors(pad: Elastic) -> tuple[float, float]:
+    """Return l, at most one over `LIGHTEST` where there is no load, and 1/l."""
     stiff = xp.maximum(pad.stiff, SOFTEST)
-    return stiff / xp.maximum(pad.load, formulas.LIGHTEST * stiff)
+    load = xp.maximum(pad.load, formulas.LIGHTEST * stiff)
+    per = 1.0 / (stiff * load)
+    return stiff * stiff * per, load * load * per
 
 
 @kernel
@@ -82,7 +84,8 @@ def _pieces_of(plain: Any) -> tuple[Any, Any]:
     @kernel
     def evaluate(pad: Elastic, z: Vector, u: Vector) -> tuple[Vector, Vector]:
         """Compute z' and the traction of a piece that moves at u."""
-        y = times(factor(pad), z)
+        stiffer, _ = factors(pad)
+        y = times(stiffer, z)
         rate, _ = rate_of(pad.law, y, u)
         back = recovery(pad.law, y, norm(u))
         return plus(rate, -back, y), traction(pad.law, y, rate, u)
@@ -90,9 +93,9 @@ def _pieces_of(plain: Any) -> tuple[Any, Any]:
     @kernel
     def step(pad: Elastic, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
         """Compute the bristle after dt and its traction."""
-        stiffer = factor(pad)
+        stiffer, softer = factors(pad)
         new, rate = moved(pad.law, within(pad.law, times(stiffer, z)), u, stiffer * dt)
-        return times(1.0 / stiffer, new), traction(pad.law, new, rate, u)
+        return times(softer, new), traction(pad.law, new, rate, u)
 
     return evaluate, step
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from planarfriction._engine.bristles.elastic import Elastic, factor
+from planarfriction._engine.bristles.elastic import Elastic, factors
 from planarfriction._engine.codegen.vectors import Vector, norm, reader_of
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, reader
@@ -50,7 +50,8 @@ def settle(contact: CellsContact, size: int, load: float, z: Doubles) -> None:
     for i in range(n):
         longest = contact.law.mu_s / contact.law.sigma_0
         bent = norm((z[i], z[n + i], z[2 * n + i] if size == 3 else 0.0))
-        over = bent * factor(elastic(contact, i, load)) / longest
+        stiffer, _ = factors(elastic(contact, i, load))
+        over = bent * stiffer / longest
         if over > 1.0:
             for m in range(size):
                 z[m * n + i] = z[m * n + i] / over

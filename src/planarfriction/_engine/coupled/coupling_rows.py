@@ -178,6 +178,8 @@ class Patches(NamedTuple):
     """1 of pads, whose bristles see their loads; 0 of others, [k]."""
     compliance: Doubles
     """Common compliances of pads, [k, 9] (see `face`)."""
+    back: Doubles
+    """Stiffnesses of the common parts of pads, inverse to these, [k, 9]."""
     lag: Doubles
     """Lags [s] of these, [k]; 0 where the face is the back."""
     followers: Followers

@@ -40,12 +40,25 @@ def add_faces(patches: Patches, p: ContactSolve, w: Doubles, twist: Doubles) -> 
 
 
 @kernel
+def _guess(patches: Patches, p: ContactSolve, k: int) -> None:
+    """Begin with the wrench of the common part at rest, if none is given."""
+    w = at(p.wrench, 3 * k)
+    if w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0:
+        return
+    last = patches.firsts[k + 1] - 3
+    for i in range(3):
+        for j in range(3):
+            w[i] -= patches.back[9 * k + 3 * i + j] * p.state[last + j]
+
+
+@kernel
 def hang(patches: Patches, p: ContactSolve) -> None:
     """Write the faces in place of the host, whose numbers are kept."""
     n = 3 * patches.count
     for k in range(patches.count):
         if patches.lag[k] > 0.0:
             kept = at(p.host, HOST * k)
+            _guess(patches, p, k)
             for i in range(3):
                 row = at(p.response, n * (3 * k + i) + 3 * k)
                 copy(row, at(kept, 3 * i), 3)

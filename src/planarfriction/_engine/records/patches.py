@@ -67,6 +67,7 @@ def packed_patches(
         radius=np.array(levers),
         pad=np.array([each.of_pad for each in models], np.int64),
         compliance=np.ravel(soft),
+        back=np.ravel([np.linalg.pinv(each, hermitian=True) for each in soft]),
         lag=np.array([each.lag for each in models]),
         followers=followers,
         row=rows.offsets,

@@ -29,6 +29,7 @@ class CompiledSoft(CompiledDistributed):
         self.compliance = pad.compliance(patch)
         self.lag = pad.lag
         self._lever_arm = lever
+        self._pieces = CompiledDistributed(law, patch, pad)
 
     @functools.cached_property
     def _patch(self) -> PackedPatches:
@@ -87,9 +88,56 @@ class CompiledSoft(CompiledDistributed):
         dt: np.ndarray,
         centre: np.ndarray | None = None,
     ) -> StepJacobians:
-        """See `CompiledModel`."""
-        raise InvalidValueError(
-            "pad",
-            "have no common compliance for derivatives of steps",
-            type(self.pad).__name__,
+        """See `CompiledModel`: those of the pieces at the twist of the face, which moves with all inputs."""
+        batch = load.shape
+        soft = self.compliance
+        h = (dt + self.lag)[..., None, None]
+        _, wrench = self.step(state, twist, load, dt, centre)
+        face = state[..., -3:]
+        at_face = twist + (face + wrench @ soft.T) / h[..., 0]
+        bristles = state[..., :-3].reshape(*batch, *self._pieces.state_shape)
+        pieces = self._pieces.step_jacobians(bristles, at_face, load, dt, centre)
+        n = state.shape[-1] - 3
+        by_face = pieces.wrench_twist
+        alone = np.concatenate(
+            [pieces.wrench_state.reshape(*batch, 3, n), by_face / h], axis=-1
         )
+        answer = np.linalg.inv(np.eye(3) - by_face @ soft / h)
+        wrench_state = answer @ alone
+        wrench_twist = answer @ by_face
+        wrench_load = (answer @ pieces.wrench_load[..., None])[..., 0]
+        moved = np.zeros((*batch, 3, n + 3))
+        moved[..., n:] = np.eye(3) / h
+        face_state = moved + soft @ wrench_state / h
+        face_twist = np.eye(3) + soft @ wrench_twist / h
+        face_load = (soft @ wrench_load[..., None] / h)[..., 0]
+        of_twist = pieces.state_twist.reshape(*batch, n, 3)
+        new_state = of_twist @ face_state
+        new_state[..., :n] += _spread(pieces.state_state)
+        loaded = (load > 0.0)[..., None, None] * dt[..., None, None]
+        back = np.zeros((*batch, 3, n + 3))
+        back[..., n:] = (load > 0.0)[..., None, None] * np.eye(3)
+        of_load = pieces.state_load.reshape(*batch, n)
+        return StepJacobians(
+            np.concatenate([new_state, back - loaded * face_state], axis=-2),
+            np.concatenate(
+                [of_twist @ face_twist, loaded * (np.eye(3) - face_twist)], axis=-2
+            ),
+            np.concatenate(
+                [
+                    of_load + (of_twist @ face_load[..., None])[..., 0],
+                    -loaded[..., 0] * face_load,
+                ],
+                axis=-1,
+            ),
+            wrench_state,
+            wrench_twist,
+            wrench_load,
+        )
+
+
+def _spread(cells: np.ndarray) -> np.ndarray:
+    """Return derivatives cell by cell `[..., d, d, N]` as matrices `[..., d N, d N]`."""
+    d, n = cells.shape[-2:]
+    spread = np.einsum("...abn,nm->...anbm", cells, np.eye(n))
+    return spread.reshape(*cells.shape[:-3], d * n, d * n)

@@ -309,9 +309,8 @@ class Placed:
         self.support = int(bodies[1 - own])
         kinds = set(m.geom_type[self.geoms].tolist())
         faces = kinds == {_BOX} or (_PLANE in kinds and not _ROUND.intersection(kinds))
-        free = faces and patch.model.law.reference_load is None
         self.follows = patch.pressure == "follows" or (
-            patch.pressure == "auto" and free
+            patch.pressure == "auto" and faces
         )
         """True if the pressure follows the contact forces."""
         reach = [

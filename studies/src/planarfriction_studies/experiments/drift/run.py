@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from planarfriction.pads import Pad
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots.style import LINE_STYLES, PlotFigure
 from planarfriction.scenes import Signal
@@ -155,9 +156,10 @@ def _move(load: Load, model: str, rtol: float, atol: float) -> Arrays:
 
 def _fixed_stiffness(rtol: float, atol: float) -> Arrays:
     """Simulate the distributed model under the normal load, with the stiffness that it has under the weight."""
-    law = dataclasses.replace(runs.LAW, reference_load=GRAVITY)
+    model = runs.published_model("d", "Circle", runs.LAW, width=WIDTH)
+    pad = Pad.at_load(GRAVITY)
     return runs.simulated(
-        drift(runs.published_model("d", "Circle", law, width=WIDTH), load="normal"),
+        drift(dataclasses.replace(model, pad=pad), load="normal"),
         rtol=rtol,
         atol=atol,
     )

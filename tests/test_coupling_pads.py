@@ -1,26 +1,29 @@
-"""The step in contact space with patches whose stiffness does not grow with the load."""
-
-import dataclasses
+"""The step in contact space with pads."""
 
 import numpy as np
 import pytest
 
 from planarfriction.coupling import CoupledPatches, HostStep
-from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel
+from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 
 _GRID = ContactPatch.disc(0.02, cells=4)
 DISCS = ContactPatch(
     _GRID.positions, _GRID.areas, _GRID.weights(), radii=np.full(_GRID.cells, 0.005)
 )
-LEANING = dataclasses.replace(DISCS, asymmetry=(0.3, -0.2))
 
 
-def _patches(reference, sigma_0=1e6, second=DISCS):
-    law = LuGre(mu_s=1.2, sigma_0=sigma_0, elasto_plastic=0.9, reference_load=reference)
-    return CoupledPatches([DistributedModel(_GRID, law), DistributedModel(second, law)])
+def _patches(reference, sigma_0=1e6, pad=None):
+    """Return two patches on pads with the stiffness at a load, or the second one on another pad."""
+    law = LuGre(mu_s=1.2, sigma_0=sigma_0, sigma_1=0.0, elasto_plastic=0.9)
+    of_load = reference and Pad.at_load(reference)
+    models = [
+        DistributedModel(_GRID, law, pad=of_load),
+        DistributedModel(DISCS, law, pad=pad or of_load),
+    ]
+    return CoupledPatches(models)
 
 
 def _host(seed, load=None, response=0.0):
@@ -48,10 +51,10 @@ def test_at_a_held_load_it_is_a_law_of_another_sigma_0(load):
         y = other.state
 
 
-@pytest.mark.parametrize("second", [DISCS, LEANING], ids=["discs", "leaning discs"])
-def test_wrenches_are_those_of_the_models_while_loads_follow_them(second):
-    patches = _patches(1.0, second=second)
-    z = _patches(1.0).rest()
+@pytest.mark.parametrize("pad", [None, Pad.measured(1e6), Pad.measured(1e6, 0.6)])
+def test_wrenches_are_those_of_the_models_while_loads_follow_them(pad):
+    patches = _patches(1.0, pad=pad)
+    z = patches.rest()
     moved = 0.0
     for seed in range(30):
         host = _host(seed, response=0.3)
@@ -116,9 +119,18 @@ def test_a_held_body_keeps_its_force_under_a_load_that_oscillates():
         assert swing < 1e-11 if reference else swing > 1e-7
 
 
-def test_moments_are_refused():
-    host = _host(0)._replace(moments=np.zeros((2, 2)))
-    with pytest.raises(
-        InvalidValueError, match="moments must be None for a law with a reference_load"
-    ):
-        _patches(1.0).step(_patches(1.0).rest(), host, 1e-3)
+def test_pressures_follow_moments():
+    """The wrenches are those of the models' steps under the same moments."""
+    patches = _patches(1.0, pad=Pad.measured(1e6, 0.6))
+    z = patches.rest()
+    moments = np.array([[2e-3, -1e-3], [-1e-3, 4e-3]])
+    for seed in range(5):
+        host = _host(seed)._replace(moments=moments)
+        done = patches.step(z, host, 1e-3)
+        for k, (model, state) in enumerate(
+            zip(patches.models, patches.states(z), strict=True)
+        ):
+            given = done.twist[k], done.normal_force[k], 1e-3
+            _, pull = model.step(state, *given, moments=moments[k])
+            np.testing.assert_allclose(done.wrench[k], pull, rtol=1e-6, atol=1e-9)
+        z = done.state
