@@ -227,7 +227,7 @@ STILL = 1e-18
 """Takes the place of `elastic.STILL` in single precision, where squares of smaller ones leave the range."""
 
 _SINGLE = {
-    "factor": _with(elastic.factor, formulas=SimpleNamespace(LIGHTEST=LIGHTEST)),
+    "factors": _with(elastic.factors, formulas=SimpleNamespace(LIGHTEST=LIGHTEST)),
     "traction": _with(elastic.traction, STILL=STILL),
 }
 
