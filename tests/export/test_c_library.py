@@ -59,7 +59,7 @@ def test_steps(name, precision):
 
 
 @pytest.mark.parametrize("precision", KINDS)
-@pytest.mark.parametrize("name", ["discs", "turned discs"])
+@pytest.mark.parametrize("name", ["discs", "turned discs", "discs at a load"])
 def test_all_speeds(name, precision):
     """Steps from rest, and from deflections as faint, are numbers at any speed, and those of the model."""
     made = library(name, precision)

@@ -80,6 +80,10 @@ def test_gradients_to_weights_are_those_of_recorded_steps(front, case):  # noqa:
         front.plain(compiled), wanted, rtol=1e-10, atol=1e-11 * np.abs(wanted).max()
     )
     assert np.abs(wanted).max() > 1e-3
+    way = np.random.default_rng(4).normal(size=wanted.shape)
+    func = front.library.func if front.name == "torch" else front.library
+    along = func.jvp(power(front, model, *at, "adjoint"), (numbers,), tuple(front.arrays(way)))[1]  # fmt: skip
+    np.testing.assert_allclose(front.plain(along), (wanted * way).sum(), rtol=1e-9)
 
 
 def test_every_contact_may_have_weights_of_its_own(front):  # noqa: F811

@@ -256,7 +256,8 @@ def shares(
 ) -> None:  # fmt: skip
     """Write the cotangents of the weights of cells, from those of the wrenches [B or 1, T, 3], to `out` [B, n].
 
-    Bristles do not see the weights: they are the `states` before each step [B or 1, T, size n], and stay.
+    Bristles do not see the weights, or their stiffness on a pad follows these: they are the `states` before each step
+    [B or 1, T, size n], and stay.
     """
     w = pointer(scratch)
     n = states.shape[2] // kind.size
@@ -269,6 +270,9 @@ def shares(
         pulls = wrench_bar[row_of(wrench_bar, b)]
         before = states[row_of(states, b)]
         _lay(w, blocks, inputs.shape.data)
+        at_load = inputs.which[row_of(inputs.which, b), 0]
+        weights = inputs.shape.weights[at_load]
+        _weigh(w, blocks, lanes, weights, inputs.shape.by_load[at_load])
         for t in range(inputs.dt.shape[0]):
             load = loads[t]
             twist = three(twists[t])
