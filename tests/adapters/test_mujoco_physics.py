@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from planarfriction import half_space
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -63,6 +64,26 @@ def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(
     assert np.hypot(*friction.wrenches(d)[:, :2].T).sum() == pytest.approx(
         0.2 * 9.81, rel=1e-5
     )
+
+
+def test_soft_pads_give_way_by_their_stiffness():
+    """Two half-spaces that stick carry a box: it sinks by its weight over the stiffness of both, and stays."""
+    scene = dataclasses.replace(mujoco_scenes.grip("box"), time=1.0)
+    law = pf.LuGre(mu_c=50.0, sigma_1=0.0, elasto_plastic=0.9)
+    pad = pf.Pad.half_space(1e6, 0.45)
+    model = pf.ReducedModel(scene.model.patch, law, pad=pad)
+    m, d, friction = scene.ours(2e-3, model=model)
+    path = scene.run(m, d, lambda: step_checked(friction, d, 1e-8))
+    stuck = half_space.stuck(
+        model.patch.positions,
+        model.patch.areas,
+        model.patch.cell_extents(),
+        1e6,
+        0.45,
+    )
+    sunk = path[0, 2] - path[-1, 2]
+    assert sunk == pytest.approx(0.2 * 9.81 / (2.0 * stuck.stiffness[0, 0]), rel=0.02)
+    assert np.ptp(path[-50:, 2]) < 1e-9
 
 
 def test_a_gripper_of_four_bar_linkages_holds():

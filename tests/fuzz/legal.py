@@ -133,6 +133,8 @@ def objects() -> dict[str, Any]:
         "make": lambda: None, "words": "words",
         # numbers
         "mass": 1.0, "inertia": 0.01, "radius": 0.01, "width": 0.02, "height": 0.01, "length": 0.02, "area": 1e-6,
+        "shear_modulus": 2e5, "thickness": 1e-3, "poisson_ratio": 0.4, "bodies": 1, "lag": 1e-3, "stiffness": 1e4,
+        "common": 0.0, "pad": None,
         "inner_radius": 0.005, "outer_radius": 0.01, "cells": 5, "mu": 0.5, "mu_c": 0.5, "mu_s": 0.6, "t_end": 0.02,
         "angle": 0.1, "along": 0.4, "across": 0.6, "c": 0.006, "n": 0.3, "k": 2.0, "normal_force": 2.0,
         "sigma_0": 1e5, "sigma_1": 100.0, "sigma_2": 0.1, "v_s": 1e-3, "gamma": 2.0, "dt": 1e-3, "time": TIMES,
@@ -172,6 +174,9 @@ def objects() -> dict[str, Any]:
         "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
         "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),
         "PerCell": pf.patch.PerCell([1.0, 2.0, 3.0]),
+        "Pad": pf.Pad.layer(2e5, 1e-3), "Layer": pf.Pad.layer(2e5, 1e-3), "HalfSpace": pf.Pad.half_space(2e5),
+        "Measured": pf.Pad.measured(1e4), "AtLoad": pf.Pad.at_load(2.0),
+        "Pieces": pf.pads.Pieces(np.full(PATCH.cells, 1e4)), "each": np.full(PATCH.cells, 1e4),
         "Drive": pf.joints.Drive(100.0, 7.0), "Plant": pf.joints.Plant(inertia=0.05), "JointLog": turned,
         "JointFriction": pf.joints.JointFriction(0.5), "tau_motor": 0.3, "tau_external": -0.1,
         "FrictionObserver": watcher,
