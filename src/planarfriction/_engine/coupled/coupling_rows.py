@@ -176,6 +176,8 @@ class Patches(NamedTuple):
     """Lever arms of the patches that turn spins into speeds [m], [k]."""
     pad: Integers
     """1 of pads, whose bristles see their loads; 0 of others, [k]."""
+    bristle: Integers
+    """Components of the bristles of each patch, [k]."""
     compliance: Doubles
     """Common compliances of pads, [k, 9] (see `face`)."""
     back: Doubles

@@ -77,6 +77,8 @@ class CompiledModel:
 
     depends_on_load: bool
     """True if the load changes the shape of the patch."""
+    components = 3
+    """Components of a bristle."""
     of_pad = False
     """True if the bristles are pieces of a pad, which see the load."""
     compliance: np.ndarray | None = None

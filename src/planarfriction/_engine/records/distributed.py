@@ -40,6 +40,7 @@ class CompiledDistributed(CompiledModel):
         self.depends_on_load = patch.depends_on_load
         self.size = patch.bristles
         """Number of bristles of a cell: two of a point, three of a disc."""
+        self.components = self.size
         self.springs = 1.0 if pad is None or pad.springs_of_law else 0.0
         """See `cells.rollouts.Inputs`."""
         self.stiff = None

@@ -66,6 +66,7 @@ def packed_patches(
         firsts=bounds.astype(np.int64),
         radius=np.array(levers),
         pad=np.array([each.of_pad for each in models], np.int64),
+        bristle=np.array([each.components for each in models], np.int64),
         compliance=np.ravel(soft),
         back=np.ravel([np.linalg.pinv(each, hermitian=True) for each in soft]),
         lag=np.array([each.lag for each in models]),

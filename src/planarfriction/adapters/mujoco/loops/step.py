@@ -313,12 +313,12 @@ def plan(place_of_host: Place, m: Place, d: Place) -> None:
         write_laws(host, m, patches, problem, at(taken, host.scratch.records))
         for p in range(host.count):
             first = patches.firsts[p]
-            _carry(
-                s,
-                p,
-                at(problem.state, first),
-                (patches.firsts[p + 1] - first) // patches.bristle[p],
-            )
+            bent = at(problem.state, first)
+            states = patches.firsts[p + 1] - first
+            if patches.lag[p] > 0.0:
+                states -= 3
+                _carry(s, p, at(bent, states), 1)
+            _carry(s, p, bent, states // patches.bristle[p])
             _put_guess(host, m, p, s, at(kept.guess, 3 * p), at(problem.guess, 3 * p))
         copy(problem.guess, problem.wrench, 3 * host.count)
         _apply(own, d, problem.guess)
