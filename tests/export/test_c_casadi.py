@@ -108,8 +108,10 @@ def test_jacobians(loaded):
             chained, own, atol=1e-9 * max(np.abs(own).max(), 1e-6)
         )
         wanted = first @ own
+        # A stuck patch has slopes of 1e6; where all has slipped they are what rounding leaves.
+        scale = max(np.abs(first).max(), 1e-3)
         np.testing.assert_allclose(
-            twice(state, *given, params).full(), wanted, atol=1e-9 * np.abs(first).max()
+            twice(state, *given, params).full(), wanted, atol=1e-9 * scale
         )
         ends = [
             step(state, *given[:2], given[2] * (1.0 + sign * 1e-4), params)[1].full()

@@ -26,7 +26,7 @@ from planarfriction.formulas import LawNumbers
 RECOVERY = 1.0
 """Speed [m/s]: a bristle far beyond its limit returns to it as fast as it would forget while sliding at this speed."""
 
-SOFTEST = 1e-100
+SOFTEST = 1e-60
 """Least s [N]: no piece is without stiffness, not even those that fill up vectors."""
 
 STILL = 1e-200
