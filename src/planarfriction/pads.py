@@ -107,7 +107,7 @@ class Pad(ByValue):
     """True if the stiffness is that of the law, and not the pad's own."""
 
     def check(self, patch: ContactPatch, law: FrictionLaw) -> None:
-        """Raise InvalidValueError for a patch or a law that does not go with the pad."""
+        """Check a patch and a law. Raises InvalidValueError for those that do not go with the pad."""
         if patch.asymmetric:
             raise InvalidValueError(
                 "patch", "have no asymmetry for a pad", "an asymmetry"
@@ -139,7 +139,10 @@ class Pad(ByValue):
 
 @dataclass(frozen=True, eq=False)
 class Layer(Pad):
-    """Thin layer bonded to a rigid back (see `Pad.layer`)."""
+    """Thin layer bonded to a rigid back (see `Pad.layer`).
+
+    Raises InvalidValueError for numbers that are not > 0.
+    """
 
     shear_modulus: float = checked(validation.positive)
     """Shear modulus G [Pa]."""
@@ -147,7 +150,7 @@ class Layer(Pad):
     """Thickness h [m]."""
 
     def check(self, patch: ContactPatch, law: FrictionLaw) -> None:
-        """See `Pad.check`."""
+        """See `Pad.check`. Raises InvalidValueError as that does."""
         super().check(patch, law)
         size = math.sqrt(patch.areas.sum())
         if self.thickness >= size:
@@ -161,7 +164,10 @@ class Layer(Pad):
 
 @dataclass(frozen=True, eq=False)
 class AtLoad(Pad):
-    """Stiffness of the law under a load, at all loads (see `Pad.at_load`)."""
+    """Stiffness of the law under a load, at all loads (see `Pad.at_load`).
+
+    Raises InvalidValueError for a load that is not > 0.
+    """
 
     normal_force: float = checked(validation.positive_load)
     """Load f_ref [N] at which the law has the stiffness."""
@@ -169,7 +175,7 @@ class AtLoad(Pad):
     springs_of_law = True
 
     def check(self, patch: ContactPatch, law: FrictionLaw) -> None:
-        """See `Pad.check`."""
+        """See `Pad.check`. Raises InvalidValueError as that does."""
         super().check(patch, law)
         self._refuse_loads(patch)
 
@@ -180,7 +186,10 @@ class AtLoad(Pad):
 
 @dataclass(frozen=True, eq=False)
 class Measured(Pad):
-    """Pad by the stiffness of a stuck patch (see `Pad.measured`)."""
+    """Pad by the stiffness of a stuck patch (see `Pad.measured`).
+
+    Raises InvalidValueError as `Pad.measured` does.
+    """
 
     stiffness: float = checked(validation.positive)
     """Stiffness of the stuck patch in shift [N/m]."""
@@ -201,7 +210,10 @@ class Measured(Pad):
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace(Pad):
-    """Body that is thick beside the patch (see `Pad.half_space`)."""
+    """Body that is thick beside the patch (see `Pad.half_space`).
+
+    Raises InvalidValueError as `Pad.half_space` does.
+    """
 
     shear_modulus: float = checked(validation.positive)
     """Shear modulus G [Pa]."""
@@ -213,7 +225,7 @@ class HalfSpace(Pad):
     """Time in which the common part follows [s]."""
 
     def check(self, patch: ContactPatch, law: FrictionLaw) -> None:
-        """See `Pad.check`."""
+        """See `Pad.check`. Raises InvalidValueError as that does."""
         self._refuse_loads(patch)
         if not patch.cell_extents().all():
             rule = "have cells with an area for a half-space (take measured)"

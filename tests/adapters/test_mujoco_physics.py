@@ -67,7 +67,7 @@ def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(
 
 
 def test_soft_pads_give_way_by_their_stiffness():
-    """Two half-spaces that stick carry a box: it sinks by its weight over the stiffness of both, and stays."""
+    """Two half-spaces that stick carry a box 4 mm beside its centre: it sinks and turns by its weight, and stays."""
     scene = dataclasses.replace(mujoco_scenes.grip("box"), time=1.0)
     law = pf.LuGre(mu_c=50.0, sigma_1=0.0, elasto_plastic=0.9)
     pad = pf.Pad.half_space(1e6, 0.45)
@@ -81,8 +81,10 @@ def test_soft_pads_give_way_by_their_stiffness():
         1e6,
         0.45,
     )
+    load = 0.5 * 0.2 * 9.81
+    shift, _, turn = 1.0 / stuck.stiffness.diagonal()
     sunk = path[0, 2] - path[-1, 2]
-    assert sunk == pytest.approx(0.2 * 9.81 / (2.0 * stuck.stiffness[0, 0]), rel=0.02)
+    assert sunk == pytest.approx(load * (shift + 4e-3**2 * turn), rel=0.02)
     assert np.ptp(path[-50:, 2]) < 1e-9
 
 
