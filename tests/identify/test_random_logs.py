@@ -3,7 +3,6 @@
 `python -m tests.identify.test_random_logs FIRST LAST` prints the counts of more seeds.
 """
 
-import dataclasses
 import sys
 
 import numpy as np

@@ -12,9 +12,9 @@ from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.identify.logs import EVEN, Linear, Log
 from planarfriction.identify.parameters import RADIUS, SHAPE
 from planarfriction.laws import LuGre
-from planarfriction.pads import Pad
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 
 CHANGE = 1e-6

@@ -35,6 +35,16 @@ def step_patch(
 
 
 @kernel
+def _yields(patches: Patches, p: ContactSolve, k: int) -> bool:
+    """Return True if the load of patch k depends on any wrench."""
+    n = 3 * patches.count
+    yields = False
+    for j in range(n):
+        yields = yields or p.load_response[n * k + j] != 0.0
+    return yields
+
+
+@kernel
 def write_load_slopes(patches: Patches, p: ContactSolve) -> None:
     """Write the slopes of the wrenches by the loads; of a pad, by a step under another load."""
     for k in range(patches.count):
@@ -42,7 +52,12 @@ def write_load_slopes(patches: Patches, p: ContactSolve) -> None:
         load = p.load[k]
         for i in range(3):
             p.unit_loaded[one + i] = p.unit[one + i]
-        if patches.pad[k] != 0 and p.acting[k] != 0 and load > 0.0:
+        if (
+            patches.pad[k] != 0
+            and p.acting[k] != 0
+            and load > 0.0
+            and _yields(patches, p, k)
+        ):
             copy(at(p.twist, one), p.seen, 3)
             step_patch(patches, p, patches.steps, k, (1.0 + LOAD_STEP) * load)
             for i in range(3):
