@@ -126,9 +126,8 @@ class StepFunctions(NamedTuple):
     """Compiled steps of a contact with S states.
 
     Their arguments are `(contact, z, V, dt, new, out)`: the address of the contact's record (with which the solver
-    calls its `protocol.ModelFunctions`), a number `dt`, and pointers to doubles; behind V is the load. They write the new
-    state to `new` and
-    to `out`, per unit load, the wrench W at the end of the step [3] and derivatives.
+    calls its `protocol.ModelFunctions`), a number `dt`, and pointers to doubles; behind V is the load. They write the
+    new state to `new` and to `out`, per unit load, the wrench W at the end of the step [3] and derivatives.
     """
 
     step: Any

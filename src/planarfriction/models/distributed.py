@@ -37,9 +37,10 @@ class DistributedModel(FrictionModel):
     bristle decays towards `a_i g/sigma_0` instead of zero, `zdot_i = u_i - k_i (z_i - a_i g/sigma_0)`, `k_i = beta
     sigma_0 |u_i|/g`, where beta depends on the deflection measured from there.
 
-    With a `pad` bristle i is a piece of it, whose stiffness K_i is its own and does not grow with its load N_i: it moves
-    as above with `l_i z_i` in place of `z_i`, `l_i = K_i/(sigma_0 N_i)`, and damps along `u_i` alone (docs/pads.md). The
-    state of a pad with a common compliance is flat, `[d N + 3]`; the displacement of the face is last.
+    With a `pad` bristle i is a piece of it, whose stiffness K_i is its own and does not grow with its load N_i: it
+    moves as above with `l_i z_i` in place of `z_i`, `l_i = K_i/(sigma_0 N_i)`, and damps along `u_i` alone
+    (docs/pads.md). The state of a pad with a common compliance is flat, `[d N + 3]`; the displacement of the face is
+    last.
 
     Raises InvalidValueError for what is not a patch or a law, for a law that creeps on a patch with an asymmetry, and
     for a pad that does not go with them.

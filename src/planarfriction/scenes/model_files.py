@@ -28,7 +28,7 @@ _MISSING = object()
 def model_to_dict(
     model: Any, of_patch: Callable[[Any], Any] = lambda patch: patch.to_dict()
 ) -> dict[str, Any]:
-    """Return `{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables; with its "pad".
+    """Return `{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables; its "pad" too.
 
     `of_patch` makes the tables of patches.
     """
@@ -58,8 +58,8 @@ def _surface_to_dict(
 def model_from_dict(contact: Section) -> Any:
     """Return the model of the table of a contact: `patch`, `law` and `pad` are tables, `model` is a name or a table.
 
-    The table of a model, a law or a pad holds its `kind` and its parameters; `surface` is a name, or a table with `kind`,
-    its parameters, and `patch` where that is not the model's.
+    The table of a model, a law or a pad holds its `kind` and its parameters; `surface` is a name, or a table with its
+    `kind`, its parameters, and `patch` where that is not the model's.
     """
     patch = patch_from_dict(contact.section("patch"))
     law = law_from_dict(contact.section("law"))

@@ -195,8 +195,8 @@ class CompiledDistributed(CompiledModel):
             stiff = float(self.stiff.sum())
             scale = scale * weights.max(axis=0) * stiff / self.stiff[chosen]
         return PackedModel(
-            self._contact, rows, states, per_cell * count, np.tile(scale, self.size), radius, (weights, numbers), chosen,
-            stiff=stiff,
+            self._contact, rows, states, per_cell * count, np.tile(scale, self.size), radius, (weights, numbers),
+            chosen, stiff=stiff,
         )  # fmt: skip
 
     def numbers(self, chosen: Any = slice(None)) -> np.ndarray:
