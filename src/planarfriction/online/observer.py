@@ -12,8 +12,8 @@ from planarfriction._support.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import FrictionModel
-from planarfriction.online.loops import filter_state
 from planarfriction.online.loops import friction_filter as kernels
+from planarfriction.online.loops.filter_state import BIAS, MU, STATE
 from planarfriction.online.sensors import Measurement, Sensors
 
 PARAMETERS = ("mu_c", "mu_s", "radius")
@@ -97,8 +97,9 @@ class FrictionObserver:
     from what was assumed, and a bias that no empty hand has shown, unless `bias` (standard deviations) is at most the
     noise of the sensors. Nothing is determined then.
 
-    `information()` is that of the motion so far. `state` `[..., 190]` is all that changes: a copy of it is a
-    checkpoint. With `batch`, the observer watches so many parts at once; measurements have that leading shape.
+    `information()` is that of the motion so far. `state` `[...]`, records of dtype
+    `planarfriction.online.loops.filter_state.STATE`, is all that changes: a copy of it is a checkpoint. With `batch`,
+    the observer watches so many parts at once; measurements have that leading shape.
 
     Raises InvalidValueError for what is neither a model nor a limit surface, asymmetric friction, and values out of
     range.
@@ -154,7 +155,6 @@ class FrictionObserver:
         prior = np.array(
             [validation.positive(name, value) for name, value in spreads.items()]
         )
-        n = kernels.N
         numbers = model.law.numbers
         middle = np.log([numbers.mu_c, numbers.mu_s / numbers.mu_c, 1.0])
         self._filter = _settings(
@@ -179,14 +179,14 @@ class FrictionObserver:
                 [self._filter.remainder, fresh, prior, np.maximum(unsure, 1e-9)]
             )
         )
-        self.state = state = np.zeros(validation.batched(batch, (filter_state.STATE,)))
-        state[..., filter_state.MU : filter_state.BIAS] = middle
-        state[..., filter_state.TARED] = (unsure <= np.sqrt(self._filter.noise)).all()
-        state[..., kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
-        state[..., filter_state.SLIP] = 1e-3
-        state[..., filter_state.TIME] = -math.inf
-        state[..., [filter_state.BOUND, filter_state.PEAK]] = -10.0
-        state[..., filter_state.GAUGE] = kernels.NONE
+        self.state = state = np.zeros(validation.batched(batch, ()), STATE)
+        state["x"][..., MU:BIAS] = middle
+        state["root"] = root
+        state["tared"] = (unsure <= np.sqrt(self._filter.noise)).all()
+        state["slip"] = 1e-3
+        state["time"] = -math.inf
+        state["bound"] = state["peak"] = -10.0
+        state["gauge"] = kernels.NONE
 
     def update(self, measurement: Measurement) -> Estimate:
         """Take a sample of every part, with NaN or None for what is missing; return what is known now.
@@ -201,8 +201,7 @@ class FrictionObserver:
         Raises InvalidValueError as `update` does.
         """
         validation.instance("measurement", measurement, Measurement, "a Measurement")
-        batch = self.state.shape[:-1]
-        state = self.state.reshape(-1, filter_state.STATE)
+        batch = self.state.shape
         velocity = measurement.slip_velocity
         samples = np.empty((*batch, 8))
         try:
@@ -213,23 +212,25 @@ class FrictionObserver:
                 "measurement", f"hold numbers of the batch {list(batch)}", measurement
             ) from None
         found = np.empty(batch, kernels.ESTIMATE)
-        kernels.update(self._filter, state, samples.reshape(-1, 8), found.reshape(-1))
+        kernels.update(
+            self._filter,
+            self.state.reshape(-1),
+            samples.reshape(-1, 8),
+            found.reshape(-1),
+        )
         return found
 
     @property
     def bias(self) -> np.ndarray:
         """Estimated bias of the measured wrench, `[..., 3]` [N, N, N m]."""
-        return -self.state[..., filter_state.BIAS : kernels.N] @ self._filter.frame
+        return -self.state["x"][..., BIAS:] @ self._filter.frame
 
     def information(self) -> np.ndarray:
         """Return the information of the samples so far on the logs of mu_c, mu_s/mu_c and the radius, `[..., 3, 3]`.
 
         The inverse covariance less that of the prior; a direction without information is not determined by the motion.
         """
-        n = kernels.N
-        root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(
-            *self.state.shape[:-1], n, n
-        )[..., filter_state.MU : filter_state.BIAS, :]
+        root = self.state["root"][..., MU:BIAS, :]
         return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(
             1.0 / self._filter.prior_spread**2
         )
