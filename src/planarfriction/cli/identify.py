@@ -201,8 +201,12 @@ def identify(
             print(stop)
             return INTERRUPTED
     samples = sum(len(log.time) for log in read)
-    title = f"{', '.join(log.name for log in read)}: {samples} samples, {given.name}"
-    print(title, "", found.table(), sep="\n")
+    print(
+        f"{', '.join(log.name for log in read)}: {samples} samples, {given.name}",
+        "",
+        found.table(),
+        sep="\n",
+    )
     note(f"{found.starts[0]} of {found.starts[1]} starting points led to this minimum")
     if out is not None:
         stem = slug(read[0].name)

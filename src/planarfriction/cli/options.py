@@ -49,8 +49,9 @@ def find_patch(
             if name != "width":
                 option = f"--{name.replace('_', '-')}"
                 given = f"{size[name]} for the patch {text}"
-                rule = "be given only for a pressure map"
-                raise InvalidValueError(option, rule, given)
+                raise InvalidValueError(
+                    option, "be given only for a pressure map", given
+                )
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
         from planarfriction._support import validation  # loads NumPy
@@ -145,9 +146,12 @@ cells_option = click.option(
 
 def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
     """Make the option `--patch`, given to a command as `name`; `default` says what is taken without it."""
-    words = f"Contact patch: {PATCH_HELP} {default}"
     return click.option(
-        "--patch", name, metavar="PATCH", shell_complete=complete_patch, help=words
+        "--patch",
+        name,
+        metavar="PATCH",
+        shell_complete=complete_patch,
+        help=f"Contact patch: {PATCH_HELP} {default}",
     )
 
 

@@ -207,8 +207,11 @@ def one_each(settings: Sequence[str]) -> dict[str, Any]:
     several = parse_all(settings)
     for path, values in several.items():
         if len(values) > 1:
-            rule = "be one value (planarfriction sweep takes several)"
-            raise InvalidValueError(f"--set {path}", rule, ", ".join(map(str, values)))
+            raise InvalidValueError(
+                f"--set {path}",
+                "be one value (planarfriction sweep takes several)",
+                ", ".join(map(str, values)),
+            )
     return {path: next(iter(values.values())) for path, values in several.items()}
 
 
@@ -223,8 +226,11 @@ def _check_cells(cells: int | None, makes: Iterable[Any]) -> None:
     validation.count("--cells", cells)
     if not any(map(_has_cells, makes)):
         kinds = ", ".join(kind for kind, make in MODELS.items() if _has_cells(make))
-        rule = f"be given only for a model that has a number of cells ({kinds})"
-        raise InvalidValueError("--cells", rule, cells)
+        raise InvalidValueError(
+            "--cells",
+            f"be given only for a model that has a number of cells ({kinds})",
+            cells,
+        )
 
 
 def _make(make: Any, patch: pf.ContactPatch, law: Any, cells: int | None) -> Any:

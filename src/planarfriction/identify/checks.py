@@ -178,8 +178,13 @@ def with_findings(
         ]
         odd += filter(None, rates)
         if None not in rates:
-            text = "no log is sampled at twice the corner frequency of the bristles"
-            verdicts.append(Verdict("sigma_1", False, text))
+            verdicts.append(
+                Verdict(
+                    "sigma_1",
+                    False,
+                    "no log is sampled at twice the corner frequency of the bristles",
+                )
+            )
     verdicts += (Verdict("fit", False, str(finding)) for finding in odd)
     return dataclasses.replace(result, verdicts=(*result.verdicts, *verdicts))
 
@@ -273,8 +278,12 @@ def check_work(log: Log, sliding: Sliding) -> Finding | None:
     if len(power) < LEAST or power[driving].sum() <= AGAINST * np.abs(power).sum():
         return None
     rule = f"act on the moving body, against its motion (it does {_best_reading(sliding)[1]})"
-    found = f"power > 0 in {100.0 * driving.mean():.4g} % of the samples that slide"
-    return Finding(f"wrench of {log.name}", rule, found, refuses=True)
+    return Finding(
+        f"wrench of {log.name}",
+        rule,
+        f"power > 0 in {100.0 * driving.mean():.4g} % of the samples that slide",
+        refuses=True,
+    )
 
 
 def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
@@ -295,8 +304,11 @@ def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
     if angle > BETTER * as_read:
         return None
     rule = "point in the direction of friction on the patch"
-    text = f"a median deviation of {as_read:.0f} deg, and {angle:.0f} deg {words}"
-    return Finding(f"wrench of {log.name}", rule, text)
+    return Finding(
+        f"wrench of {log.name}",
+        rule,
+        f"a median deviation of {as_read:.0f} deg, and {angle:.0f} deg {words}",
+    )
 
 
 def _best_reading(sliding: Sliding) -> tuple[float, str]:
@@ -344,8 +356,11 @@ def check_times(log: Log, size: float) -> Finding | None:
     if log.interval >= SLOW and moved > TRAVEL * size:
         return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
     if speed > SPEEDY or moved > size:
-        text = f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
-        return Finding(f"twist of {log.name}", "be in m/s and rad/s", text)
+        return Finding(
+            f"twist of {log.name}",
+            "be in m/s and rad/s",
+            f"{seen}: are vx and vy in mm/s, or omega in deg/s?",
+        )
     return None
 
 
@@ -358,8 +373,11 @@ def check_friction(log: Log, size: float) -> Finding | None:
     force = np.quantile(np.linalg.norm(shares[:, :2], axis=1), 0.9)
     torque = np.quantile(np.abs(shares[:, 2]) / size, 0.9)
     if force > HIGH:
-        text = f"friction of {force:.3g} times the load: is normal_force in kg or kN?"
-        return Finding(f"normal_force of {log.name}", "be in N", text)
+        return Finding(
+            f"normal_force of {log.name}",
+            "be in N",
+            f"friction of {force:.3g} times the load: is normal_force in kg or kN?",
+        )
     if torque > HIGH:
         rule = "be in N m about the origin of the contact frame"
         text = f"a torque of {torque:.3g} times the load and the contact radius: is it in N mm, or about another point?"
@@ -389,8 +407,11 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
     if rate >= 2.0 * corner:
         return None
     why = f"to determine sigma_1 (corner frequency sigma_0/(2 pi sigma_1): {corner:.3g} Hz)"
-    rule = f"be taken at {2.0 * corner:.3g} Hz or more {why}"
-    return Finding(f"samples of {log.name}", rule, f"{rate:.3g} Hz")
+    return Finding(
+        f"samples of {log.name}",
+        f"be taken at {2.0 * corner:.3g} Hz or more {why}",
+        f"{rate:.3g} Hz",
+    )
 
 
 # ---------------------------------------------------------------------- slides
@@ -412,8 +433,9 @@ def check_slide_units(
     steadier = np.std(np.log(in_degrees))
     text = f"friction of {friction:.3g} times the load"
     if friction < LOW:
-        text = f"{text}: is it in ms?"
-        return Finding("time of the slides", "be in s", text, refuses=True)
+        return Finding(
+            "time of the slides", "be in s", f"{text}: is it in ms?", refuses=True
+        )
     if (spread > VARIES and steadier < STEADIER * spread) or (
         friction > USUAL and less < HALF * friction
     ):
@@ -422,8 +444,9 @@ def check_slide_units(
         sure = (len(as_read) >= FEW and spread > SURE) or friction > HIGH
         return Finding("theta of the slides", "be in rad", text, refuses=bool(sure))
     if friction > HIGH:
-        text = f"{text}: are they in mm?"
-        return Finding("x and y of the slides", "be in m", text, refuses=True)
+        return Finding(
+            "x and y of the slides", "be in m", f"{text}: are they in mm?", refuses=True
+        )
     return None
 
 
@@ -474,6 +497,7 @@ def _size_at(load: float, patch: ContactPatch) -> float:
     size = patch.contact_radius(load)
     if not size > 0.0:
         rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"
-        found = f"{patch.cells} cell with a contact radius of {size:g} m"
-        raise InvalidValueError("patch", rule, found)
+        raise InvalidValueError(
+            "patch", rule, f"{patch.cells} cell with a contact radius of {size:g} m"
+        )
     return size

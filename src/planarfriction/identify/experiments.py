@@ -193,8 +193,9 @@ def design_experiment(
     candidates = as_tuple("motions", motions, Log)
     for each in candidates:
         if not each.twist.any():
-            rule = "move the contact"
-            raise InvalidValueError(f"twist of {each.name}", rule, "0 throughout")
+            raise InvalidValueError(
+                f"twist of {each.name}", "move the contact", "0 throughout"
+            )
     sigma = _noise(noise, before, candidates, patch, law)
     later = tuple(group for group in groups if group != "twist")
     information = _Information(patch, law, names, later, sigma)
@@ -297,7 +298,7 @@ class _Information:
         """Return the motion with its expected wrenches."""
         unmeasured = dataclasses.replace(motion, wrench=np.ones_like(motion.twist))
         problem = self.problem([unmeasured], ())
-        return dataclasses.replace(motion, wrench=problem.shown(self.values)[0])
+        return dataclasses.replace(motion, wrench=problem.shown(self.values))
 
     def measured(self, log: Log) -> Log:
         """Return the log with its noise added to the wrenches: a torque of 0 throughout would count as not measured."""

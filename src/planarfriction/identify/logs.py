@@ -96,8 +96,9 @@ class Log(ByValue):
         load = np.broadcast_to(load, len(time)) if load.ndim == 0 else load
         if (load <= 0.0).all() and (load < 0.0).any():
             rule = "be >= 0; negate it if the sensor counts pressure as negative"
-            found = f"{load.min():.3g} to {load.max():.3g} N"
-            raise InvalidValueError("normal_force", rule, found)
+            raise InvalidValueError(
+                "normal_force", rule, f"{load.min():.3g} to {load.max():.3g} N"
+            )
         load = validation.non_negative_array("normal_force", load, (len(time),))
         self._set(time=time, twist=twist, wrench=wrench, normal_force=load)
         for value in (time, twist, wrench, load):
@@ -309,8 +310,9 @@ def loads(log: Log) -> np.ndarray:
     """Return the loads > 0 of a log [N], or raise InvalidValueError if there is none."""
     found = log.normal_force[log.normal_force > 0.0]
     if not len(found):
-        name = f"normal_force of {log.name}"
-        raise InvalidValueError(name, "be > 0 somewhere", "0 everywhere")
+        raise InvalidValueError(
+            f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere"
+        )
     return found
 
 
@@ -422,7 +424,10 @@ def unwrapped(
     ):
         if where.any():
             i = int(np.argmax(where))
-            found = f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s"
-            raise InvalidValueError(f"{name} [rad]", rule, found)
+            raise InvalidValueError(
+                f"{name} [rad]",
+                rule,
+                f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s",
+            )
     count = int(np.count_nonzero(turns))
     return angle - TURN * np.append(0.0, np.cumsum(turns)), count

@@ -227,14 +227,11 @@ class SlideProblem(LeastSquaresProblem):
             slide_poses(model, self.body, slide.time, start) for slide, start in both
         ]
 
-    def even_sigma(self, noise: np.ndarray) -> Arrays:
+    def even_sigma(self, noise: np.ndarray) -> np.ndarray:
         rows = np.broadcast_to(noise, (len(self.slides), 3))
-        both = zip(rows, self.slides, strict=True)
-        return [np.broadcast_to(row, slide.pose.shape) for row, slide in both]
+        return np.repeat(rows, [len(slide.time) for slide in self.slides], axis=0)
 
-    def estimate_noise(
-        self, values: np.ndarray, noise: np.ndarray
-    ) -> tuple[np.ndarray, Arrays]:
+    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> Linear:
         """Estimate the noise `[S, 3]`, equal for x and y, from the residuals at `values`, and sigma of each sample."""
         both = zip(self.slides, self.poses(values), strict=True)
         residuals = [slide.pose - poses for slide, poses in both]
@@ -253,12 +250,12 @@ class SlideProblem(LeastSquaresProblem):
             noise = np.maximum(channels, LEAST_NOISE) / np.sqrt(weighed)[:, None]
         return noise, self.even_sigma(noise)
 
-    def linearised(self, values: np.ndarray, sigma: Arrays) -> Linear:
+    def linearised(self, values: np.ndarray, sigma: np.ndarray) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, at the best starts, and derivatives `[M, F]` with the starts free.
 
         The start answers every change: `q' = -B^+ (r, J)` with B of the poses from which it is estimated.
         """
-        noise = np.min([each[0] for each in sigma], axis=0)
+        noise = sigma.min(axis=0)
         model = self.fitted_model(values)
         least = np.abs(self.start_values()) + 1e-2 * (values == 0.0)
         changes = CHANGE * np.maximum(np.abs(values), least)
@@ -287,10 +284,9 @@ class SlideProblem(LeastSquaresProblem):
             known = None if self.samples is None else 3 * self.samples
             answer = np.linalg.lstsq(basis[:known], both[:known], rcond=None)[0]
             self.starts[i] = start - answer[:, 0]
-            weight = (noise / sigma[i]).reshape(-1, 1)
-            rows.append(weight * (both - basis @ answer))
+            rows.append(both - basis @ answer)
         self._turns = 0
-        whole = np.concatenate(rows)
+        whole = np.concatenate(rows) * (noise / sigma).reshape(-1, 1)
         return whole[:, 0], whole[:, 1:]
 
 

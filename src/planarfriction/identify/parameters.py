@@ -157,8 +157,11 @@ def check_loads(
             and np.abs(log.normal_force / load - 1.0).max() > CONSTANT
         ):
             rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
-            found = f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
-            raise InvalidValueError(f"normal_force of {log.name}", rule, found)
+            raise InvalidValueError(
+                f"normal_force of {log.name}",
+                rule,
+                f"{log.normal_force.min():g} .. {log.normal_force.max():g} N",
+            )
 
 
 class Coordinates:

@@ -72,9 +72,9 @@ def softened(residual: np.ndarray) -> Linear:
 class LeastSquaresProblem:
     """Measurements, a model, and the values that vary: F of the contact, then K of the rig.
 
-    Subclasses predict what was measured, and estimate its noise from `values` and the `noise` of before. Given `sigma`
-    `[T, 3]` of each log or slide, `linearised` computes the residuals over it, `[M]`, and their derivatives by the
-    values, `[M, F + K]`.
+    Subclasses predict what was measured, and estimate its noise from `values` and the `noise` of before. Samples of all
+    logs or slides stand one after the other, T in all. Given `sigma` `[T, 3]`, `linearised` computes the residuals over
+    it, `[M]`, and their derivatives by the values, `[M, F + K]`.
     """
 
     numbers: Any
@@ -84,9 +84,9 @@ class LeastSquaresProblem:
     linearised: Any
     """Return `Linear` residuals for values `[F + K]` and `sigma`."""
     even_sigma: Any
-    """Return the same noise for all samples, `[T, 3]` of each log or slide, from that of the channels."""
+    """Return the same noise for all samples, `[T, 3]`, from that of the channels."""
     estimate_noise: Any
-    """Return the noise of the channels and sigma of each log or slide for values and the noise of before."""
+    """Return the noise of the channels and sigma `[T, 3]` for values and the noise of before."""
 
     names: tuple[str, ...]
     """Names of the parameters of the contact, `[F]`."""
@@ -110,7 +110,7 @@ class LeastSquaresProblem:
         """Return the optimiser's coordinates for a search from values `[F]`."""
         return Coordinates(self.names, start, self.law.mu_c)
 
-    def refine_steps(self, values: np.ndarray, sigma: Arrays) -> bool:
+    def refine_steps(self, values: np.ndarray, sigma: np.ndarray) -> bool:
         """Take more steps between two samples if the estimates ask for it; returns True if they do."""
         return False
 
@@ -118,7 +118,7 @@ class LeastSquaresProblem:
         """Forget derivatives that were kept, from other steps or other values."""
 
     def residuals(
-        self, coordinates: Coordinates, sigma: Arrays
+        self, coordinates: Coordinates, sigma: np.ndarray
     ) -> Callable[[np.ndarray], Linear]:
         """Return the function of the coordinates that least squares minimises, with its derivatives."""
 
@@ -176,7 +176,11 @@ class LogProblem(LeastSquaresProblem):
         self.twists = [(as_measured if known_twist else smoothed)(log) for log in logs]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
         first = int(options.begins == "rest")
-        self.used = [log.inner[first:] for log in logs]
+        used = [np.isin(np.arange(len(log.time)), log.inner[first:]) for log in logs]
+        self._log = np.repeat(np.arange(len(logs)), [len(each) for each in used])
+        self.used = np.concatenate(used)
+        self.measured = np.concatenate([log.wrench for log in logs])
+        self.channels = np.array([log.channels for log in logs])[self._log]
         own = self._per_load if self.kind.own_radius else law
         self.simulator = self.kind(self.fixed_patch, own, options.surface)
         self.steps = options.refine or 1
@@ -238,17 +242,21 @@ class LogProblem(LeastSquaresProblem):
 
     @property
     def numbers(self) -> int:
-        return sum(int(log.channels.sum()) * len(log.time) for log in self.logs)
+        return int(self.channels.sum())
+
+    def split_logs(self, rows: np.ndarray) -> Arrays:
+        """Split rows `[T, ...]` of all samples into those of each log."""
+        return [rows[self._log == i] for i in range(len(self.logs))]
 
     def coordinates(self, start: np.ndarray) -> Coordinates:
         return Coordinates(
             self.names, start, self.law.mu_c, self.rig.widths, self.rig.limits
         )
 
-    def sizes(self) -> list[int]:
-        return [3 * len(used) for used in self.used]
+    def sizes(self) -> np.ndarray:
+        return 3 * np.bincount(self._log[self.used])
 
-    def refine_steps(self, values: np.ndarray, sigma: Arrays) -> bool:
+    def refine_steps(self, values: np.ndarray, sigma: np.ndarray) -> bool:
         """Take as many steps as keep the estimates within `COARSE` standard errors; returns True if these are more.
 
         Their number follows from the change of the residuals with twice as many steps, as errors fall with its square.
@@ -293,43 +301,42 @@ class LogProblem(LeastSquaresProblem):
         rig = values[count:]
         return values[:count], rig if len(rig) else np.zeros(len(self.rig.columns))
 
-    def shown(self, values: np.ndarray) -> Arrays:
-        """Compute the wrenches `[T, 3]` that the sensors of each log should show, for values `[F]` or `[F + K]`."""
+    def shown(self, values: np.ndarray) -> np.ndarray:
+        """Compute the wrenches `[T, 3]` that the sensors should show, for values `[F]` or `[F + K]`."""
         if self._shown is None or not np.array_equal(self._shown[0], values):
             self._shown = values.copy(), self._wrenches(values, self.predictions)
         return self._shown[1]
 
+    def _vectors(self, values: np.ndarray) -> Arrays:
+        """Return the vector of the model for each log."""
+        contact, _ = self.split(values)
+        return [each.vector(contact) for each in self.maps]
+
     def _wrenches(
         self, values: np.ndarray, predictions: Sequence[Prediction]
-    ) -> Arrays:
-        contact, rig = self.split(values)
+    ) -> np.ndarray:
+        _, rig = self.split(values)
         result = []
-        both = zip(predictions, self.maps, strict=True)
-        for i, (prediction, each) in enumerate(both):
-            wrench = prediction.wrenches(each.vector(contact), self.rig.delay(rig))
+        both = zip(predictions, self._vectors(values), strict=True)
+        for i, (prediction, vector) in enumerate(both):
+            wrench = prediction.wrenches(vector, self.rig.delay(rig))
             result.append(self.rig.added(i, rig, wrench, np.zeros_like(wrench))[0])
-        return result
+        return np.concatenate(result)
 
-    def linearised(self, values: np.ndarray, sigma: Arrays) -> Linear:
+    def linearised(self, values: np.ndarray, sigma: np.ndarray) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, and derivatives `[M, F + K]`, at `values` or nearby (`NEARBY`)."""
         if self._slopes is None or not self._near(values, self._slopes[0]):
             self._slopes = self._derive(values)
-        both = zip(self._slopes[1], self.logs, self.used, sigma, strict=True)
-        rows = [
-            (slope * (log.channels / each)[..., None])[used].reshape(
-                -1, slope.shape[-1]
-            )
-            for slope, log, used, each in both
-        ]
+        rows = self._slopes[1] * (self.channels / sigma)[..., None]
         residual, factor = self._counted(values, sigma)
-        return residual, factor[:, None] * np.concatenate(rows)
+        return residual, factor[:, None] * rows[self.used].reshape(len(factor), -1)
 
     def slopes_of(
         self,
         names: Sequence[str],
         held: np.ndarray,
         values: np.ndarray,
-        sigma: Arrays,
+        sigma: np.ndarray,
     ) -> Linear:
         """Compute the residuals `[M]` at `values`, and derivatives `[M, H]` by `names` of the law, `held` at these."""
         wide = copy.copy(self)
@@ -348,13 +355,10 @@ class LogProblem(LeastSquaresProblem):
         contact, _ = self.split(np.abs(values))
         centre = np.isin(self.names, ("centre_x", "centre_y"))
         sizes = np.maximum(contact, self.base["contact_radius"] * centre)
-        return bool(
-            (
-                np.abs(values - others) <= NEARBY * np.append(sizes, self.rig.widths)
-            ).all()
-        )
+        most = NEARBY * np.append(sizes, self.rig.widths)
+        return bool((np.abs(values - others) <= most).all())
 
-    def _derive(self, values: np.ndarray) -> tuple[np.ndarray, Arrays]:
+    def _derive(self, values: np.ndarray) -> Linear:
         """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`, and remember the wrenches."""
         contact, rig = self.split(values)
         wrenches = []
@@ -371,126 +375,109 @@ class LogProblem(LeastSquaresProblem):
             slope = factor[:, None, None] * (slope @ per_value[rows])
             wrenches.append(shown)
             slopes.append(np.concatenate([slope, of_rig], axis=-1))
-        self._shown = values.copy(), wrenches
-        return values.copy(), slopes
+        self._shown = values.copy(), np.concatenate(wrenches)
+        return values.copy(), np.concatenate(slopes)
 
-    def residual(self, values: np.ndarray, sigma: Arrays) -> np.ndarray:
+    def residual(self, values: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, as the loss counts them."""
         return self._counted(values, sigma)[0]
 
-    def _counted(self, values: np.ndarray, sigma: Arrays) -> Linear:
+    def _counted(self, values: np.ndarray, sigma: np.ndarray) -> Linear:
         """Compute the residuals `[M]` as the loss counts them, and their derivatives by those over `sigma`."""
         residual = self.distances(values, sigma)
         if self.options.loss == "linear":
             return residual, np.ones_like(residual)
         return softened(residual)
 
-    def distances(self, values: np.ndarray, sigma: Arrays) -> np.ndarray:
+    def distances(self, values: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, whatever the loss."""
         return self._scaled(self.shown(values), sigma)
 
-    def _scaled(self, wrenches: Arrays, sigma: Arrays) -> np.ndarray:
+    def _scaled(self, wrenches: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Subtract the measured wrenches and divide by `sigma`; returns all used samples flat."""
-        rows = zip(self._apart(wrenches, sigma), self.used, strict=True)
-        return np.concatenate([each[used].ravel() for each, used in rows])
+        return self._apart(wrenches, sigma)[self.used].ravel()
 
-    def even_sigma(self, noise: np.ndarray) -> Arrays:
-        return [np.broadcast_to(noise, log.wrench.shape) for log in self.logs]
+    def _apart(self, wrenches: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+        """Subtract the measured wrenches and divide by `sigma`, `[T, 3]`."""
+        return (wrenches - self.measured) * (self.channels / sigma)
 
-    def estimate_noise(
-        self, values: np.ndarray, noise: np.ndarray
-    ) -> tuple[np.ndarray, Arrays]:
-        """Estimate the noise of each channel `[3]`, unless it is given, and sigma `[T, 3]` of each log's residuals."""
+    def even_sigma(self, noise: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(noise, self.measured.shape)
+
+    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> Linear:
+        """Estimate the noise of each channel `[3]`, unless it is given, and sigma `[T, 3]` of the residuals."""
+        shown = self.shown(values)
         if self.options.noise is None:
-            both = zip(self.shown(values), self.logs, strict=True)
-            noise = wrench_noise(self.logs, [shown - log.wrench for shown, log in both])
+            noise = wrench_noise(self.logs, self.split_logs(shown - self.measured))
         sigma = self.sigma(values, noise)
         if self.options.loss != "linear":
-            spoiled = [
-                np.abs(each) > SPOILED
-                for each in self._apart(self.shown(values), sigma)
-            ]
-            if sum(each.sum() for each in spoiled) < FEW * self.numbers:
-                sigma = [
-                    np.where(out, np.inf, each)
-                    for out, each in zip(spoiled, sigma, strict=True)
-                ]
+            spoiled = np.abs(self._apart(shown, sigma)) > SPOILED
+            if spoiled.sum() < FEW * self.numbers:
+                sigma = np.where(spoiled, np.inf, sigma)
         return noise, sigma
 
-    def _apart(self, wrenches: Arrays, sigma: Arrays) -> Arrays:
-        """Subtract the measured wrenches and divide by `sigma`, `[T, 3]` of each log."""
-        both = zip(wrenches, self.logs, sigma, strict=True)
-        return [
-            (wrench - log.wrench) * (log.channels / each) for wrench, log, each in both
-        ]
-
-    def sigma(self, values: np.ndarray, noise: np.ndarray) -> Arrays:
-        """Compute the standard deviation `[T, 3]` of each log's residuals from the noise `[3]` and that of the twist.
+    def sigma(self, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """Compute the standard deviation `[T, 3]` of the residuals from the noise `[3]` and that of the twist.
 
         The latter adds, to first order, the change of each sample if the twists before it were all off by the error
         that smoothing left of them.
         """
-        contact, _ = self.split(values)
-        sigma = []
-        for prediction, each, log, twist in zip(
-            self.predictions, self.maps, self.logs, self.twists, strict=True
+        squares = []
+        for prediction, vector, twist in zip(
+            self.predictions, self._vectors(values), self.twists, strict=True
         ):
-            square = np.broadcast_to(noise**2, log.wrench.shape).copy()
-            vector = each.vector(contact)
+            square = np.tile(noise**2, (len(twist.values), 1))
             channels = np.eye(3)[twist.noisy]
             base = prediction.wrenches(vector) if len(channels) else None
             for one in channels:
                 square += (
                     prediction.moved(vector, one * twist.left, one * twist.noise) - base
                 ) ** 2
-            sigma.append(np.sqrt(square))
-        return sigma
+            squares.append(square)
+        return np.sqrt(np.concatenate(squares))
 
     def twist_residuals(
-        self, values: np.ndarray, sigma: Arrays, draws: int
+        self, values: np.ndarray, sigma: np.ndarray, draws: int
     ) -> np.ndarray | None:
         """Compute the changes `[draws, M]` of the residuals over `sigma` for drawn errors of the twists.
 
         The draws are always the same ones. Returns None if no twist has noise.
         """
-        noisy = [twist.noisy for twist in self.twists]
-        if not np.any(noisy):
+        if not any(twist.noisy.any() for twist in self.twists):
             return None
         random = np.random.default_rng(0)
-        base = self.shown(values)
         result = []
-        both = [*zip(self.twists, noisy, self.logs, strict=True)]
         for _ in range(draws):
             drawn = [
-                twist.values + np.where(on, twist.error(random), 0.0)
-                for twist, on, _ in both
+                twist.values + np.where(twist.noisy, twist.error(random), 0.0)
+                for twist in self.twists
             ]
-            logs = [redrawn(log, twist.noise * on, random) for twist, on, log in both]
+            logs = [
+                redrawn(log, twist.noise * twist.noisy, random)
+                for log, twist in zip(self.logs, self.twists, strict=True)
+            ]
             shown = self._wrenches(values, self._predictions(self.steps, drawn, logs))
-            change = [
-                new - old + log.wrench
-                for new, old, log in zip(shown, base, self.logs, strict=True)
-            ]
+            change = shown - self.shown(values) + self.measured
             result.append(self._scaled(change, sigma))
         return np.array(result)
 
-    def coefficients(self, values: np.ndarray) -> Arrays:
-        """Compute friction over load [-], `[T]` of each log; NaN without load."""
-        contact, _ = self.split(values)
+    def coefficients(self, values: np.ndarray) -> np.ndarray:
+        """Compute friction over load [-], `[T]`; NaN without load."""
         result = []
-        for log, each in zip(self.logs, self.maps, strict=True):
-            radius = each.vector(contact)[RADIUS]
-            size = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
+        for log, vector in zip(self.logs, self._vectors(values), strict=True):
+            size = np.linalg.norm(log.wrench / [1.0, 1.0, vector[RADIUS]], axis=1)
             load = np.where(log.normal_force > 0.0, log.normal_force, np.nan)
             result.append(size / load)
-        return result
+        return np.concatenate(result)
 
-    def sliding(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Compute the sliding speed `|V_S|` and its part from spin [m/s], `[T]` each, of each log."""
-        contact, _ = self.split(values)
-        result = []
-        for twist, each in zip(self.twists, self.maps, strict=True):
-            vector = each.vector(contact)
-            scaled = twist.values @ scaling(vector[CENTRE], vector[RADIUS]).T
-            result.append((np.linalg.norm(scaled, axis=1), np.abs(scaled[:, 2])))
-        return result
+    def sliding(self, values: np.ndarray) -> Linear:
+        """Compute the sliding speeds `|V_S|` and their parts from spin [m/s], `[T]` each."""
+        scaled = np.concatenate(
+            [
+                twist.values @ scaling(vector[CENTRE], vector[RADIUS]).T
+                for twist, vector in zip(
+                    self.twists, self._vectors(values), strict=True
+                )
+            ]
+        )
+        return np.linalg.norm(scaled, axis=1), np.abs(scaled[:, 2])

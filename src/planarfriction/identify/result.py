@@ -176,8 +176,11 @@ class Identification(ByValue):
             )
             reasons = [each.reason for each in self.verdicts if each.parameter == name]
             if reasons:
-                text = f"{name}: {'; '.join(reasons)}"
-                remarks.append(textwrap.fill(text, WIDTH, subsequent_indent="  "))
+                remarks.append(
+                    textwrap.fill(
+                        f"{name}: {'; '.join(reasons)}", WIDTH, subsequent_indent="  "
+                    )
+                )
         if self.scores:
             samples = f"{self.samples[0]:,} samples, {len(self.names)} parameters"
             chi2 = _digits(self.scores[0].reduced_chi2, 4)

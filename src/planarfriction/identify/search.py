@@ -167,7 +167,7 @@ def _best(
     coordinates: Coordinates,
     points: Arrays,
     noise: np.ndarray,
-    sigma: Arrays,
+    sigma: np.ndarray,
     change: float,
 ) -> Fit:
     """Minimise the sum of squares from coordinates `[F + K]` until the cost changes by less than `change`.
@@ -255,12 +255,12 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
     """Return the values at all points of the grid; a parameter that is not estimated or is given has one value."""
     base = problem.start_values()
     law = problem.law
-    speeds = [each[0] for each in problem.sliding(base)]
+    speeds = problem.sliding(base)[0]
     mu_c, mu_s = _friction(problem, speeds)
     wanted = [name for name in problem.names if name not in given]
     interval = min(log.interval for log in problem.logs)
     grid = itertools.product(
-        _speeds(np.concatenate(speeds)) if "v_s" in wanted else [law.v_s],
+        _speeds(speeds) if "v_s" in wanted else [law.v_s],
         _stiffnesses(problem, speeds, mu_c) if "sigma_0" in wanted else [law.sigma_0],
     )
     results = []
@@ -272,19 +272,19 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
             "gamma": 1.5,
             "sigma_0": sigma_0,
             "sigma_1": 0.3 * sigma_0 * interval,
-            "sigma_2": 0.02 * mu_c / max(np.max(speeds[0]), 1e-9),
+            "sigma_2": 0.02 * mu_c / max(problem.split_logs(speeds)[0].max(), 1e-9),
         }
         picked = {name: guess[name] for name in wanted if name in guess}
         results.append(np.array([*(problem.by_name(base) | picked).values()]))
     return results
 
 
-def _friction(problem: LogProblem, speeds: Arrays) -> tuple[float, float]:
+def _friction(problem: LogProblem, speeds: np.ndarray) -> tuple[float, float]:
     """Estimate the friction coefficients of fast sliding and of the largest friction."""
-    coefficient = np.concatenate(problem.coefficients(problem.start_values()))
+    coefficient = problem.coefficients(problem.start_values())
     usable = np.isfinite(coefficient)
     coefficient = coefficient[usable]
-    speed = np.concatenate(speeds)[usable]
+    speed = speeds[usable]
     fast = coefficient[speed >= np.quantile(speed, 0.7)]
     mu_c = np.clip(np.median(fast), 0.01, 10.0)
     return mu_c, np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c)
@@ -299,11 +299,9 @@ def _speeds(speeds: np.ndarray) -> np.ndarray:
     return np.geomspace(max(low, 1e-3 * high), high, SPEEDS)
 
 
-def _stiffnesses(problem: LogProblem, speeds: Arrays, mu_c: float) -> np.ndarray:
+def _stiffnesses(problem: LogProblem, speeds: np.ndarray, mu_c: float) -> np.ndarray:
     """Return stiffnesses to try [1/m]: full deflection after a tenth of a usual step up to a tenth of all travel."""
-    steps = np.concatenate(
-        [s * log.durations for s, log in zip(speeds, problem.logs, strict=True)]
-    )
+    steps = speeds * np.concatenate([log.durations for log in problem.logs])
     moving = steps[steps > 0.0]
     if not len(moving):
         return np.array([LuGre.sigma_0])

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.identify.logs import Arrays
 from planarfriction.identify.parameters import ALL, LAW, PRIOR, Coordinates, fitted_law
 from planarfriction.identify.sensor_errors import TINY
 
@@ -70,8 +69,8 @@ class Fit(NamedTuple):
     """Mask of the coordinates that lie on a bound, `[F + K]`."""
     noise: np.ndarray
     """Noise of each channel, `[3]`, or of the channels of each slide, `[S, 3]`."""
-    sigma: Arrays
-    """Standard deviation of each residual, `[T, 3]` of each log or slide."""
+    sigma: np.ndarray
+    """Standard deviation of each residual, `[T, 3]` of all logs or slides one after the other."""
     starts: tuple[int, int]
     """Number of starting points that led to this minimum, and number of all."""
     cost: float
@@ -135,8 +134,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
     low = fit.coordinates.bounds()[0] == 0.0
     free = ~fit.at_bound | (low & (fit.values <= 1e-9 + fit.coordinates.scale * 1e-9))
     reduced_chi2, neighbours = _left(fit, residual)
-    used = zip(problem.logs, problem.used, strict=True)
-    measured = sum(int(log.channels.sum()) * len(log.time[rows]) for log, rows in used)
+    measured = problem.channels[problem.used].sum()
     inverse = covariance_of(fit, np.concatenate([jacobian, pull]), free)
     plain = inverse * max(reduced_chi2, 1.0)
     bread = finite(inverse)
@@ -171,7 +169,7 @@ def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, ...]:
     if not np.isfinite(bread).all():
         return bread, np.zeros_like(votes), jacobian
     moved = votes @ bread
-    if sum(bool(np.isfinite(each).all()) for each in fit.sigma) < 2:
+    if np.isfinite(fit.noise).all(axis=-1).sum() < 2:
         return bread, moved, jacobian
     return moved.T @ moved * len(votes) / (len(votes) - 1), moved, jacobian
 
@@ -197,16 +195,14 @@ def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
 
 def _left(fit: Fit, residual: np.ndarray) -> tuple[float, float]:
     """Compute the mean square of the scaled residuals, and their correlation one sample apart."""
-    both = zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True)
-    rows = [each[:, log.channels, 0] for each, log in both]
-    every = np.concatenate([each.ravel() for each in rows])
+    problem = fit.problem
+    rows = list(problem.by_log(residual[:, None]))
     now = np.concatenate([each[1:].ravel() for each in rows])
     before = np.concatenate([each[:-1].ravel() for each in rows])
     pairs = 0.5 * (now @ now + before @ before)
-    return (
-        float(every @ every / max(len(every), 1)),
-        float(now @ before / pairs) if pairs > 0.0 else 0.0,
-    )
+    measured = max(problem.channels[problem.used].sum(), 1)
+    correlation = now @ before / pairs if pairs > 0.0 else 0.0
+    return float(residual @ residual / measured), float(correlation)
 
 
 def _over_time(
@@ -238,15 +234,11 @@ def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarra
     Noise leaves residuals `r` of covariance `I - H` in a fold of M, and `e = (I - H)^-1 r` if it is held out, so that
     `r' e/M` is 1 in the mean: also if little but this fold shows a parameter, and `e` is large.
     """
-    folds = []
-    channels = []
-    both = zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True)
-    for rows, log in both:
-        place = np.arange(len(rows)) * BLOCKS // len(rows) % FOLDS
-        folds.append(np.repeat(place, 3))
-        channels.append(np.tile(log.channels, len(rows)))
-    fold = np.concatenate(folds)
-    seen = np.concatenate(channels)
+    problem = fit.problem
+    counts = [len(each) for each in problem.by_log(residual[:, None])]
+    places = [np.arange(count) * BLOCKS // count % FOLDS for count in counts]
+    fold = np.repeat(np.concatenate(places), 3)
+    seen = problem.channels[problem.used].ravel()
     rows, size = _of_unit_columns(np.concatenate([jacobian, pull]))
     slopes = rows[: len(jacobian)]
     whole = rows.T @ rows + RIDGE * np.eye(len(size))

@@ -14,7 +14,7 @@ import numpy as np
 
 from planarfriction._support.described import described
 from planarfriction.identify.decimation import samples_of
-from planarfriction.identify.logs import TWO_LOADS, Arrays, Log
+from planarfriction.identify.logs import TWO_LOADS, Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.problem import SPOILED
 from planarfriction.identify.sensor_errors import CHANNELS
@@ -171,8 +171,8 @@ class Candidate(NamedTuple):
             problem.by_name(self.fit.values),
         )
 
-    def cost(self, sigma: Arrays) -> float:
-        """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""
+    def cost(self, sigma: np.ndarray) -> float:
+        """Compute half the sum of the squared residuals over `sigma` `[T, 3]`, and of the pulls."""
         fit = self.fit
         pull = fit.coordinates.prior(fit.x)[0]
         return 0.5 * (
@@ -391,8 +391,11 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
             "cannot be distinguished from 0, so the corner frequency of the bristles may be above all samples"
         )
     if kind.low == 0.0 and value < half:
-        text = f"cannot be distinguished from 0, at most {value + half:.3g} {kind.unit}"
-        return Verdict(name, True, text)
+        return Verdict(
+            name,
+            True,
+            f"cannot be distinguished from 0, at most {value + half:.3g} {kind.unit}",
+        )
     other, correlation = _partner(evidence, i)
     if not other:
         return None

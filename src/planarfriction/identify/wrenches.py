@@ -227,8 +227,9 @@ def _models_to_fit(
     if patch.depends_on_load or any(name in SOFT_FINGER for name in names):
         able = (LEAD,)
     if model not in ("auto", *able):
-        rule = f"be {LEAD!r} if the patch changes with the load"
-        raise InvalidValueError("model", rule, model)
+        raise InvalidValueError(
+            "model", f"be {LEAD!r} if the patch changes with the load", model
+        )
     return able if model == "auto" else (model,)
 
 
@@ -247,8 +248,9 @@ def _start_laws(
     if type(start) is LuGre:
         return [start], None
     if not isinstance(start, Mapping | None):
-        rule = "be a LuGre law or a table of its parameters"
-        raise InvalidValueError("start", rule, start)
+        raise InvalidValueError(
+            "start", "be a LuGre law or a table of its parameters", start
+        )
     given = dict(start or {})
     for name, value in given.items():
         validation.choice("start", name, LAW)
@@ -325,10 +327,9 @@ def _evidence(
         0.5 * (problem.residual(each, fit.sigma) ** 2).sum()
         for each in (fit.values, still)
     )
-    speeds, spins = np.concatenate(problem.sliding(values), axis=1)
+    speeds, spins = problem.sliding(values)
     spoiled = (np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()
-    for sigma, log in zip(fit.sigma, problem.logs, strict=True):
-        spoiled += np.isinf(sigma[:, log.channels]).sum()
+    spoiled += np.isinf(fit.sigma[problem.channels]).sum()
     return Evidence(
         names=problem.names,
         values=values,
@@ -341,7 +342,7 @@ def _evidence(
         held_mu_c=problem.law.numbers.mu_c,
         loads=np.array([mean_load(log) for log in problem.logs]),
         load_ratio=load_ratio(problem.logs),
-        measured=np.any([log.channels for log in problem.logs], axis=0),
+        measured=problem.channels.any(axis=0),
         spoiled=int(spoiled),
         robust=problem.options.loss != "linear",
         without_slip=sticks - slips,
@@ -356,34 +357,24 @@ def _histories(best: Candidate) -> list[dict[str, Any]]:
     fit = best.fit
     problem = fit.problem
     values, _ = problem.split(fit.values)
-    each = zip(
-        problem.logs,
-        problem.used,
-        fit.sigma,
-        problem.by_log(best.uncertainty.unseen[:, None]),
-        problem.shown(fit.values),
-        problem.sliding(values),
-        problem.coefficients(values),
-        strict=True,
-    )
-    histories = []
-    for log, used, sigma, rows, shown, (speed, _), coefficient in each:
-        held_out = np.full_like(log.wrench, np.nan)
-        known_noise = np.where(log.channels & np.isfinite(sigma), sigma, np.nan)
-        held_out[used] = log.wrench[used] + rows[:, :, 0] * known_noise[used]
-        histories.append(
-            {
-                "name": log.name,
-                "time": log.time,
-                "measured": np.where(log.channels, log.wrench, np.nan),
-                "predicted": shown,
-                "twist": log.twist,
-                "speed": speed,
-                "held_out": held_out,
-                "coefficient": coefficient,
-            }
-        )
-    return histories
+    known = problem.channels & np.isfinite(fit.sigma)
+    unseen = best.uncertainty.unseen.reshape(-1, 3)
+    held_out = np.full_like(problem.measured, np.nan)
+    held_out[problem.used] = unseen
+    held_out = problem.measured + held_out * np.where(known, fit.sigma, np.nan)
+    columns = {
+        "measured": np.where(problem.channels, problem.measured, np.nan),
+        "predicted": problem.shown(fit.values),
+        "speed": problem.sliding(values)[0],
+        "held_out": held_out,
+        "coefficient": problem.coefficients(values),
+    }
+    rows = zip(*map(problem.split_logs, columns.values()), strict=True)
+    return [
+        {"name": log.name, "time": log.time, "twist": log.twist}
+        | dict(zip(columns, row, strict=True))
+        for log, row in zip(problem.logs, rows, strict=True)
+    ]
 
 
 def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:

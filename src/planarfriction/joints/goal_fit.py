@@ -207,13 +207,17 @@ def _check_related(
                 f"{error:.2g} rad left of a mean swing of {swing:.2g} rad about its mean"
             )
     if len(missed) > 1 or len(missed) == len(problem.logs):
-        rule = "follow from goal or voltage: check units, signs, gains, and that all belong to one joint"
         raise InvalidValueError(
-            f"q of {', '.join(missed)}", rule, next(iter(missed.values()))
+            f"q of {', '.join(missed)}",
+            "follow from goal or voltage: check units, signs, gains, and that all belong to one joint",
+            next(iter(missed.values())),
         )
     for name, found in missed.items():
-        text = f"{name}: {found}: this log contradicts the others; check its gains and units, or leave it out"
-        yield Verdict("fit", False, text)
+        yield Verdict(
+            "fit",
+            False,
+            f"{name}: {found}: this log contradicts the others; check its gains and units, or leave it out",
+        )
 
 
 def fit_goals(

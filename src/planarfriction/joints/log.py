@@ -358,22 +358,20 @@ def _check_sensors(log: JointLog) -> None:
     first, last = _longest_run(log.torque)
     seconds = log.time[last] - log.time[first]
     if seconds > FROZEN and np.ptp(log.q[first : last + 1]) > MOVED * np.ptp(log.q):
-        found = f"{log.torque[first]:.3g} N m for {seconds:.2g} s from t = {log.time[first]:g} s on"
         raise InvalidValueError(
             f"torque of {log.name}",
             "change while the joint moves (a dead sensor?)",
-            found,
+            f"{log.torque[first]:.3g} N m for {seconds:.2g} s from t = {log.time[first]:g} s on",
         )
     first, last = _longest_run(log.q)
     seconds = log.time[last] - log.time[first]
     speed = np.abs(log.speed)
     before = speed[max(first - 5, 0)]
     if first > 5 and seconds > FROZEN and before > SUDDEN * speed.max():
-        found = f"still for {seconds:.2g} s from t = {log.time[first]:g} s on, right after {before:.2g} rad/s"
         raise InvalidValueError(
             f"q of {log.name}",
             "come to rest gradually (a dead sensor, or a stop: cut it out)",
-            found,
+            f"still for {seconds:.2g} s from t = {log.time[first]:g} s on, right after {before:.2g} rad/s",
         )
 
 
@@ -401,11 +399,15 @@ def _check_goal(log: JointLog) -> None:
     if not (wide > 0.0 and narrow > 0.0):
         return
     if max(wide / narrow, narrow / wide) > DEGREES:
-        found = f"{wide:.3g} beside {narrow:.3g} of q: is one of them in degrees?"
-        raise InvalidValueError(f"goal of {log.name}", "swing as q does, in rad", found)
+        raise InvalidValueError(
+            f"goal of {log.name}",
+            "swing as q does, in rad",
+            f"{wide:.3g} beside {narrow:.3g} of q: is one of them in degrees?",
+        )
     correlation = float(np.corrcoef(goal, q)[0, 1])
     if correlation < OPPOSED:
-        found = f"a correlation of {correlation:.2f}: flip the sign of one of them"
         raise InvalidValueError(
-            f"goal of {log.name}", "lead q in its own direction", found
+            f"goal of {log.name}",
+            "lead q in its own direction",
+            f"a correlation of {correlation:.2f}: flip the sign of one of them",
         )

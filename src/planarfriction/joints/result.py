@@ -90,8 +90,11 @@ class JointFit:
         Raises InvalidValueError while a term was asked for that the logs do not show.
         """
         if self.unclear:
-            rule = f"be without {', '.join(self.unclear)}: {'; '.join(self.unclear.values())}"
-            raise InvalidValueError("terms of the fit", rule, ", ".join(self.terms))
+            raise InvalidValueError(
+                "terms of the fit",
+                f"be without {', '.join(self.unclear)}: {'; '.join(self.unclear.values())}",
+                ", ".join(self.terms),
+            )
         return friction_of(self.values)
 
     @property

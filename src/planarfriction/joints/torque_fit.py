@@ -102,9 +102,10 @@ def prepare(logs: Sequence[JointLog]) -> Data:
         if np.ptp(each.angle) >= max(30.0 * each.resolution, 20.0 * each.noise)
     ]
     if not moving:
-        rule = "move: friction of a joint that stands is only known to be at least its torque"
         raise InvalidValueError(
-            f"q of {logs[0].name}", rule, f"a swing of {np.ptp(logs[0].q):.2g} rad"
+            f"q of {logs[0].name}",
+            "move: friction of a joint that stands is only known to be at least its torque",
+            f"a swing of {np.ptp(logs[0].q):.2g} rad",
         )
     step = max(1e-6, *(each.resolution for each in moving))
     bits = np.log2(np.array([360.0, 2.0 * np.pi]) / step)
@@ -129,9 +130,10 @@ def prepare(logs: Sequence[JointLog]) -> Data:
     forth = np.mean(speed > 2.0 * limits.slow)
     back = np.mean(speed < -2.0 * limits.slow)
     if min(forth, back) < MATTERS:
-        rule = "move in both directions: Coulomb friction and an offset of the torque look alike in one"
         raise InvalidValueError(
-            "logs", rule, f"{forth:.0%} of the samples forwards, {back:.0%} backwards"
+            "logs",
+            "move in both directions: Coulomb friction and an offset of the torque look alike in one",
+            f"{forth:.0%} of the samples forwards, {back:.0%} backwards",
         )
     torque = np.concatenate([each.measured(0.0) for each in rows])
     slow = np.sort(np.abs(speed))

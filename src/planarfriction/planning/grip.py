@@ -136,15 +136,19 @@ def plan_grip(
     first = load_on(scene, index, 0.0, np.zeros(2), 0.0)
     at_start = holding_load(first, patch, law.mu_c)
     if at_start == 0.0:
-        rule = "have a load that moves the body"
-        raise InvalidValueError("scene", rule, "no gravity and no force")
+        raise InvalidValueError(
+            "scene", "have a load that moves the body", "no gravity and no force"
+        )
     last = load_on(scene, index, angle or 0.0, slide, scene.t_end)
     at_end = _holding_at(scene, index, last)
     low, high = _bounds(bounds, at_start)
     least = (1.0 + validation.non_negative("margin", margin)) * at_end
     if least > high:
-        rule = f"reach the {least:.3g} N that hold the body at the end"
-        raise InvalidValueError("bounds", rule, [low, high])
+        raise InvalidValueError(
+            "bounds",
+            f"reach the {least:.3g} N that hold the body at the end",
+            [low, high],
+        )
     shares = (1.0, 1.0 - friction, 1.0 + friction) if friction else (1.0,)
     seen = sorted({*shares, 0.99, 1.01})
     grips = Grips(scene, index, seen)
@@ -304,8 +308,9 @@ def _contact_of(scene: Any, name: str | None) -> int:
     """Return the index of the contact whose grip is planned."""
     validation.instance("scene", scene, Scene, "a Scene")
     if scene.start == "sliding":
-        rule = "be 'rest' or 'equilibrium' for a grip plan"
-        raise InvalidValueError("start", rule, scene.start)
+        raise InvalidValueError(
+            "start", "be 'rest' or 'equilibrium' for a grip plan", scene.start
+        )
     names = [each.name for each in scene.contacts]
     unset = {
         "velocity": (scene.velocity, "a body that a grip moves"),
@@ -318,8 +323,9 @@ def _contact_of(scene: Any, name: str | None) -> int:
         if given is not None:
             raise InvalidValueError(what, f"be None for {purpose}", given)
     if name is None and len(names) > 1:
-        rule = f"be given if there are several ({', '.join(names)})"
-        raise InvalidValueError("contact", rule, name)
+        raise InvalidValueError(
+            "contact", f"be given if there are several ({', '.join(names)})", name
+        )
     return 0 if name is None else names.index(validation.choice("contact", name, names))
 
 
@@ -343,8 +349,11 @@ def _holding_at(scene: Scene, contact: int, load: np.ndarray) -> float:
 def _goal(goal: Any) -> tuple[float | None, np.ndarray]:
     """Return the angle of the goal, None for a slide, and the slide, zeros for an angle."""
     if not isinstance(goal, Mapping) or len(goal) != 1:
-        rule = 'be {"angle": radians} or {"slide": (dx, dy)}'
-        raise InvalidValueError("goal", rule, validation.quoted(goal))
+        raise InvalidValueError(
+            "goal",
+            'be {"angle": radians} or {"slide": (dx, dy)}',
+            validation.quoted(goal),
+        )
     validation.keys("goal", goal, [], ["angle", "slide"])
     angle = None
     slide = np.zeros(2)
@@ -365,11 +374,13 @@ def _knots(scene: Scene, knots: Any) -> list[np.ndarray]:
     times = validation.array("knots", knots, (None,))
     increasing = times[:1] == 0.0 and (np.diff(times) > 0.0).all()
     if not (4 <= len(times) <= MOST_KNOTS and increasing):
-        rule = f"be 4 to {MOST_KNOTS} increasing times >= 0"
-        raise InvalidValueError("knots", rule, times.tolist())
+        raise InvalidValueError(
+            "knots", f"be 4 to {MOST_KNOTS} increasing times >= 0", times.tolist()
+        )
     if times[-1] >= scene.t_end:
-        rule = f"end before the scene does, at {scene.t_end:g} s"
-        raise InvalidValueError("knots", rule, times.tolist())
+        raise InvalidValueError(
+            "knots", f"end before the scene does, at {scene.t_end:g} s", times.tolist()
+        )
     return [times]
 
 
@@ -378,6 +389,7 @@ def _bounds(bounds: Any, holding: float) -> tuple[float, float]:
         return 0.02 * holding, 4.0 * holding
     low, high = validation.non_negative_array("bounds", bounds, (2,)).tolist()
     if not low < high:
-        rule = "be the least and the largest normal force"
-        raise InvalidValueError("bounds", rule, [low, high])
+        raise InvalidValueError(
+            "bounds", "be the least and the largest normal force", [low, high]
+        )
     return low, high

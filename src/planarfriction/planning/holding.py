@@ -92,8 +92,11 @@ def holding_load(
             break
         tried, low = _STEP * tried, tried
     else:
-        rule = "be a load that this patch holds at some normal force"
-        raise InvalidValueError("wrench", rule, load.tolist())
+        raise InvalidValueError(
+            "wrench",
+            "be a load that this patch holds at some normal force",
+            load.tolist(),
+        )
     if tried > low:
         from scipy.optimize import brentq
 
@@ -151,8 +154,9 @@ def dynamic_holding_load(
     margin = validation.non_negative("margin", margin)
     law = model.law
     if not law.holds_at_rest:
-        rule = "have a law that holds at rest"
-        raise InvalidValueError("model", rule, type(law).__name__)
+        raise InvalidValueError(
+            "model", "have a law that holds at rest", type(law).__name__
+        )
     fall = validation.number("fall", fall)
     if fall < 1.0 + CLOSE:
         raise InvalidValueError("fall", f"be at least {1.0 + CLOSE:g}", fall)
@@ -185,11 +189,13 @@ def _least_share(slips: Any) -> float:
         share = share * factor
         factor = factor**2
         if share > WIDEST:
-            rule = f"be held within {WIDEST:g} times the holding_load"
-            raise InvalidValueError("wrench", rule, "a slip")
+            raise InvalidValueError(
+                "wrench", f"be held within {WIDEST:g} times the holding_load", "a slip"
+            )
         if share < 1.0 / WIDEST:
-            rule = f"let go below 1/{WIDEST:g} of the holding_load"
-            raise InvalidValueError("model", rule, "no slip")
+            raise InvalidValueError(
+                "model", f"let go below 1/{WIDEST:g} of the holding_load", "no slip"
+            )
     low, high = sorted((share, share * factor))
     while high - low > CLOSE:
         middle = 0.5 * (low + high)

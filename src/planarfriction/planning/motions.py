@@ -93,8 +93,11 @@ class Grips:
         for each in scene.contacts:
             law = each.model.law
             if not (hasattr(law, "mu_c") or hasattr(law, "mu_s")):
-                rule = "have mu_c and mu_s to plan with uncertain friction"
-                raise InvalidValueError("law", rule, type(law).__name__)
+                raise InvalidValueError(
+                    "law",
+                    "have mu_c and mu_s to plan with uncertain friction",
+                    type(law).__name__,
+                )
         self._members = {
             factor: [with_friction(each, factor) for each in scene.contacts]
             for factor in factors

@@ -134,8 +134,9 @@ def plan_push(
     validation.instance("slider", slider, Slider, "a Slider")
     validation.instance("pusher", pusher, Pusher, "a Pusher")
     if pusher.width > 0.0 or pusher.mu == 0.0:
-        rule = "be a point with friction, for a plan"
-        raise InvalidValueError("pusher", rule, pusher)
+        raise InvalidValueError(
+            "pusher", "be a point with friction, for a plan", pusher
+        )
     start = validation.vector("start", start, 3)
     goal = validation.vector("goal", goal, 3)
     margin = validation.number("margin", margin)

@@ -124,8 +124,9 @@ def push(
     validation.instance("slider", slider, Slider, "a Slider")
     validation.instance("pusher", pusher, Pusher, "a Pusher")
     if not isinstance(path, Signal) or path.hold != "linear" or len(path.times) < 2:
-        rule = 'be a Signal of two samples or more with hold="linear"'
-        raise InvalidValueError("path", rule, path)
+        raise InvalidValueError(
+            "path", 'be a Signal of two samples or more with hold="linear"', path
+        )
     of_point = path.columns == 2 and pusher.width == 0.0
     path = as_signal("path", path, 2 if of_point else 3)
     start = validation.vector("start", start, 3)
@@ -223,8 +224,11 @@ def _follow(
         else:
             contact = None
     else:
-        rule = f"change the contact of the pusher at most {MOST_PHASES} times"
-        raise InvalidValueError("path", rule, f"t = {now:g} s")
+        raise InvalidValueError(
+            "path",
+            f"change the contact of the pusher at most {MOST_PHASES} times",
+            f"t = {now:g} s",
+        )
     return poses, modes, places
 
 

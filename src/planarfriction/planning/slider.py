@@ -33,15 +33,19 @@ class Slider(ByValue):
         validation.instance("surface", self.surface, LimitSurface, "a limit surface")
         corners = validation.array("outline", self.outline, (None, 2))
         if len(corners) < 3:
-            found = f"{len(corners)}"
-            raise InvalidValueError("outline", "have at least 3 points", found)
+            raise InvalidValueError(
+                "outline", "have at least 3 points", f"{len(corners)}"
+            )
         edges = (np.roll(corners, -1, axis=0) - corners) @ [1.0, 1.0j]
         turns = np.imag(np.roll(edges, -1) * edges.conj())
         winding = np.angle(np.roll(edges, -1) / np.where(edges, edges, 1.0)).sum()
         convex = (turns > 0.0).all() or (turns < 0.0).all()
         if not convex or abs(winding) > 7.0:
-            rule = "be convex, without three corners on a line"
-            raise InvalidValueError("outline", rule, "another polygon")
+            raise InvalidValueError(
+                "outline",
+                "be convex, without three corners on a line",
+                "another polygon",
+            )
         if turns[0] < 0.0:
             corners = corners[::-1].copy()
         corners.setflags(write=False)
@@ -200,8 +204,11 @@ class Scenery:
         facing = self.slider.inward @ rotation(self.pose(t)[2] - q[2])[:, 0]
         edge = int(facing.argmax())
         if math.acos(min(facing[edge], 1.0)) > _FLUSH:
-            rule = "not wedge the slider between two points of the face"
-            raise InvalidValueError("path", rule, f"t = {t:g} s")
+            raise InvalidValueError(
+                "path",
+                "not wedge the slider between two points of the face",
+                f"t = {t:g} s",
+            )
         return Touch(FACE, edge)
 
     def within(self, contact: Touch, t: float, q: np.ndarray) -> float:

@@ -167,9 +167,10 @@ class Bookkeeper:
         values = np.asarray(example.values)
         shape = (*self.grid.shape, *values.shape)
         if self.grid.size * values.size > MOST_NUMBERS:
-            rule = f"need at most {MOST_NUMBERS} numbers in memory (measure less)"
             raise InvalidValueError(
-                "values", rule, f"{self.grid.size} runs of {values.size}"
+                "values",
+                f"need at most {MOST_NUMBERS} numbers in memory (measure less)",
+                f"{self.grid.size} runs of {values.size}",
             )
         if values.dtype.kind == "U":
             return np.full(shape, "", dtype=object)
@@ -257,12 +258,16 @@ def check_names(grid: ValueGrid, variables: Mapping[str, History]) -> None:
     taken = {*variables, *(dim for each in variables.values() for dim in each.dims)}
     for name in grid.labels:
         if name in taken:
-            rule = "not be that of a variable or of its axis"
-            raise InvalidValueError("name of a swept quantity", rule, name)
+            raise InvalidValueError(
+                "name of a swept quantity",
+                "not be that of a variable or of its axis",
+                name,
+            )
     for name in OWN:
         if name in variables:
-            rule = f"not return anything called {', '.join(OWN)}"
-            raise InvalidValueError("measure", rule, name)
+            raise InvalidValueError(
+                "measure", f"not return anything called {', '.join(OWN)}", name
+            )
 
 
 def difference(found: Mapping[str, History], first: Mapping[str, History]) -> str:

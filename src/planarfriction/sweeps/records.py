@@ -133,8 +133,11 @@ def _variable(name: str, value: Any) -> History:
         dims = tuple(f"{name}_{axis}" for axis in range(values.ndim))
         dims = (f"{name}_index",) if values.ndim == 1 else dims
     if values.dtype.kind not in "biufcU":
-        rule = f"return numbers, texts, or arrays of them, which {name!r} is not"
-        raise InvalidValueError("measure", rule, type(value).__name__)
+        raise InvalidValueError(
+            "measure",
+            f"return numbers, texts, or arrays of them, which {name!r} is not",
+            type(value).__name__,
+        )
     return History(dims, values, attrs)
 
 

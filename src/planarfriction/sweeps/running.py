@@ -149,15 +149,19 @@ def sweep(
         Ctrl-C; carries the dataset so far. Finished runs stay in `out`.
     """
     if executor is not None:
-        words = "a concurrent.futures.Executor, or None"
-        validation.instance("executor", executor, Executor, words)
+        validation.instance(
+            "executor", executor, Executor, "a concurrent.futures.Executor, or None"
+        )
     sweeping = Sweeping(make_scene, values, out, measure, progress)
     if isinstance(executor, ProcessPoolExecutor):
         try:
             pickle.dumps(measure)
         except Exception as error:
-            rule = "be a function that other processes can import, such as one defined in a module"
-            raise InvalidValueError("measure", rule, reason_of(error)) from None
+            raise InvalidValueError(
+                "measure",
+                "be a function that other processes can import, such as one defined in a module",
+                reason_of(error),
+            ) from None
     book = sweeping.book
     try:
         sweeping.go(executor)
@@ -229,8 +233,11 @@ class Sweeping:
                 "out", "be a path of printable characters", ascii(str(out))
             )
         if out is not None and Path(out).suffix == ".zarr":
-            rule = "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))"
-            raise InvalidValueError("out", rule, str(out))
+            raise InvalidValueError(
+                "out",
+                "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))",
+                str(out),
+            )
         self.book = Bookkeeper(grid, measure is None, out)
         self._ended = ""
         self._size = 1
