@@ -204,24 +204,24 @@ def design_experiment(
         so_far = so_far + information.of_logs(before, groups)
     start = information.covariance(so_far)
     pick = [names.index(name) for name in chosen]
-    expected = []
-    gains = []
-    errors = []
+    found = []
     for each in candidates:
         motion = information.expected(each)
-        added = information.of_logs((information.measured(motion),), later)
+        # a torque of 0 throughout would count as not measured
+        measured = dataclasses.replace(motion, wrench=motion.wrench + finite(sigma))
+        added = information.of_logs((measured,), later)
         after = information.covariance(so_far + added)
-        expected.append(motion)
-        gains.append(_entropy(start, pick) - _entropy(after, pick))
-        errors.append(information.errors(after))
-    order = np.argsort(-np.array(gains), kind="stable")
+        gain = _entropy(start, pick) - _entropy(after, pick)
+        found.append((gain, motion, information.errors(after)))
+    found.sort(key=lambda each: -each[0])
+    gains, expected, errors = zip(*found, strict=True)
     return MotionPlan(
         names,
         information.values,
-        tuple(expected[i] for i in order),
-        np.array(gains)[order],
+        expected,
+        np.array(gains),
         information.errors(start),
-        np.array(errors)[order],
+        np.array(errors),
     )
 
 
@@ -299,10 +299,6 @@ class _Information:
         unmeasured = dataclasses.replace(motion, wrench=np.ones_like(motion.twist))
         problem = self.problem([unmeasured], ())
         return dataclasses.replace(motion, wrench=problem.shown(self.values))
-
-    def measured(self, log: Log) -> Log:
-        """Return the log with its noise added to the wrenches: a torque of 0 throughout would count as not measured."""
-        return dataclasses.replace(log, wrench=log.wrench + finite(self.noise))
 
     def of_logs(self, logs: Sequence[Log], groups: Sequence[str]) -> np.ndarray:
         """Compute the information `[F + S, F + S]` of logs, with the disturbances of each log estimated along."""

@@ -165,7 +165,7 @@ def identify_motion(
     noise = FIRST_NOISE / np.array([1.0, 1.0, patch.contact_radius()])
     with interruptible([problem]):
         fit = refine(multistart(problem, [problem.start_values()], noise))
-        return _identification(fit, problem, found)
+        return _identification(fit, found)
 
 
 @dataclass(eq=False)
@@ -267,7 +267,7 @@ class SlideProblem(LeastSquaresProblem):
                     f"slide {i + 1} of {len(self.slides)}, "
                     + ", ".join(f"{v:.4g}" for v in values)
                 )
-            if self._turns > 0:
+            if self._turns:
                 part = slide if self.samples is None else slide.first(self.samples)
                 self.starts[i] = improve_start(
                     model, self.body, part, self.starts[i], noise, self._turns
@@ -290,10 +290,9 @@ class SlideProblem(LeastSquaresProblem):
         return whole[:, 0], whole[:, 1:]
 
 
-def _identification(
-    fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
-) -> Identification:
+def _identification(fit: Fit, left_out: Sequence[Verdict]) -> Identification:
     """Make the result of a fit of slides."""
+    problem = fit.problem
     names = problem.names
     slides = problem.slides
     noise = fit.noise.min(axis=0)
@@ -319,7 +318,7 @@ def _identification(
     if "contact_radius" in names and not evidence.spinning:
         at = names.index("contact_radius")
         found[at] = Verdict("contact_radius", False, "no spin")
-    if (count := int((weighed > 0.0).sum())) < FEW:
+    if (count := np.count_nonzero(weighed)) < FEW:
         found.append(Verdict("fit", False, f"the errors come from only {count} slides"))
     histories = [
         {

@@ -264,9 +264,8 @@ class LogProblem(LeastSquaresProblem):
         if self.options.refine is not None or self.steps >= FINEST:
             return False
         jacobian = self.linearised(values, sigma)[1]
-        residual = self.distances(values, sigma)
         finer = self._predictions(2 * self.steps)
-        twice = self._scaled(self._wrenches(values, finer), sigma)
+        twice = self._wrenches(values, finer)
         count = len(self.names)
         pull = np.eye(len(values))[count:] / self.rig.widths[:, None]
         inverse = covariance(
@@ -274,7 +273,8 @@ class LogProblem(LeastSquaresProblem):
         )
         errors = np.sqrt(np.diag(inverse))[:count]
         sure = errors < KNOWN * np.abs(values[:count])
-        moved = (finite(inverse) @ (jacobian.T @ (twice - residual)))[:count]
+        change = self._scaled(twice - self.shown(values), sigma)
+        moved = (finite(inverse) @ (jacobian.T @ change))[:count]
         most = (np.abs(moved)[sure] / (COARSE * errors[sure])).max(initial=0.0)
         if most <= 1.0:
             return False
@@ -391,15 +391,11 @@ class LogProblem(LeastSquaresProblem):
 
     def distances(self, values: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Compute the residuals over `sigma`, `[M]`, whatever the loss."""
-        return self._scaled(self.shown(values), sigma)
+        return self._scaled(self.shown(values) - self.measured, sigma)
 
-    def _scaled(self, wrenches: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-        """Subtract the measured wrenches and divide by `sigma`; returns all used samples flat."""
-        return self._apart(wrenches, sigma)[self.used].ravel()
-
-    def _apart(self, wrenches: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-        """Subtract the measured wrenches and divide by `sigma`, `[T, 3]`."""
-        return (wrenches - self.measured) * (self.channels / sigma)
+    def _scaled(self, change: np.ndarray, sigma: np.ndarray) -> np.ndarray:
+        """Divide changes `[T, 3]` of the wrenches by `sigma`; returns all used samples flat, `[M]`."""
+        return (change * (self.channels / sigma))[self.used].ravel()
 
     def even_sigma(self, noise: np.ndarray) -> np.ndarray:
         return np.broadcast_to(noise, self.measured.shape)
@@ -411,7 +407,8 @@ class LogProblem(LeastSquaresProblem):
             noise = wrench_noise(self.logs, self.split_logs(shown - self.measured))
         sigma = self.sigma(values, noise)
         if self.options.loss != "linear":
-            spoiled = np.abs(self._apart(shown, sigma)) > SPOILED
+            left = np.where(self.channels, shown - self.measured, 0.0)
+            spoiled = np.abs(left) > SPOILED * sigma
             if spoiled.sum() < FEW * self.numbers:
                 sigma = np.where(spoiled, np.inf, sigma)
         return noise, sigma
@@ -438,13 +435,13 @@ class LogProblem(LeastSquaresProblem):
 
     def twist_residuals(
         self, values: np.ndarray, sigma: np.ndarray, draws: int
-    ) -> np.ndarray | None:
+    ) -> np.ndarray:
         """Compute the changes `[draws, M]` of the residuals over `sigma` for drawn errors of the twists.
 
-        The draws are always the same ones. Returns None if no twist has noise.
+        The draws are always the same ones. Returns one row of zeros if no twist has noise.
         """
         if not any(twist.noisy.any() for twist in self.twists):
-            return None
+            return np.zeros((1, 3 * self.used.sum()))
         random = np.random.default_rng(0)
         result = []
         for _ in range(draws):
@@ -457,8 +454,7 @@ class LogProblem(LeastSquaresProblem):
                 for log, twist in zip(self.logs, self.twists, strict=True)
             ]
             shown = self._wrenches(values, self._predictions(self.steps, drawn, logs))
-            change = shown - self.shown(values) + self.measured
-            result.append(self._scaled(change, sigma))
+            result.append(self._scaled(shown - self.shown(values), sigma))
         return np.array(result)
 
     def coefficients(self, values: np.ndarray) -> np.ndarray:

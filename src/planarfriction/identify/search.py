@@ -229,14 +229,9 @@ def condensed(residual: np.ndarray, jacobian: np.ndarray) -> Linear:
 
 
 def guess_starts(
-    problem: LogProblem,
-    given: dict[str, float] | None,
-    *,
-    starts: int,
-    seed: int,
-    noise: np.ndarray,
+    problem: LogProblem, given: dict[str, float] | None, noise: np.ndarray
 ) -> Arrays:
-    """Return `starts` vectors of values `[F]`, the best first.
+    """Return as many vectors of values `[F]` as the options of the problem ask for, the best first.
 
     A whole law as start (`given` is None) leads, scattered copies follow. Otherwise the best points of a grid over
     Stribeck speed and stiffness are taken, with the values `given` by name.
@@ -245,10 +240,14 @@ def guess_starts(
     if given is not None:
         grid = _grid(problem, given)
         ranked = sorted(grid, key=lambda values: misfit(problem, values, noise))
-    random = np.random.default_rng(seed)
-    more = range(starts - len(ranked))
-    scattered = [_scattered(ranked[0], problem.names, random) for _ in more]
-    return ranked[:starts] + scattered
+    starts = problem.options.starts
+    random = np.random.default_rng(problem.options.seed)
+    more = max(starts - len(ranked), 0), len(problem.names)
+    positive = [
+        ALL[name].logarithmic or name.startswith("sigma") for name in problem.names
+    ]
+    factors = np.exp(SCATTER * random.standard_normal(more) * positive)
+    return [*ranked[:starts], *(ranked[0] * factors)]
 
 
 def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
@@ -313,14 +312,6 @@ def _stiffnesses(problem: LogProblem, speeds: np.ndarray, mu_c: float) -> np.nda
 def misfit(problem: LogProblem, values: np.ndarray, noise: np.ndarray) -> float:
     """Compute the sum of the squared residuals of values `[F]` or `[F + K]` over the noise `[3]`."""
     return (problem.residual(values, problem.even_sigma(noise)) ** 2).sum()
-
-
-def _scattered(
-    values: np.ndarray, names: Sequence[str], random: np.random.Generator
-) -> np.ndarray:
-    factor = np.exp(SCATTER * random.standard_normal(len(values)))
-    positive = [ALL[name].logarithmic or name.startswith("sigma") for name in names]
-    return np.where(positive, values * factor, values)
 
 
 REACH = 2.0

@@ -75,11 +75,10 @@ class Slide(ByValue):
         time = increasing(self.time, f"time of {self.name}", 5)
         pose = validation.array("pose", self.pose, (len(time), 3))
         pose[:, 2], turns = unwrapped(time, pose[:, 2], f"theta of {self.name}")
-        twist = (
-            parabola(time, pose)
-            if self.twist is None
-            else validation.vector("twist", self.twist, 3)
-        )
+        # the slope of a parabola through the first poses
+        twist = polynomial.polyfit(time[:WINDOW] - time[0], pose[:WINDOW], 2)[1]
+        if self.twist is not None:
+            twist = validation.vector("twist", self.twist, 3)
         self._set(time=time - time[0], pose=pose, twist=twist, turns=turns)
         for value in (self.time, self.pose, twist):
             value.setflags(write=False)
@@ -106,12 +105,6 @@ class MassProperties(Checked):
     """Moment of inertia about the vertical through the centre of mass [kg m^2]."""
     gravity: float = checked(validation.positive, default=9.81)
     """Acceleration of gravity [m/s^2]."""
-
-
-def parabola(time: np.ndarray, pose: np.ndarray, samples: int = 8) -> np.ndarray:
-    """Estimate the velocity `[3]` at the first sample: the slope of a parabola through the first poses."""
-    count = min(samples, len(time))
-    return polynomial.polyfit(time[:count] - time[0], pose[:count], 2)[1]
 
 
 def slide_poses(

@@ -142,7 +142,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
     # no variance over an infinite one: a factor of 1
     factor = np.sqrt(np.maximum(correlated / np.diag(plain), 1.0))
     moved = problem.twist_residuals(fit.values, fit.sigma, DRAWS)
-    shifts = np.zeros((1, len(bread))) if moved is None else moved @ jacobian @ bread
+    shifts = moved @ jacobian @ bread
     whole = plain * np.outer(factor, factor) + shifts.T @ shifts / len(shifts)
     return Uncertainty(
         whole * ALLOWANCE**2,

@@ -189,13 +189,7 @@ def identify_lugre(
                 problems.append(problem)
                 if not leads:
                     problem.report("looking for starts")
-                    guesses = guess_starts(
-                        problem,
-                        given,
-                        starts=options.starts,
-                        seed=options.seed,
-                        noise=noise,
-                    )
+                    guesses = guess_starts(problem, given, noise)
                     fit = multistart(problem, guesses, noise)
                     values = problem.by_name(fit.values).items()
                     first = ", ".join(f"{key} {value:.3g}" for key, value in values)
