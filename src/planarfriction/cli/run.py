@@ -33,30 +33,21 @@ def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
     ends = {name: [_last(each, name) for each in every] for name in ("x", "y", "theta")}
     length = unit_for("length", ends["x"], ends["y"])
     angle = unit_for("angle", ends["theta"])
+    units = {"x": length, "y": length, "angle": angle}
     rows = [
         [
             f"final {called} [{unit.label}]",
             *(f"{unit.factor * end:.5g}" for end in each),
         ]
-        for (called, unit), each in zip(
-            (("x", length), ("y", length), ("angle", angle)), ends.values(), strict=True
-        )
+        for (called, unit), each in zip(units.items(), ends.values(), strict=True)
     ]
     if len(every) > 1:
-        ways, angles = zip(
-            *(largest_differences(each, every[0]) for each in every[1:]), strict=True
-        )
+        off = [largest_differences(each, every[0]) for each in every[1:]]
+        ways = (f"{1e3 * way:.4g}" for way, _ in off)
+        angles = (f"{np.degrees(angle):.4g}" for _, angle in off)
         rows += [
-            [
-                "largest difference, position [mm]",
-                "",
-                *(f"{1e3 * d:.4g}" for d in ways),
-            ],
-            [
-                "largest difference, angle [deg]",
-                "",
-                *(f"{np.degrees(d):.4g}" for d in angles),
-            ],
+            ["largest difference, position [mm]", "", *ways],
+            ["largest difference, angle [deg]", "", *angles],
         ]
     statistics = [each.statistics for each in every]
     rows += [

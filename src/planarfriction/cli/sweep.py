@@ -142,24 +142,25 @@ def _show(data: xr.Dataset, out: Path) -> None:
     if data.status.size > MOST_ROWS:
         import numpy as np
 
-        known = {name: each[np.isfinite(each)] for name, each in columns.items()}
-        ranges = {
-            name: np.quantile(each, [0.0, 0.5, 1.0])
-            for name, each in known.items()
-            if each.size
-        }
-        rows = [
-            [name, *(f"{value:.3g}" for value in each)] for name, each in ranges.items()
-        ]
+        rows = []
+        for name, each in columns.items():
+            known = each[np.isfinite(each)]
+            if known.size:
+                ranges = np.quantile(known, [0.0, 0.5, 1.0])
+                rows.append([name, *(f"{value:.3g}" for value in ranges)])
         print_table(title, ["", "smallest", "median", "largest"], rows)
         return
     labels = itertools.product(*(data[name].values.tolist() for name in swept))
-    values = zip(
-        *([f"{value:.3g}" for value in each.tolist()] for each in columns.values()),
-        strict=True,
-    )
-    rows = [[*(f"{each:.4g}" if isinstance(each, float) else str(each) for each in label), *row]
-            for label, row in zip(labels, values, strict=True)]  # fmt: skip
+    rows = [
+        [
+            *(
+                f"{each:.4g}" if isinstance(each, float) else str(each)
+                for each in label
+            ),
+            *(f"{each[i]:.3g}" for each in columns.values()),
+        ]
+        for i, label in enumerate(labels)
+    ]
     print_table(title, [*map(str, swept), *columns], rows)
 
 

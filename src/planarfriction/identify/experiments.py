@@ -252,27 +252,22 @@ def current_estimate(
     return patch, fitted_law(law, given)
 
 
+@dataclass(eq=False)
 class _Information:
     """Information of logs on the coordinates `[F]` of the contact and the disturbances `[S]` that all logs share."""
 
-    def __init__(
-        self,
-        patch: ContactPatch,
-        law: LuGre,
-        names: tuple[str, ...],
-        groups: tuple[str, ...],
-        noise: np.ndarray,
-    ) -> None:
-        self.patch = patch
-        self.law = law
-        self.names = names
-        self.groups = groups
-        self.noise = noise
+    patch: ContactPatch
+    law: LuGre
+    names: tuple[str, ...]
+    groups: tuple[str, ...]
+    noise: np.ndarray
+
+    def __post_init__(self) -> None:
         ones = np.ones((10, 3))
         probe = Log(np.linspace(0.0, 1.0, 10), ones, ones, 1.0)
-        self._probe = self.problem([probe], groups)
+        self._probe = self.problem([probe], self.groups)
         self.values = self._probe.start_values()
-        coordinates = Coordinates(names, self.values, law.mu_c)
+        coordinates = Coordinates(self.names, self.values, self.law.mu_c)
         self._scale = coordinates.scale
         self._slopes = coordinates.slopes(coordinates.of(self.values))
 

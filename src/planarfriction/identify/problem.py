@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -141,28 +142,24 @@ class LeastSquaresProblem:
             yield each.reshape(-1, 3, rows.shape[1])
 
 
+@dataclass(eq=False)
 class LogProblem(LeastSquaresProblem):
     """Logs of twist and wrench, a model, and the rig that measured them."""
 
-    def __init__(
-        self,
-        logs: Sequence[Log],
-        patch: ContactPatch,
-        names: tuple[str, ...],
-        law: LuGre,
-        options: FitOptions,
-        model: str = "reduced-published",
-        progress: Callable[[str], Any] | None = None,
-    ) -> None:
-        self.logs = logs
-        self.patch = patch
-        self.names = names
-        self.law = law
-        self.options = options
-        self.model = model
-        self.progress = progress
-        self.kind = SIMULATORS[model]
-        self.fingers = [name for name in names if name in SOFT_FINGER]
+    logs: Sequence[Log]
+    patch: ContactPatch
+    names: tuple[str, ...]
+    law: LuGre
+    options: FitOptions
+    model: str = "reduced-published"
+    progress: Callable[[str], Any] | None = None
+
+    def __post_init__(self) -> None:
+        logs = self.logs
+        patch = self.patch
+        options = self.options
+        self.kind = SIMULATORS[self.model]
+        self.fingers = [name for name in self.names if name in SOFT_FINGER]
         loads = [mean_load(log) for log in logs]
         check_loads(logs, loads, patch, self.fingers)
         self.reference_load = float(np.median(loads))
@@ -181,7 +178,7 @@ class LogProblem(LeastSquaresProblem):
         self.used = np.concatenate(used)
         self.measured = np.concatenate([log.wrench for log in logs])
         self.channels = np.array([log.channels for log in logs])[self._log]
-        own = self._per_load if self.kind.own_radius else law
+        own = self._per_load if self.kind.own_radius else self.law
         self.simulator = self.kind(self.fixed_patch, own, options.surface)
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)

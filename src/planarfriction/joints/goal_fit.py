@@ -33,9 +33,6 @@ UNRELATED = 0.7
 """Mean error over the mean deviation of the angle from its mean from which on a run has nothing to do with the log:
 beside one log that contradicts them, the runs of the others miss by up to 0.5."""
 
-BEST = 2
-"""Number of starts of a term that are followed to the end."""
-
 
 @dataclass(frozen=True)
 class Trial:
@@ -140,16 +137,9 @@ def with_term(
     """Return a problem with one term more than that of `values`, and its best values from the best of its starts."""
     problem = problem.with_terms([*problem.terms, term])
     starts = [{**values, **guess} for guess in problem.guesses(term, values)]
-    ranked = [
-        starts[0],
-        *sorted(starts[1:], key=lambda each: problem.costs(each, SHORT).mean())[
-            : BEST - 1
-        ],
-    ]
-    return problem, min(
-        (minimise(problem, each) for each in ranked),
-        key=lambda each: problem.costs(each).mean(),
-    )
+    best = min(starts[1:], key=lambda each: problem.costs(each, SHORT).mean())
+    ends = [minimise(problem, each) for each in (starts[0], best)]
+    return problem, min(ends, key=lambda each: problem.costs(each).mean())
 
 
 def attempt(

@@ -163,12 +163,14 @@ def _flush(
     place: TouchPoint,
     mu: float,
     velocity: np.ndarray,
-    held: str = "",
+    held: str,
 ) -> SliderMotion:
     """Compute the motion of a slider under a flush face with the `velocity` `(vx, vy, omega)` at its middle.
 
     The pressure of the face has a resultant that crosses it, at an angle within the friction cone.
     """
+    from scipy.optimize import brentq
+
     x, y = place.at
     h = place.half_width
     angle = math.atan(mu)
@@ -197,19 +199,11 @@ def _flush(
     if held in (LEFT, RIGHT) or (not held and slack < 0.0):
         mode = held or (LEFT if lean > 0.0 else RIGHT)
         left = 1.0 if mode == LEFT else -1.0
-        slip = _slip(lambda u: of(u)[1], left * angle, speed)
+        # the force turns from one side of the normal to the other between slips far to the right and far to the left
+        slip_at = lambda u: speed * u / (1.0 - abs(u))
+        off = lambda u: of(slip_at(u))[1] - left * angle
+        slip = slip_at(brentq(off, -0.999999, 0.999999, xtol=1e-14))
         twist, _, share = of(slip)
         slack = math.inf if angle == 0.0 else left * slip / speed
     leans = int(math.copysign(1.0, share)) if abs(share) > _EDGE else 0
     return SliderMotion(twist, mode, min(slack, 1.0 - abs(share)), leans)
-
-
-def _slip(angle_of: Any, wanted: float, speed: float) -> float:
-    """Return the speed at which a face slides along the slider, to the left, for a force at an angle [m/s]."""
-    from scipy.optimize import brentq
-
-    # from far to the right to far to the left the force turns from one side of the normal to the other
-    slip: Any = lambda x: speed * x / (1.0 - abs(x))
-    return slip(
-        brentq(lambda x: angle_of(slip(x)) - wanted, -0.999999, 0.999999, xtol=1e-14)
-    )

@@ -168,35 +168,31 @@ def plan_grip(
     return GripPlan(found[0], profile, report, chosen.name, found)
 
 
+@dataclass(eq=False)
 class _ProfileSearch:
-    """The search for the values at some knots, between `low`, `least` for those that hold, and `high` [N]."""
+    """Search for the values at some knots, between `low`, `least` for those that hold, and `high` [N]."""
 
-    def __init__(
-        self,
-        grips: Grips,
-        aim: Aim,
-        factors: Sequence[float],
-        times: np.ndarray,
-        between: tuple,
-        holding: float,
-    ) -> None:
-        low, least, high = between
-        held = times >= SPANS[0] * grips.scene.t_end
+    _grips: Grips
+    _aim: Aim
+    _factors: Sequence[float]
+    _times: np.ndarray
+    _between: tuple[float, float, float]
+    _holding: float
+
+    def __post_init__(self) -> None:
+        low, least, high = self._between
+        count = len(self._times)
+        held = self._times >= SPANS[0] * self._grips.scene.t_end
         held[-1] = True
-        self._grips = grips
-        self._aim = aim
-        self._factors = factors
-        self._times = times
         self._low = np.where(held, least, low)
-        self._highest = np.full(len(times), high * (1.0 + 1e-6))
-        self._first = grips.first
-        # Whoever holds the body at first goes on from there.
+        self._highest = np.full(count, high * (1.0 + 1e-6))
+        self._first = self._grips.first
+        # A grip that holds the body at first goes on from there.
         if self._first is not None:
             self._low[0] = self._first * (1.0 - 1e-6)
             self._highest[0] = self._first * (1.0 + 1e-6)
-        self._holding = holding
-        self._bend = ROUGH / holding * np.diff(np.eye(len(times)), 2, axis=0)
-        self._weights = np.full(len(factors), 1.0 / len(factors))
+        self._bend = ROUGH / self._holding * np.diff(np.eye(count), 2, axis=0)
+        self._weights = np.full(len(self._factors), 1.0 / len(self._factors))
         self._values = np.zeros(0)
         self._reached = 0.0
 

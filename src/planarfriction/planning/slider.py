@@ -88,7 +88,7 @@ class Pusher(Checked):
     width: float = checked(validation.non_negative, default=0.0)
     """Width of the face along the pusher's y axis [m]; 0 is a point."""
 
-    @property
+    @cached_property
     def ends(self) -> np.ndarray:
         """Right and left end of the face, in the pusher's axes `[2, 2]` [m]; for a point that point `[1, 2]`."""
         half = 0.5 * self.width
@@ -118,41 +118,41 @@ class Touch(NamedTuple):
     end: int = 0
 
 
+@dataclass(eq=False)
 class Scenery:
-    """A slider, a pusher and the path of the latter: all the geometry of a push."""
+    """Slider, pusher and the path of the latter: all the geometry of a push."""
 
-    def __init__(
-        self, slider: Slider, pusher: Pusher, times: np.ndarray, poses: np.ndarray
-    ) -> None:
-        self.slider = slider
-        self.pusher = pusher
-        self._times = times
-        self._poses = poses
-        self.path_end = times[-1]
-        self._rates = np.diff(poses, axis=0) / np.diff(times)[:, None]
-        self._ends = pusher.ends
-        self.near = _NEAR * slider.size
-        edges = np.roll(slider.outline, -1, axis=0) - slider.outline
+    slider: Slider
+    pusher: Pusher
+    times: np.ndarray
+    """Times of the corners of the path `[K]` [s]."""
+    poses: np.ndarray
+    """Poses of the pusher there `[K, 3]` [m, m, rad]."""
+
+    def __post_init__(self) -> None:
+        self._rates = np.diff(self.poses, axis=0) / np.diff(self.times)[:, None]
+        self.near = _NEAR * self.slider.size
+        edges = np.roll(self.slider.outline, -1, axis=0) - self.slider.outline
         self._lengths = np.hypot(*edges.T)
 
     def pose(self, t: float) -> np.ndarray:
         """Return the pose of the pusher `[3]`."""
         i = self._piece(t)
-        return self._poses[i] + (t - self._times[i]) * self._rates[i]
+        return self.poses[i] + (t - self.times[i]) * self._rates[i]
 
     def _piece(self, t: float, forward: bool = False) -> int:
         side = "right" if forward else "left"
-        i = int(np.searchsorted(self._times, t, side)) - 1
+        i = int(np.searchsorted(self.times, t, side)) - 1
         return min(max(i, 0), len(self._rates) - 1)
 
     def piece_end(self, t: float) -> float:
         """Return the time at which the line ends that the pusher follows from a time on."""
-        return self._times[self._piece(t, forward=True) + 1]
+        return self.times[self._piece(t, forward=True) + 1]
 
     def end(self, i: int, t: float, q: np.ndarray) -> np.ndarray:
         """Return an end of the pusher in the slider's axes `[2]`."""
         pose = self.pose(t)
-        world = pose[:2] + rotation(pose[2]) @ self._ends[i]
+        world = pose[:2] + rotation(pose[2]) @ self.pusher.ends[i]
         return (world - q[:2]) @ rotation(q[2])
 
     def corners(self, t: float, q: np.ndarray) -> np.ndarray:
@@ -164,7 +164,7 @@ class Scenery:
     def features(self, t: float, q: np.ndarray) -> list[tuple[float, Touch]]:
         """Return everything that may touch, with its distance [m]."""
         found = []
-        for i in range(len(self._ends)):
+        for i in range(len(self.pusher.ends)):
             gaps = self.slider.gaps(self.end(i, t, q))
             edge = int(gaps.argmax())
             found.append((gaps[edge], Touch(END, edge, i)))
@@ -183,7 +183,7 @@ class Scenery:
         """Return a time up to which a free pusher cannot have gone further than it is away from a slider at rest."""
         import shapely
 
-        ends = [self.end(i, t, q) for i in range(len(self._ends))]
+        ends = [self.end(i, t, q) for i in range(len(self.pusher.ends))]
         pusher = shapely.Point(ends[0]) if len(ends) == 1 else shapely.LineString(ends)
         away = shapely.distance(shapely.Polygon(self.slider.outline), pusher)
         away = max(away, _LEAST * self.slider.size)
@@ -289,7 +289,7 @@ def touch_after(
 
     off = lambda at: scenery.gap(at, q) + scenery.near
     before = off(t)
-    while t < scenery.path_end:
+    while t < scenery.times[-1]:
         end = scenery.not_before(t, q)
         after = off(end)
         if after < 0.0 <= before:
