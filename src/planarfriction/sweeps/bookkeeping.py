@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from time import monotonic
@@ -142,67 +143,54 @@ class Bookkeeper:
 
     def _results(self) -> dict[str, Any]:
         """Return the variables of all runs over the grid; a run that differs from the first one has failed."""
-        done = {index: each for index, (_, each) in self.runs.items() if each.variables}
+        done = sorted(index for index, (_, each) in self.runs.items() if each.variables)
         if not done:
             return {}
         time = instants(self._ends) if self.timed else None
-        first = _over(done[min(done)], time)
+        first = _over(self.runs[done[0]][1], time)
         check_names(self.grid, first)
-        axes = [name for name, each in first.items() if each.dims == (name,)]
-        arrays = {
-            name: self._empty(each, len(done))
-            for name, each in first.items()
-            if name not in axes
+        columns: dict[str, dict[Index, Any]] = {
+            name: {} for name, each in first.items() if each.dims != (name,)
         }
-        for index in sorted(done):
-            self._place(index, _over(done[index], time), first, arrays)
+        for index in done:
+            key, record = self.runs[index]
+            found = _over(record, time)
+            if differing := difference(found, first):
+                record = record._replace(status=FAILED, reason=differing)
+            else:
+                record = record._replace(variables={})  # the columns have them now
+                for name, column in columns.items():
+                    column[index] = found[name].values
+            self.runs[index] = key, record
         variables: dict[str, Any] = {}
-        for name, values in arrays.items():
+        for name, column in columns.items():
             dims = (*self.grid.labels, *first[name].dims)
-            variables[name] = History(dims, values, first[name].attrs)
-        return variables | {name: first[name] for name in axes}
+            variables[name] = History(dims, self._whole(column), first[name].attrs)
+        return {name: variables.get(name, each) for name, each in first.items()}
 
-    def _empty(self, example: History, done: int) -> np.ndarray:
-        """Return an array for all runs, of which some are `done`, whose entries say that they are missing."""
-        values = np.asarray(example.values)
-        shape = (*self.grid.shape, *values.shape)
-        if self.grid.size * values.size > MOST_NUMBERS:
+    def _whole(self, column: Mapping[Index, Any]) -> np.ndarray:
+        """Return an array over the grid from the values of a variable in some runs; the others say that they are missing."""
+        shape = np.shape(next(iter(column.values())))
+        count = math.prod(shape)
+        if self.grid.size * count > MOST_NUMBERS:
             raise InvalidValueError(
                 "values",
                 f"need at most {MOST_NUMBERS} numbers in memory (measure less)",
-                f"{self.grid.size} runs of {values.size}",
+                f"{self.grid.size} runs of {count}",
             )
-        if values.dtype.kind == "U":
-            return np.full(shape, "", dtype=object)
-        if values.dtype.kind in "fc":
-            return np.full(shape, np.nan, values.dtype)
-        return (
-            np.full(shape, np.nan)
-            if done < self.grid.size
-            else np.zeros(shape, values.dtype)
-        )
-
-    def _place(
-        self,
-        index: Index,
-        found: Mapping[str, History],
-        first: Mapping[str, History],
-        arrays: dict[str, np.ndarray],
-    ) -> None:
-        """Write the variables of a run into the arrays, or note that it failed."""
-        key, record = self.runs[index]
-        if differing := difference(found, first):
-            self.runs[index] = key, record._replace(status=FAILED, reason=differing)
-            return
-        for name, array in list(arrays.items()):
-            values = np.asarray(found[name].values)
-            if array.dtype.kind != "O" and not np.can_cast(
-                values.dtype, array.dtype, "same_kind"
-            ):
-                arrays[name] = array = array.astype(np.result_type(array, values))
-            array[index] = values
-        # They are in the arrays now.
-        self.runs[index] = key, record._replace(variables={})
+        kind = np.result_type(*(np.asarray(each) for each in column.values()))
+        missing: Any = np.nan
+        if kind.kind == "U":
+            kind = np.dtype(object)
+            missing = ""
+        elif kind.kind not in "fc" and len(column) < self.grid.size:
+            kind = np.dtype(float)
+        elif kind.kind not in "fc":
+            missing = 0
+        full = np.full((*self.grid.shape, *shape), missing, kind)
+        for index, values in column.items():
+            full[index] = values
+        return full
 
 
 def _name(content: bytes) -> str:
