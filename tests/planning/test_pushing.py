@@ -9,7 +9,7 @@ import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
 from planarfriction.planning.contact_modes import TouchPoint, motion_at
 from planarfriction.planning.push_plans import PushReport
-from planarfriction.planning.slider import (
+from planarfriction.planning.pushing import (
     CORNER,
     END,
     FACE,

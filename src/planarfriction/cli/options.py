@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click import option
 from click.shell_completion import CompletionItem
 
 import planarfriction as pf
@@ -47,10 +48,10 @@ def find_patch(
     if make := makers.get(text.lower()):
         for name in size:
             if name != "width":
-                option = f"--{name.replace('_', '-')}"
-                given = f"{size[name]} for the patch {text}"
                 raise InvalidValueError(
-                    option, "be given only for a pressure map", given
+                    f"--{name.replace('_', '-')}",
+                    "be given only for a pressure map",
+                    f"{size[name]} for the patch {text}",
                 )
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
@@ -112,31 +113,29 @@ class FilePath(click.Path):
 FILE = FilePath()
 
 
+def or_file(words: Mapping[str, Any], incomplete: str) -> list[CompletionItem]:
+    """Return completions by names that begin with the typed text in any case, with their descriptions, and by files."""
+    typed = incomplete.lower()
+    names = [name for name in words if name.lower().startswith(typed)]
+    items = [CompletionItem(name, help=words[name]) for name in names]
+    return [*items, CompletionItem(incomplete, type="file")]
+
+
 def complete_scene(
     context: object, parameter: object, incomplete: str
 ) -> list[CompletionItem]:
     """Return completions of a scene: ready scenes that begin with the typed text, and files."""
-    names = [
-        CompletionItem(name, help=SCENES.words(name))
-        for name in SCENES
-        if name.startswith(incomplete)
-    ]
-    return [*names, CompletionItem(incomplete, type="file")]
+    return or_file({name: SCENES.words(name) for name in SCENES}, incomplete)
 
 
 def complete_patch(
     context: object, parameter: object, incomplete: str
 ) -> list[CompletionItem]:
     """Return completions of a patch: names that begin with the typed text in any case, and files."""
-    names = [
-        CompletionItem(name)
-        for name in patch_names()
-        if name.lower().startswith(incomplete.lower())
-    ]
-    return [*names, CompletionItem(incomplete, type="file")]
+    return or_file(dict.fromkeys(patch_names()), incomplete)
 
 
-cells_option = click.option(
+cells_option = option(
     "--cells",
     type=int,
     help="Number of discs of the reduced model. Default: 24, or the file's.",
@@ -146,7 +145,7 @@ cells_option = click.option(
 
 def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
     """Make the option `--patch`, given to a command as `name`; `default` says what is taken without it."""
-    return click.option(
+    return option(
         "--patch",
         name,
         metavar="PATCH",
@@ -156,39 +155,37 @@ def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
 
 
 _MAP_OPTIONS = (
-    click.option(
-        "--cell-size", type=float, help="Side of a cell of a pressure map in m."
-    ),
-    click.option(
+    option("--cell-size", type=float, help="Side of a cell of a pressure map in m."),
+    option(
         "--width",
         type=float,
         help=f"Width in m of a patch. Default: {WIDTH}, or the scene's or map's.",
     ),
-    click.option(
+    option(
         "--header/--no-header",
         default=None,
         help="First row of a CSV map: names, or pressures.",
     ),
-    click.option(
+    option(
         "--index/--no-index",
         default=None,
         help="First column of a CSV map: labels, or pressures.",
     ),
-    click.option(
+    option(
         "--frame", type=int, help="Frame or page of a map that has several, from 0."
     ),
-    click.option(
+    option(
         "--frame-shape",
         type=(int, int),
         metavar="ROWS COLUMNS",
         help="Shape of frames that are rows.",
     ),
-    click.option(
+    option(
         "--threshold",
         type=float,
         help="Share of the peak up to which cells of a map count as empty.",
     ),
-    click.option(
+    option(
         "--invert/--no-invert",
         default=None,
         help="In an image, dark means pressure, or bright does.",
@@ -217,8 +214,8 @@ def map_options(function: Any) -> Any:
         }
         return function(*arguments, size=size, **options)
 
-    for option in reversed(_MAP_OPTIONS):
-        command = option(command)
+    for add in reversed(_MAP_OPTIONS):
+        command = add(command)
     return command
 
 

@@ -6,7 +6,7 @@ import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
+from click import argument, command, option
 
 from planarfriction.cli.options import (
     FILE,
@@ -29,9 +29,9 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
 """Kinds of quantities, by their SI units."""
 
 
-@click.command(short_help="Simulate a scene for every combination of values.")
-@click.argument("scene", shell_complete=complete_scene)
-@click.option(
+@command(short_help="Simulate a scene for every combination of values.")
+@argument("scene", shell_complete=complete_scene)
+@option(
     "--set",
     "settings",
     metavar="PATH=VALUES",
@@ -39,19 +39,19 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
     required=True,
     help="START:STOP:COUNT, both ends included, or VALUE,VALUE,...; may be repeated.",
 )
-@click.option(
+@option(
     "--model", metavar="NAME", help="Friction model. Default: the file's, or reduced."
 )
 @cells_option
 @patch_option("Default: Circle, or the file's.")
 @map_options
-@click.option("--t-end", type=float, help="Duration of a ready scene in s.")
-@click.option(
+@option("--t-end", type=float, help="Duration of a ready scene in s.")
+@option(
     "--measure",
     metavar="FILE.py:NAME",
     help="Function of a solution that returns what to keep. Default: all.",
 )
-@click.option(
+@option(
     "--out",
     type=FILE,
     default=Path("sweep"),

@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.balance import Refined, predict
-from planarfriction.joints.goal_verdicts import lags
+from planarfriction.joints.goal_fit import lags
 from planarfriction.joints.log import Plant
 from planarfriction.joints.result import JointFit
 from planarfriction.joints.smoothing import DELAYS, smoothed_noise, white_noise

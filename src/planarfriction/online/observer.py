@@ -141,27 +141,43 @@ class FrictionObserver:
             raise InvalidValueError(
                 "model", "have symmetric friction", "a patch with an asymmetry"
             )
-        self.sensors: Any = (
-            Sensors()
-            if sensors is None
-            else validation.instance("sensors", sensors, Sensors, "Sensors")
-        )
+        sensors = Sensors() if sensors is None else sensors
+        self.sensors = validation.instance("sensors", sensors, Sensors, "Sensors")
         self.tolerance = validation.positive("tolerance", tolerance)
-        spreads = {
-            "mu_spread": mu_spread,
-            "ratio_spread": ratio_spread,
-            "radius_spread": radius_spread,
-        }
         prior = np.array(
-            [validation.positive(name, value) for name, value in spreads.items()]
+            [
+                validation.positive("mu_spread", mu_spread),
+                validation.positive("ratio_spread", ratio_spread),
+                validation.positive("radius_spread", radius_spread),
+            ]
         )
         numbers = model.law.numbers
         middle = np.log([numbers.mu_c, numbers.mu_s / numbers.mu_c, 1.0])
-        self._filter = _settings(
-            model,
-            surface,
+        frame = surface._frame()
+        back = np.linalg.inv(frame)
+        quantum = sensors.quantum
+        place = quantum / max(sensors.slip_rate, 1.0)
+        noise = np.abs(back.T) @ (
+            sensors.force_noise,
+            sensors.force_noise,
+            sensors.torque_noise,
+        )
+        self._filter = kernels.Filter(
+            *surface.numbers,
+            _planes(surface),
+            frame,
+            back,
+            -back.T.copy(),
+            surface.contact_radius,
             load,
-            self.sensors,
+            _growth(model.patch, load),
+            numbers.v_s,
+            numbers.gamma,
+            numbers.sigma_2,
+            np.maximum(noise, _LEAST_NOISE) ** 2,
+            quantum,
+            place,
+            np.abs(frame) @ (place, place, place / sensors.base) / math.sqrt(12.0),
             validation.positive("model_error", model_error),
             validation.non_negative("drift", drift),
             validation.positive("saturation", saturation),
@@ -240,46 +256,6 @@ def estimate_of(found: np.ndarray) -> Estimate:
     """Return the estimate in records of the compiled filter."""
     return Estimate._make(found[name] for name in Estimate._fields)._replace(
         determined=found["determined"] > 0
-    )
-
-
-def _settings(
-    model: FrictionModel,
-    surface: LimitSurface,
-    load: float,
-    sensors: Sensors,
-    *rest: Any,
-) -> Any:
-    """Return what the filter reads and never changes; `rest` are its last fields."""
-    kind, size, data = surface.numbers
-    frame = surface._frame()
-    numbers = model.law.numbers
-    back = np.linalg.inv(frame)
-    place = sensors.quantum / max(sensors.slip_rate, 1.0)
-    noise = np.abs(back.T) @ (
-        sensors.force_noise,
-        sensors.force_noise,
-        sensors.torque_noise,
-    )
-    return kernels.Filter(
-        kind,
-        size,
-        data,
-        _planes(surface),
-        frame,
-        back,
-        -back.T.copy(),
-        surface.contact_radius,
-        load,
-        _growth(model.patch, load),
-        numbers.v_s,
-        numbers.gamma,
-        numbers.sigma_2,
-        np.maximum(noise, _LEAST_NOISE) ** 2,
-        sensors.quantum,
-        place,
-        np.abs(frame) @ (place, place, place / sensors.base) / math.sqrt(12.0),
-        *rest,
     )
 
 

@@ -20,8 +20,7 @@ from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.geometry import rotate
 from planarfriction.limit_surface import LimitSurfaceEllipsoid
 from planarfriction.planning.contact_modes import STICK, TouchPoint, pushed_by
-from planarfriction.planning.pushing import Push, push
-from planarfriction.planning.slider import Pusher, Slider
+from planarfriction.planning.pushing import Push, Pusher, Slider, push
 from planarfriction.scenes import Signal
 
 PARTS = 3

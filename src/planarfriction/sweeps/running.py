@@ -25,12 +25,14 @@ from planarfriction._support import validation
 from planarfriction._support.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene, Solution
-from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index
 from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.records import (
     FAILED,
+    OWN,
     TURN,
     Batch,
+    Bookkeeper,
+    Index,
     Record,
     reason_of,
     run_all,

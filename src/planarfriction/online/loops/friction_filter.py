@@ -250,9 +250,9 @@ def _learn(settings, s, h, column, jacobian):
     misfit = 0.0
     for i in range(3):
         w = load * s.old_sum[i] / count - s.x[BIAS + i]
-        power = power + w * s.x[TWIST + i]
-        force2 = force2 + w * w
-        speed2 = speed2 + s.x[TWIST + i] * s.x[TWIST + i]
+        power += w * s.x[TWIST + i]
+        force2 += w * w
+        speed2 += s.x[TWIST + i] * s.x[TWIST + i]
     s.dissipated += (
         power / math.sqrt(max(force2 * speed2, 1e-300)) - s.dissipated
     ) / POWERS
@@ -451,7 +451,7 @@ def update(settings, states, samples, found):
         lost = good and load <= settings.least_load and s.gauge > NONE
         flags += 0 if good and not lost else 1
         if good and force >= settings.saturation:
-            flags = flags + 4
+            flags += 4
             good = False
         if dt > 0.0:
             if settings.drift > 0.0:
@@ -468,7 +468,8 @@ def update(settings, states, samples, found):
                 w = _row(settings.conjugate, i, wrench)
                 s.seen[i] += share * ((w - s.x[BIAS + i]) / load - s.seen[i])
                 s.sum[i] += w / load
-            s.loads, s.count = s.loads + load, s.count + 1.0
+            s.loads += load
+            s.count += 1.0
             _judge(settings, s, load, dt, best)
             s.peak = max(s.peak, s.gauge)
             if s.slip < 0.1:

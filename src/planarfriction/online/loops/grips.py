@@ -250,9 +250,15 @@ def _median(row, count):
 
 
 @kernel
+def _repeats(c):
+    """Return the number of times in a row for which a component of the slip velocity has been the same."""
+    return max(c.same[0], max(c.same[1], c.same[2]))
+
+
+@kernel
 def _speed(c, e):
     """Return the size of the last slip velocity at the rim of the contact, 0 of one that repeats itself."""
-    if max(c.same[0], max(c.same[1], c.same[2])) >= REPEATS:
+    if _repeats(c) >= REPEATS:
         return 0.0
     return math.hypot(
         math.hypot(c.velocity[0], c.velocity[1]), e.radius * c.velocity[2]
@@ -294,10 +300,9 @@ def _follow(c, e, least_load, quantum, turns, keeps):
         c.pressed = grown if c.pressed > 0.0 else e.normal_force
     needed = e.gauge * c.pressed
     lacks = needed < keeps * c.usual and _speed(c, e) < FAST * quantum
-    repeats = max(c.same[0], max(c.same[1], c.same[2])) >= FROZEN
     bears = (
         e.seen > 0
-        and not (frozen or lacks or repeats)
+        and not (frozen or lacks or _repeats(c) >= FROZEN)
         and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
     )
     c.mute = 0.0 if bears else c.mute + dt
@@ -306,18 +311,16 @@ def _follow(c, e, least_load, quantum, turns, keeps):
     c.age = max(c.age, 0.0) + dt
     c.span += dt
     v = e.velocity
-    c.quiet = c.quiet + dt
+    c.quiet += dt
     if dt > 0.0 and known(v):
-        same = 0.0
         for i in range(3):
             c.slid[i] += v[i] * c.span if c.span >= 0.0 else 0.0
             c.same[i] = (
                 c.same[i] + 1.0 if v[i] == c.velocity[i] and v[i] != 0.0 else 0.0
             )
-            same = max(same, c.same[i])
             c.velocity[i] = v[i]
         along = -(e.wrench[0] * v[0] + e.wrench[1] * v[1] + turn * e.radius * v[2])
-        if along >= COUNTED * quantum * size and size > 0.0 and same < REPEATS:
+        if along >= COUNTED * quantum * size and size > 0.0 and _repeats(c) < REPEATS:
             c.quiet = 0.0
         c.span = 0.0
     if c.age < SETTLED and bears:  # one wrong sample is not the grip, nor the load
