@@ -12,8 +12,7 @@ from planarfriction.cli.output import write_solution
 from planarfriction.identify import Log, Slide
 from planarfriction.identify.checks import Sliding
 from planarfriction.identify.logs import is_mean, unwrapped
-from planarfriction.identify.options import FitOptions
-from planarfriction.identify.problem import LogProblem
+from planarfriction.identify.problem import FitOptions, LogProblem
 from planarfriction.identify.sensor_errors import wrench_noise
 from tests.support.identification_logs import (
     LAW,

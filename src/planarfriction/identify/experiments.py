@@ -24,7 +24,6 @@ from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import Log, as_tuple
-from planarfriction.identify.options import FitOptions, check_noise
 from planarfriction.identify.parameters import (
     ALL,
     LAW,
@@ -38,7 +37,7 @@ from planarfriction.identify.parameters import (
     check_patch,
     fitted_law,
 )
-from planarfriction.identify.problem import LogProblem
+from planarfriction.identify.problem import FitOptions, LogProblem, check_noise
 from planarfriction.identify.result import WIDTH, Identification
 from planarfriction.identify.sensor_errors import GROUPS, check_groups, wrench_noise
 from planarfriction.identify.uncertainty import finite

@@ -16,7 +16,7 @@ from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Checked, checked
 from planarfriction.derivatives.scene_inputs import STATES
 from planarfriction.identify.logs import Linear, increasing, unwrapped
-from planarfriction.identify.options import check_noise
+from planarfriction.identify.problem import check_noise
 from planarfriction.identify.verdicts import Verdict, caution, few_of
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide

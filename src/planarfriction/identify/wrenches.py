@@ -12,9 +12,9 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.checks import check_logs, size_of, with_findings
-from planarfriction.identify.columns import TWIST
 from planarfriction.identify.decimation import decimated, samples_of
 from planarfriction.identify.logs import (
+    TWIST,
     TWO_LOADS,
     Log,
     as_tuple,
@@ -22,7 +22,6 @@ from planarfriction.identify.logs import (
     mean_load,
     one_coordinate,
 )
-from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import (
     LAW,
     RADIUS,
@@ -34,7 +33,7 @@ from planarfriction.identify.parameters import (
     fitted_law,
     scaled_patch,
 )
-from planarfriction.identify.problem import SPOILED, LogProblem
+from planarfriction.identify.problem import SPOILED, FitOptions, LogProblem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.search import (
     guess_starts,

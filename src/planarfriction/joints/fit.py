@@ -14,7 +14,6 @@ from planarfriction.joints import (
     goal_fit,
     problem,
     torque_fit,
-    torque_verdicts,
 )
 from planarfriction.joints.balance import Refined
 from planarfriction.joints.log import JointLog, Plant, as_joint_logs
@@ -102,7 +101,7 @@ def _fit_torques(
     ranked, baseline = torque_fit.choose(data, chosen, auto, progress)
     fit = torque_fit.finish(data, ranked, chosen, auto, progress)
     values, spread = numbers_of(fit)
-    rest = torque_verdicts.rest_of(data, fit)
+    rest = torque_fit.rest_of(data, fit)
     scores = {each.terms: each.score for each in ranked}
     without = {
         term: tuple(each for each in fit.terms if each != term) for term in fit.terms
@@ -129,11 +128,11 @@ def _fit_torques(
         logs, _settled(plant, values), None, fit.terms, values, spread, fit.freedom,
         names, np.array(errors), np.array(less), series, unclear, (),
     )  # fmt: skip
-    torque_verdicts.refuse(data, fit, rest, found.intervals)
+    torque_fit.refuse(data, fit, rest, found.intervals)
     return replace(
         found,
         verdicts=(
-            *torque_verdicts.judge(data, found, rest, plant, gains),
+            *torque_fit.judge(data, found, rest, plant, gains),
             *not_shown(unclear),
         ),
     )

@@ -10,8 +10,13 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.online.loops import grips
-from planarfriction.online.observer import Estimate, FrictionObserver, estimate_of
-from planarfriction.online.sensors import GRAVITY, Measurement
+from planarfriction.online.observer import (
+    GRAVITY,
+    Estimate,
+    FrictionObserver,
+    Measurement,
+    estimate_of,
+)
 
 _LEAST_MU = 3.0902
 """Standard deviations by which mu_c is assumed to be smaller where it cannot be found: one part in a thousand slips."""

@@ -1,20 +1,58 @@
-"""Estimate the friction of a grip while it holds and slips."""
+"""Estimate the friction of a grip while it holds and slips, from the sensors of a gripper."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction._support import validation
-from planarfriction._support.equality import by_parts
+from planarfriction._support.equality import ByValue, by_parts, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import FrictionModel
 from planarfriction.online.loops import friction_filter as kernels
 from planarfriction.online.loops.filter_state import BIAS, MU, STATE
-from planarfriction.online.sensors import Measurement, Sensors
+
+GRAVITY = 9.81
+"""Gravity [m/s^2]."""
+
+
+@by_parts
+class Measurement(NamedTuple):
+    """Sensors at one instant; leading axes are parts."""
+
+    time: Any
+    """Time of the samples [s], `[...]`."""
+    wrench: Any
+    """Friction wrench of one finger on the part, about the grip's centre, axes of the hand `[..., 3]` [N, N, N m]."""
+    normal_force: Any
+    """Grip force [N], `[...]`."""
+    slip_velocity: Any = None
+    """Mean velocity of the part over its finger since the last such sample, `[..., 3]` [m/s, m/s, rad/s]; NaN or None
+    between samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensors(ByValue):
+    """Noise and rates of the sensors of a gripper.
+
+    Raises InvalidValueError for a value out of range.
+    """
+
+    force_noise: float = checked(validation.non_negative, default=0.02)
+    """Standard deviation of the forces, also of the grip force [N]."""
+    torque_noise: float = checked(validation.non_negative, default=2e-4)
+    """Standard deviation of the torque [N m]."""
+    slip_rate: float = checked(validation.non_negative, default=120.0)
+    """Rate of the slip velocity [Hz]; 0 for no such sensor."""
+    quantum: float = checked(validation.positive, default=0.95e-3)
+    """Smallest slip velocity [m/s]: the sensor counts places, so that what a sample leaves out is in the next."""
+    base: float = checked(validation.positive, default=0.01)
+    """Distance of the two counters whose difference is the spin [m]."""
+
 
 PARAMETERS = ("mu_c", "mu_s", "radius")
 """Names of what is estimated beside the twist, in the order of `Estimate.determined` and `covariance`."""
