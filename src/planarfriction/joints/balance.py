@@ -42,24 +42,24 @@ STEPS = 12
 def predict(rows: Sequence[Rows], values: Values) -> list[np.ndarray]:
     """Compute the smoothed torque of each log at all of its rows, `[R]` [N m]."""
     numbers = Balance(**values)
-    return [_predict(each, numbers) for each in rows]
-
-
-def _predict(rows: Rows, numbers: Balance) -> np.ndarray:
-    level = np.full_like(rows.speed, numbers.mu_c)
-    if numbers.rise:
-        level += numbers.rise * np.exp(-((rows.speed / numbers.v_s) ** 2))
-    gravity = [numbers.gravity_sin, numbers.gravity_cos] @ rows.linear[2:]
-    viscous = [numbers.sigma_2, numbers.viscous_asymmetry] @ rows.linear[:2]
-    rest = numbers.inertia * rows.acceleration + viscous + gravity
-    weights = rows.weights
-    # The damping of bristles is a slope, which their smoothing takes as well.
-    if numbers.sigma_0:
-        weights = weights - numbers.sigma_1 / numbers.sigma_0 * rows.sloping
-    # the motor's torque less that of all else
-    driving = rest + gravity - 2.0 * rows.external
-    friction = slide(numbers, weights, rows.path, rows.direction, level, driving)
-    return numbers.torque_offset + rows.low_passed(rest + friction, numbers.low_pass)
+    torques = []
+    for each in rows:
+        level = np.full_like(each.speed, numbers.mu_c)
+        if numbers.rise:
+            level += numbers.rise * np.exp(-((each.speed / numbers.v_s) ** 2))
+        gravity = [numbers.gravity_sin, numbers.gravity_cos] @ each.linear[2:]
+        viscous = [numbers.sigma_2, numbers.viscous_asymmetry] @ each.linear[:2]
+        rest = numbers.inertia * each.acceleration + viscous + gravity
+        weights = each.weights
+        # The damping of bristles is a slope, which their smoothing takes as well.
+        if numbers.sigma_0:
+            weights = weights - numbers.sigma_1 / numbers.sigma_0 * each.sloping
+        # the motor's torque less that of all else
+        driving = rest + gravity - 2.0 * each.external
+        friction = slide(numbers, weights, each.path, each.direction, level, driving)
+        torque = each.low_passed(rest + friction, numbers.low_pass)
+        torques.append(numbers.torque_offset + torque)
+    return torques
 
 
 def errors(rows: Sequence[Rows], values: Values) -> np.ndarray:
@@ -111,14 +111,14 @@ RANGES = {
 """Ranges in which the errors change: beyond, an estimate is at its bound."""
 
 
-def limited(values: Values) -> dict[str, float]:
+def limited(values: dict[str, float]) -> dict[str, float]:
     """Return numbers within `RANGES`."""
     inside = {
         name: min(max(values[name], low), high)
         for name, (low, high) in RANGES.items()
         if name in values
     }
-    return {**values, **inside}
+    return values | inside
 
 
 def refine(
@@ -136,32 +136,19 @@ def refine(
     names = names_of(terms, late)
     # an asymmetric level and an offset of the torque are one number
     offset = start.get("torque_offset", start.get("asymmetry", 0.0))
-    values = {
-        name: ({"torque_offset": offset, "asymmetry": offset, "delay": 0.0} | start)[
-            name
-        ]
-        for name in names
-    }
+    known = {"torque_offset": offset, "asymmetry": offset, "delay": 0.0} | start
+    values = {name: known[name] for name in names}
     reversing = np.concatenate([each.reversing for each in rows])
     sizes = np.ones(2) if scatter is None else scatter
 
-    def weighted(values: Values) -> np.ndarray:
+    def weighted(values: dict[str, float]) -> np.ndarray:
         return errors(rows, limited(values)) / sizes[reversing]
 
     for _ in range(2 if scatter is None else 1):
         if scatter is None:
             sizes = _scatter(weighted(values) * sizes[reversing], reversing)
-        values = limited(
-            least(
-                weighted,
-                values,
-                names,
-                False,
-                loss="huber",
-                f_scale=HUBER,
-                max_nfev=STEPS,
-            )
-        )
+        settings = {"loss": "huber", "f_scale": HUBER, "max_nfev": STEPS}
+        values = limited(least(weighted, values, names, False, **settings))
     error = weighted(values)
     size = np.abs(error)
     pull = np.minimum(1.0, HUBER / np.maximum(size, 1e-9))
@@ -211,15 +198,15 @@ def blocks_of(rows: Sequence[Rows]) -> np.ndarray:
 
 
 COLUMNS = (
-    *(
-        "inertia",
-        "torque_offset",
-        "sigma_2",
-        "viscous_asymmetry",
-        "gravity_sin",
-        "gravity_cos",
-    ),
-    *("load", "mu_c", "rise"),
+    "inertia",
+    "torque_offset",
+    "sigma_2",
+    "viscous_asymmetry",
+    "gravity_sin",
+    "gravity_cos",
+    "load",
+    "mu_c",
+    "rise",
 )
 """Linear numbers of the balance, in the order of the columns; there is a column of `rise` for each Stribeck speed."""
 
@@ -274,8 +261,8 @@ def search(
         each
         for count in range(len(terms) + 1)
         for each in itertools.combinations(terms, count)
+        if {*told} <= {*each, "load"}
     ]
-    sets = [each for each in sets if {*told} <= {*each, "load"}]
     folds = np.repeat(np.arange(len(rows)), [len(each.fitted) for each in rows])
     if len(rows) < LEAST_LOGS:
         blocks = np.unique(blocks_of(rows), return_inverse=True)[1]
@@ -293,33 +280,22 @@ def search(
     weak = WEAK * np.abs(torques).max()
 
     def scored(load: np.ndarray, sets: Sequence[tuple[str, ...]]) -> list[Candidate]:
-        tables = (
-            np.hstack([linear, *columns, torques])
-            for columns in zip(load, falling, strict=True)
-        )
-        sums = np.array(
-            [
-                [table[folds == i].T @ table[folds == i] for i in np.unique(folds)]
-                for table in tables
-            ]
-        )
-        return sorted(
-            (_best(each, sums, grid, weak) for each in sets),
-            key=lambda each: each.score,
-        )
+        sums = []
+        for columns in zip(load, falling, strict=True):
+            table = np.hstack([linear, *columns, torques])
+            parts = [table[folds == i] for i in np.unique(folds)]
+            sums.append([each.T @ each for each in parts])
+        found = [_best(each, np.array(sums), grid, weak) for each in sets]
+        return sorted(found, key=lambda each: each.score)
 
-    found = scored(
-        np.zeros_like(falling[..., :1]), [each for each in sets if "load" not in each]
-    )
+    none = np.zeros_like(falling[..., :1])
+    found = scored(none, [each for each in sets if "load" not in each])
     if "load" in allowed:
         loads = [_through(each, found[0].values) for each in rows]
-        found += scored(
-            _bent(rows, loads, grid), [each for each in sets if "load" in each]
-        )
-    return sorted(
-        (each for each in found if {*told} <= {*each.terms}),
-        key=lambda each: each.score,
-    )
+        with_load = [each for each in sets if "load" in each]
+        found += scored(_bent(rows, loads, grid), with_load)
+    wanted = [each for each in found if {*told} <= {*each.terms}]
+    return sorted(wanted, key=lambda each: each.score)
 
 
 def _linear(rows: Rows) -> np.ndarray:

@@ -103,30 +103,20 @@ def _fit_torques(
     values, spread = numbers_of(fit)
     rest = torque_fit.rest_of(data, fit)
     scores = {each.terms: each.score for each in ranked}
-    without = {
-        term: tuple(each for each in fit.terms if each != term) for term in fit.terms
-    }
-    gains = {
-        term: scores[terms] / fit.score
-        for term, terms in without.items()
-        if terms in scores
-    }
-    unclear = (
-        {}
-        if auto
-        else {
-            term: why
-            for term in fit.terms
-            if (why := torque_fit.doubt(data, fit, term))
-        }
-    )
+    gains = {}
+    for term in fit.terms:
+        less = tuple(each for each in fit.terms if each != term)
+        if less in scores:
+            gains[term] = scores[less] / fit.score
+    doubts = {term: torque_fit.doubt(data, fit, term) for term in fit.terms}
+    unclear = {term: why for term, why in doubts.items() if why and not auto}
     series = _series(data, fit, baseline)
     errors = [np.abs(each.fitted - each.measured).mean() for each in series]
-    less = [np.abs(each.baseline - each.measured).mean() for each in series]
+    plain = [np.abs(each.baseline - each.measured).mean() for each in series]
     names = tuple(each.name for each in series)
     found = JointFit(
         logs, _settled(plant, values), None, fit.terms, values, spread, fit.freedom,
-        names, np.array(errors), np.array(less), series, unclear, (),
+        names, np.array(errors), np.array(plain), series, unclear, (),
     )  # fmt: skip
     torque_fit.refuse(data, fit, rest, found.intervals)
     return replace(
@@ -176,11 +166,8 @@ def _settled(plant: Plant, values: Mapping[str, float]) -> Plant:
 def _series(data: Data, fit: Refined, baseline: Refined) -> tuple[Series, ...]:
     """Return the smoothed torque of each log as measured and modelled."""
     delay = fit.values.get("delay", 0.0)
-    columns = zip(
-        data.rows,
-        *(balance.predict(data.rows, each.values) for each in (fit, baseline)),
-        strict=True,
-    )
+    torques = (balance.predict(data.rows, each.values) for each in (fit, baseline))
+    columns = zip(data.rows, *torques, strict=True)
     return tuple(
         Series(
             each.even.log.name,

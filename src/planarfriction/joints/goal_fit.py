@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -58,25 +57,8 @@ WORDS = {
 """Meaning of a term that was kept, and of one that was not."""
 
 
-def judge(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> tuple[Verdict, ...]:
-    """Return the verdicts on a trial that was kept, and on the `pairs` of trials with and without a term."""
-    logs = kept.problem.logs
-    stuck = (
-        _on_standing(kept, i, mask)
-        for i, log in enumerate(logs)
-        if (mask := standing(log)).any()
-    )
-    return (
-        *_on_terms(kept, pairs),
-        *_on_drive(kept),
-        *lags(logs),
-        *itertools.chain(*stuck),
-    )
-
-
-def _on_terms(
-    kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]
-) -> Iterator[Verdict]:
+def judge(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Verdict]:
+    """Yield the verdicts on a trial that was kept, and on the `pairs` of trials with and without a term."""
     for term, (trial, without) in pairs.items():
         gain, scatter, halves = trial.gains(without)
         ratio, low, high, *both = np.exp(
@@ -88,6 +70,11 @@ def _on_terms(
         if term == "load":
             numbers += f", b = {trial.values['load']:.2g}"
         yield Verdict(term, good, f"{WORDS[term][0 if good else 1]} ({numbers})")
+    yield from _on_drive(kept)
+    yield from lags(kept.problem.logs)
+    for i, log in enumerate(kept.problem.logs):
+        if (mask := standing(log)).any():
+            yield from _on_standing(kept, i, mask)
 
 
 def _on_drive(kept: Trial) -> Iterator[Verdict]:
@@ -235,11 +222,7 @@ class Trial:
         scatter = (
             quantile(len(falls) - 1, 0.95) * falls.std(ddof=1) / np.sqrt(len(falls))
         )
-        return (
-            float(falls.mean()),
-            float(scatter),
-            [float(each.mean()) for each in halves],
-        )
+        return falls.mean(), scatter, [each.mean() for each in halves]
 
     @property
     def jackknife(self) -> dict[str, float]:
@@ -383,44 +366,32 @@ def fit_goals(
     """
     kept = first = attempt(base, minimise(base, base.start()), progress)
     pairs: dict[str, tuple[Trial, Trial]] = {}
+    problem = base
+    values = first.values
+    for term in chosen:
+        problem, values = with_term(problem, values, term)
     if chosen:
-        problem = base
-        values = first.values
-        for term in chosen:
-            problem, values = with_term(problem, values, term)
         kept = attempt(problem, values, progress)
     # Again, since bristles may hide a fall of friction.
     for term in (*TERMS, "stribeck") if auto else ():
-        has = kept.problem.terms
-        if (
-            term in has
-            or NEEDS.get(term, term) not in (*has, term)
-            or (term in pairs and "bristles" not in has)
-        ):
+        has = kept.terms
+        lacks = NEEDS.get(term, term) not in (*has, term)
+        if term in has or lacks or (term in pairs and "bristles" not in has):
             continue
         more = attempt(*with_term(kept.problem, kept.values, term), progress)
         pairs[term] = more, kept
         # Motor and load may have different shares.
         if term == "load" and not improves(more, kept):
-            both = attempt(
-                *with_term(more.problem, more.values, "directional"), progress
-            )
+            wider = with_term(more.problem, more.values, "directional")
+            both = attempt(*wider, progress)
             pairs[term] = (both, kept) if improves(both, kept) else pairs[term]
         kept = more if improves(*pairs[term]) else kept
     # What came later may explain what came before.
-    for term in kept.problem.terms[:-1] if auto else ():
-        rest = base.with_terms(
-            [
-                each
-                for each in kept.problem.terms
-                if each != term and NEEDS.get(each) != term
-            ]
-        )
-        less = attempt(
-            rest,
-            minimise(rest, {name: kept.values[name] for name in rest.names}),
-            progress,
-        )
+    for term in kept.terms[:-1] if auto else ():
+        others = [each for each in kept.terms if term not in (each, NEEDS.get(each))]
+        rest = base.with_terms(others)
+        start = {name: kept.values[name] for name in rest.names}
+        less = attempt(rest, minimise(rest, start), progress)
         pairs[term] = kept, less
         kept = kept if improves(kept, less) else less
     return result_of(kept, first, pairs)

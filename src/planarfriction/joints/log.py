@@ -28,30 +28,31 @@ GRAVITY = 9.81
 """Standard acceleration of gravity of the fits [m/s^2]."""
 
 ALIASES = {
-    **{
-        "time": "t",
-        "position": "q",
-        "angle": "q",
-        "theta": "q",
-        "tau": "torque",
-        "speed": "dq",
-        "velocity": "dq",
-    },
-    **{"omega": "dq", "tau_external": "external", "effort": "torque"},
-    **{"__time": "t", "time_s": "t", "t_s": "t", "timestamp": "t"},
+    "time": "t",
+    "position": "q",
+    "angle": "q",
+    "theta": "q",
+    "tau": "torque",
+    "speed": "dq",
+    "velocity": "dq",
+    "omega": "dq",
+    "tau_external": "external",
+    "effort": "torque",
+    "__time": "t",
+    "time_s": "t",
+    "t_s": "t",
+    "timestamp": "t",
 }
 """Other names of columns, in small letters."""
 
 COLUMNS = {
-    **{
-        "torque": "Nm",
-        "dq": "rad/s",
-        "enabled": "",
-        "goal": "rad",
-        "duty": "",
-        "voltage": "V",
-        "supply": "V",
-    },
+    "torque": "Nm",
+    "dq": "rad/s",
+    "enabled": "",
+    "goal": "rad",
+    "duty": "",
+    "voltage": "V",
+    "supply": "V",
     "external": "Nm",
 }
 """Columns beside t and q, with their units."""
@@ -195,17 +196,13 @@ class JointLog(ByValue):
         validation.instance("name", self.name, str, "a text")
         validation.count("turns", self.turns, at_least=0)
         time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
-        given = {each: getattr(self, each, None) for each in ("q", *COLUMNS)}
-        columns = {each: value for each, value in given.items() if value is not None}
+        self._set(time=time)
         if np.asarray(self.enabled).dtype == bool:
-            columns["enabled"] = np.asarray(self.enabled, dtype=float)
-        self._set(
-            time=time,
-            **{
-                each: validation.array(each, columns[each], (len(time),))
-                for each in columns
-            },
-        )
+            self._set(enabled=np.asarray(self.enabled, dtype=float))
+        for each in ("q", *COLUMNS):
+            value = getattr(self, each, None)
+            if value is not None:
+                self._set(**{each: validation.array(each, value, (len(time),))})
         q, turns = unwrapped(time, self.q, f"q of {self.name}")
         if turns and self.goal is not None:
             rule = (
@@ -241,11 +238,9 @@ class JointLog(ByValue):
     @cached_property
     def on(self) -> np.ndarray:
         """Share of the drive that is on, 1 or 0, `[T]`."""
-        return (
-            np.ones(len(self.time))
-            if self.enabled is None
-            else (self.enabled > 0.5).astype(float)
-        )
+        if self.enabled is None:
+            return np.ones(len(self.time))
+        return (self.enabled > 0.5).astype(float)
 
     @cached_property
     def outside(self) -> np.ndarray:
