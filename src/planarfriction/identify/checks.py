@@ -191,8 +191,8 @@ def with_findings(
 
 def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
     """Check one log: sign of the work, axes and units, displacement between samples, friction against load."""
-    size = size_of(log, patch)
-    sliding = Sliding.of(log, patch)
+    size = size_at(load_of(log), patch)
+    sliding = Sliding.of(log, patch, size)
     found = (
         check_work(log, sliding) or check_directions(log, sliding, size),
         check_times(log, size),
@@ -222,10 +222,10 @@ class Sliding(NamedTuple):
     """Mask of the measured channels, `[3]`."""
 
     @classmethod
-    def of(cls, log: Log, patch: ContactPatch) -> Sliding:
+    def of(cls, log: Log, patch: ContactPatch, radius: float) -> Sliding:
         """Select the fast samples under load, at most `MOST` of them."""
         few = patch.discs(FEW_DISCS) if patch.cells > MOST_CELLS else patch
-        size = [1.0, 1.0, size_of(log, patch)]
+        size = [1.0, 1.0, radius]
         speed = np.linalg.norm(log.twist * size, axis=1)
         force = np.linalg.norm(log.wrench / size, axis=1)
         fast = speed >= FAST * np.quantile(speed, 0.95)
@@ -241,7 +241,7 @@ class Sliding(NamedTuple):
             log.wrench[rows],
             np.append(0.0, np.cumsum(turns))[rows],
             few.levers(),
-            few.weights(_load(log)),
+            few.weights(load_of(log)),
             log.channels,
         )
 
@@ -422,7 +422,7 @@ def check_slide_units(
 ) -> Finding | None:
     """Check that decelerations are those of friction, and alike in all windows of all slides, for times in s, places in
     m and angles in rad: of 281 measured slides, one at a time, 245 are doubted if they are in deg, and none in rad."""
-    size = _size_at(body.mass * body.gravity, patch)
+    size = size_at(body.mass * body.gravity, patch)
     as_read = _friction_of_slides(slides, body, size, 1.0)
     if len(as_read) == 0:
         return None
@@ -482,18 +482,17 @@ def check_frozen(slide: Slide) -> Finding | None:
     return None
 
 
-def _load(log: Log) -> float:
+def load_of(log: Log) -> float:
+    """Return the median load of the samples under load [N], 1 without any."""
     loaded = log.normal_force[log.normal_force > 0.0]
     return np.median(loaded) if len(loaded) else 1.0
 
 
-def size_of(log: Log, patch: ContactPatch) -> float:
-    """Return the length that turns spin into speed [m]: the contact radius at the load of the log."""
-    return _size_at(_load(log), patch)
+def size_at(load: float, patch: ContactPatch) -> float:
+    """Return the length that turns spin into speed [m]: the contact radius at a load.
 
-
-def _size_at(load: float, patch: ContactPatch) -> float:
-    """Return the contact radius at a load [m]. Raises InvalidValueError for a single point."""
+    Raises InvalidValueError for a single point.
+    """
     size = patch.contact_radius(load)
     if not size > 0.0:
         rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"

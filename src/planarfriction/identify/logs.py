@@ -454,13 +454,6 @@ def as_tuple(name: str, value: Any, kind: type) -> tuple[Any, ...]:
     return result
 
 
-def one_coordinate(logs: Sequence[Log]) -> bool:
-    """Return True if all logs have one wrench channel only, and move only along it."""
-    measured = np.any([log.channels for log in logs], axis=0)
-    moving = np.any([log.twist.any(axis=0) for log in logs], axis=0)
-    return bool(measured.sum() == 1 and not (moving & ~measured).any())
-
-
 def load_ratio(logs: Sequence[Log]) -> float:
     """Return the largest load over the least, of which no log has 5 % of its samples beyond."""
     spans = np.array([np.quantile(loads(log), (0.05, 0.95)) for log in logs])

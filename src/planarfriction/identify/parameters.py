@@ -186,16 +186,16 @@ class Coordinates:
         self.start = np.append(start[:count], np.zeros(len(widths)))
         self._held_mu_c = held_mu_c
         self._limits = np.asarray(limits, dtype=float)
-        self._mu_s = self.names.index("mu_s") if "mu_s" in self.names else None
-        self._mu_c = self.names.index("mu_c") if "mu_c" in self.names else None
+        places = {name: i for i, name in enumerate(names)}
+        self._mu_s = places.get("mu_s")
+        self._mu_c = places.get("mu_c")
         self.logarithmic = np.zeros(len(self.start), dtype=bool)
-        self.logarithmic[:count] = [
-            ALL[name].logarithmic and name != "mu_s" for name in self.names
-        ]
+        self.logarithmic[:count] = [ALL[name].logarithmic for name in names]
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
-        if self._mu_s is not None:
-            self.scale[self._mu_s] = 1.0
         self.scale[self.rig] = widths
+        if self._mu_s is not None:
+            self.logarithmic[self._mu_s] = False
+            self.scale[self._mu_s] = 1.0
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the lower and the upper bounds of the coordinates, `[F + K]` each."""
@@ -226,9 +226,7 @@ class Coordinates:
         linear coordinates of the contact, whose scale is a guess, are left alone.
         """
         width = np.where(self.rig, 1.0, np.where(self.logarithmic, PRIOR, np.inf))
-        for name in ("gamma", "mu_s"):
-            if name in self.names:
-                width[self.names.index(name)] = SHAPE_PRIOR
+        width[: len(self.names)][np.isin(self.names, ("gamma", "mu_s"))] = SHAPE_PRIOR
         return (coordinates - self.of(self.start)) / width, np.diag(1.0 / width)
 
     def values(self, coordinates: np.ndarray) -> np.ndarray:
@@ -249,9 +247,8 @@ class Coordinates:
         if self._mu_s is not None:
             result[self._mu_s, self._mu_s] = self._mu(values)
             if self._mu_c is not None:
-                result[self._mu_s, self._mu_c] = (
-                    1.0 + coordinates[self._mu_s]
-                ) * values[self._mu_c]
+                # mu_c is logarithmic: by its coordinate, mu_s grows by itself
+                result[self._mu_s, self._mu_c] = values[self._mu_s]
         return result
 
     def _mu(self, values: np.ndarray) -> float:

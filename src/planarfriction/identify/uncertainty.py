@@ -133,8 +133,9 @@ def uncertainty(fit: Fit) -> Uncertainty:
     # A value that rests on zero is as uncertain as its neighbours let it be; other bounds are no estimates.
     low = fit.coordinates.bounds()[0] == 0.0
     free = ~fit.at_bound | (low & (fit.values <= 1e-9 + fit.coordinates.scale * 1e-9))
-    reduced_chi2, neighbours = _left(fit, residual)
     measured = problem.channels[problem.used].sum()
+    reduced_chi2 = float(residual @ residual / max(measured, 1))
+    neighbours = _neighbours(fit, residual)
     inverse = covariance_of(fit, np.concatenate([jacobian, pull]), free)
     plain = inverse * max(reduced_chi2, 1.0)
     bread = finite(inverse)
@@ -193,16 +194,13 @@ def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
     return np.where(unknown, np.inf, result)
 
 
-def _left(fit: Fit, residual: np.ndarray) -> tuple[float, float]:
-    """Compute the mean square of the scaled residuals, and their correlation one sample apart."""
-    problem = fit.problem
-    rows = list(problem.by_log(residual[:, None]))
+def _neighbours(fit: Fit, residual: np.ndarray) -> float:
+    """Compute the correlation of scaled residuals one sample apart."""
+    rows = list(fit.problem.by_log(residual[:, None]))
     now = np.concatenate([each[1:].ravel() for each in rows])
     before = np.concatenate([each[:-1].ravel() for each in rows])
     pairs = 0.5 * (now @ now + before @ before)
-    measured = max(problem.channels[problem.used].sum(), 1)
-    correlation = now @ before / pairs if pairs > 0.0 else 0.0
-    return float(residual @ residual / measured), float(correlation)
+    return float(now @ before / pairs) if pairs > 0.0 else 0.0
 
 
 def _over_time(

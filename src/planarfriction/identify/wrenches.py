@@ -11,7 +11,7 @@ import numpy as np
 
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.checks import check_logs, size_of, with_findings
+from planarfriction.identify.checks import check_logs, load_of, size_at, with_findings
 from planarfriction.identify.decimation import decimated, samples_of
 from planarfriction.identify.logs import (
     TWIST,
@@ -20,7 +20,6 @@ from planarfriction.identify.logs import (
     as_tuple,
     load_ratio,
     mean_load,
-    one_coordinate,
 )
 from planarfriction.identify.parameters import (
     LAW,
@@ -133,7 +132,11 @@ def identify_lugre(
     """
     logs = as_tuple("log", log, Log)
     names = check_names(parameters)
-    if names == USUAL and one_coordinate(logs):
+    measured, moving = np.any(
+        [(log.channels, log.twist.any(axis=0)) for log in logs], axis=0
+    )
+    # of one coordinate: one wrench channel only, and motion along it only
+    if names == USUAL and measured.sum() == 1 and not (moving & ~measured).any():
         names = tuple(name for name in names if name != "contact_radius")
     check_patch(patch, "identify_lugre")
     models = _models_to_fit(
@@ -149,7 +152,7 @@ def identify_lugre(
         )
     findings = check_logs(logs, patch)
     whole = logs
-    size = size_of(logs[0], patch)
+    size = size_at(load_of(logs[0]), patch)
     logs = decimated(logs, size, options.samples)
     noise = wrench_noise(logs) if options.noise is None else np.array(options.noise)
     if (
@@ -280,7 +283,35 @@ def _identification(
     if not u.rejected:
         errors[:count] *= stretches(fit, u)
     histories = _histories(best)
-    evidence = _evidence(best, errors[:count], histories)
+    still = fit.values.copy()
+    still[:count][np.isin(problem.names, ("mu_c", "mu_s"))] *= NO_SLIP
+    slips, sticks = (
+        0.5 * (problem.residual(each, fit.sigma) ** 2).sum()
+        for each in (fit.values, still)
+    )
+    speeds, spins = problem.sliding(fit.values)
+    spoiled = (np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()
+    spoiled += np.isinf(fit.sigma[problem.channels]).sum()
+    evidence = Evidence(
+        names=problem.names,
+        values=values,
+        errors=errors[:count],
+        correlations=correlations(u.covariance)[:count, :count],
+        at_bound=fit.at_bound[:count],
+        jacobian=u.jacobian[:, :count],
+        speeds=speeds,
+        spins=spins,
+        held_mu_c=problem.law.numbers.mu_c,
+        loads=np.array([mean_load(log) for log in logs]),
+        load_ratio=load_ratio(logs),
+        measured=problem.channels.any(axis=0),
+        spoiled=spoiled,
+        robust=problem.options.loss != "linear",
+        without_slip=sticks - slips,
+        largest_coefficient=max(
+            np.nanquantile(each["coefficient"], 0.99) for each in histories
+        ),
+    )
     law = fitted_law(problem.law, problem.by_name(values))
     return Identification(
         names=problem.names,
@@ -305,62 +336,20 @@ def _identification(
     )
 
 
-def _evidence(
-    best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[str, Any]]
-) -> Evidence:
-    """Collect the evidence for verdicts on estimates with `errors` `[F]`."""
-    fit = best.fit
-    u = best.uncertainty
-    problem = fit.problem
-    count = len(problem.names)
-    values, _ = problem.split(fit.values)
-    still = fit.values.copy()
-    still[:count][np.isin(problem.names, ("mu_c", "mu_s"))] *= NO_SLIP
-    slips, sticks = (
-        0.5 * (problem.residual(each, fit.sigma) ** 2).sum()
-        for each in (fit.values, still)
-    )
-    speeds, spins = problem.sliding(values)
-    spoiled = (np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()
-    spoiled += np.isinf(fit.sigma[problem.channels]).sum()
-    return Evidence(
-        names=problem.names,
-        values=values,
-        errors=errors,
-        correlations=correlations(u.covariance)[:count, :count],
-        at_bound=fit.at_bound[:count],
-        jacobian=u.jacobian[:, :count],
-        speeds=speeds,
-        spins=spins,
-        held_mu_c=problem.law.numbers.mu_c,
-        loads=np.array([mean_load(log) for log in problem.logs]),
-        load_ratio=load_ratio(problem.logs),
-        measured=problem.channels.any(axis=0),
-        spoiled=int(spoiled),
-        robust=problem.options.loss != "linear",
-        without_slip=sticks - slips,
-        largest_coefficient=max(
-            np.nanquantile(each["coefficient"], 0.99) for each in histories
-        ),
-    )
-
-
 def _histories(best: Candidate) -> list[dict[str, Any]]:
     """Return measured and predicted wrenches of each log, held-out predictions, and sliding speeds."""
     fit = best.fit
     problem = fit.problem
-    values, _ = problem.split(fit.values)
     known = problem.channels & np.isfinite(fit.sigma)
-    unseen = best.uncertainty.unseen.reshape(-1, 3)
     held_out = np.full_like(problem.measured, np.nan)
-    held_out[problem.used] = unseen
+    held_out[problem.used] = best.uncertainty.unseen.reshape(-1, 3)
     held_out = problem.measured + held_out * np.where(known, fit.sigma, np.nan)
     columns = {
         "measured": np.where(problem.channels, problem.measured, np.nan),
         "predicted": problem.shown(fit.values),
-        "speed": problem.sliding(values)[0],
+        "speed": problem.sliding(fit.values)[0],
         "held_out": held_out,
-        "coefficient": problem.coefficients(values),
+        "coefficient": problem.coefficients(fit.values),
     }
     rows = zip(*map(problem.split_logs, columns.values()), strict=True)
     return [
@@ -375,13 +364,10 @@ def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:
     result = []
     for log, twist in zip(problem.logs, problem.twists, strict=True):
         name = log.name if len(problem.logs) > 1 else ""
-        errors = twist.noise / np.sqrt(0.3 * len(log.time))
-        units = ("m/s", "m/s", "rad/s")
-        for row in zip(TWIST, units, twist.noise, errors, strict=True):
-            channel, unit, noise, error = row
-            result.append(
-                Nuisance(f"noise_{channel}", unit, float(noise), float(error), name)
-            )
+        for k, unit in enumerate(("m/s", "m/s", "rad/s")):
+            noise = float(twist.noise[k])
+            error = noise / np.sqrt(0.3 * len(log.time))
+            result.append(Nuisance(f"noise_{TWIST[k]}", unit, noise, error, name))
     return result if "twist" in problem.rig.groups else []
 
 
@@ -394,8 +380,7 @@ def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
         finger = {name: given[name] for name in problem.fingers}
         pressure = dataclasses.replace(problem.patch.pressure, **finger)
         patch = dataclasses.replace(problem.patch, pressure=pressure)
-        load = problem.reference_load
-        surface = functools.partial(surface, normal_force=load)
+        surface = functools.partial(surface, normal_force=problem.reference_load)
     elif any(name in SHAPE for name in given):
         x, y = patch.centre_of_pressure()
         radius = problem.maps[0].base[RADIUS]

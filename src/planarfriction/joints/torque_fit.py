@@ -227,7 +227,12 @@ def choose(
             fit = refined(shown)
         good[fit.terms] = fit
     ranked = sorted(good.values(), key=lambda each: each.score)
-    close = [each for each in ranked if _as_good(each, ranked[0])]
+    close = []
+    for each in ranked:
+        excess = each.scores - ranked[0].scores
+        error = excess.std(ddof=1) * np.sqrt(len(excess)) if len(excess) > 1 else 0.0
+        if excess.sum() <= max(error, FLAT * ranked[0].score):
+            close.append(each)
     smallest = min(close, key=lambda each: (len(each.terms), each.score))
     return [smallest, *(each for each in ranked if each is not smallest)], baseline
 
@@ -262,13 +267,6 @@ def _level(values: Values) -> str:
 
 def _words(terms: Sequence[str]) -> str:
     return " and ".join(terms) or "Coulomb and viscous friction"
-
-
-def _as_good(fit: Refined, best: Refined) -> bool:
-    """Return True if a score exceeds the best by less than its standard error, or by little."""
-    excess = fit.scores - best.scores
-    error = excess.std(ddof=1) * np.sqrt(len(excess)) if len(excess) > 1 else 0.0
-    return bool(excess.sum() <= max(error, FLAT * best.score))
 
 
 def seen(data: Data, fit: Refined, told: Sequence[str]) -> tuple[str, ...]:

@@ -174,7 +174,12 @@ def dynamic_holding_load(
     body = Body(mass, inertia, gravity=(0.0, 0.0))
 
     def slips(share: float) -> bool:
-        grip = _falling(max(fall, share) * slow, share * slow, ramp)
+        high = max(fall, share) * slow
+        low = share * slow
+        grip = Signal.sampled([0.0, BEFORE], [high, low])
+        if BEFORE + ramp > BEFORE:  # else it is nothing, or less than times tell apart
+            times = [0.0, BEFORE, BEFORE + ramp]
+            grip = Signal.sampled(times, [high, high, low], "linear")
         return _slips(model, body, load, grip)
 
     return (1.0 + margin) * slow * _least_share(slips)
@@ -201,13 +206,6 @@ def _least_share(slips: Any) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if slips(middle) else (low, middle)
     return high
-
-
-def _falling(high: float, low: float, ramp: float) -> Signal:
-    """Return a normal force that falls from one value to another [N]."""
-    if BEFORE + ramp == BEFORE:  # nothing, or less than numbers of times tell apart
-        return Signal.sampled([0.0, BEFORE], [high, low])
-    return Signal.sampled([0.0, BEFORE, BEFORE + ramp], [high, high, low], "linear")
 
 
 def _slips(model: Any, body: Body, load: np.ndarray, grip: Signal) -> bool:

@@ -149,7 +149,7 @@ def plan_push(
     largest = (1.0 - margin) * cone
     if not np.any(goal - start):
         raise InvalidValueError("goal", "differ from the start", goal.tolist())
-    aim = _relative(start, goal)
+    aim = rotate(goal - start, -start[2])
     found = []
     for shares in PLACES:
         for edge, share in itertools.product(chosen, shares):
@@ -169,7 +169,7 @@ def plan_push(
     path = _path(slider, place, x, start)
     done = push(slider, pusher, path, start=start)
     for _ in range(ROUNDS):
-        aim = aim + _relative(start, goal) - _relative(start, done.end)
+        aim = aim + rotate(goal - done.end, -start[2])
         length, x = _shortest(slider, place, largest, aim, x)
         if length == math.inf:
             break
@@ -202,11 +202,6 @@ def plan_push(
         time.perf_counter() - begin,
     )
     return PushPlan(path, done, report)
-
-
-def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Return the goal in the axes of the start."""
-    return rotate(goal - start, -start[2])
 
 
 def _moved(pose: np.ndarray, twist: np.ndarray, distance: float) -> np.ndarray:
