@@ -7,7 +7,6 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
-from planarfriction.planning.contact_modes import TouchPoint, motion_at
 from planarfriction.planning.push_plans import PushReport
 from planarfriction.planning.pushing import (
     CORNER,
@@ -15,7 +14,9 @@ from planarfriction.planning.pushing import (
     FACE,
     Scenery,
     Touch,
+    TouchPoint,
     flush_after,
+    motion_at,
     place_of,
     touch_after,
 )

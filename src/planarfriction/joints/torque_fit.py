@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from planarfriction.joints.balance import (
 from planarfriction.joints.goal_fit import lags
 from planarfriction.joints.log import JointLog, Plant
 from planarfriction.joints.numbers import PARAMETERS, Values
-from planarfriction.joints.result import JointFit
+from planarfriction.joints.result import JointFit, Series, not_shown
 from planarfriction.joints.smoothing import (
     DELAYS,
     Rows,
@@ -593,3 +594,85 @@ def _on_scale(found: JointFit, plant: Plant) -> Iterator[Verdict]:
     if not known:
         text = "neither gravity nor inertia is known: a wrong torque constant would scale all results"
         yield Verdict("torque", False, text)
+
+
+def fit_torques(
+    logs: tuple[JointLog, ...],
+    plant: Plant,
+    chosen: tuple[str, ...],
+    auto: bool,
+    progress: Callable[[str], None],
+) -> JointFit:
+    """Fit the torques of logs with the `chosen` terms, or with those that they ask for.
+
+    Raises InvalidValueError for logs that no model of friction explains.
+    """
+    data = prepare(logs)
+    ranked, baseline = choose(data, chosen, auto, progress)
+    fit = finish(data, ranked, chosen, auto, progress)
+    values, spread = numbers_of(fit)
+    rest = rest_of(data, fit)
+    scores = {each.terms: each.score for each in ranked}
+    gains = {}
+    for term in fit.terms:
+        less = tuple(each for each in fit.terms if each != term)
+        if less in scores:
+            gains[term] = scores[less] / fit.score
+    doubts = {term: doubt(data, fit, term) for term in fit.terms}
+    unclear = {term: why for term, why in doubts.items() if why and not auto}
+    delay = fit.values.get("delay", 0.0)
+    torques = (predict(data.rows, each.values) for each in (fit, baseline))
+    series = tuple(
+        Series(
+            each.even.log.name,
+            each.time[each.fitted],
+            each.measured(delay),
+            one[each.fitted],
+            other[each.fitted],
+        )
+        for each, one, other in zip(data.rows, *torques, strict=True)
+    )
+    errors = [np.abs(each.fitted - each.measured).mean() for each in series]
+    plain = [np.abs(each.baseline - each.measured).mean() for each in series]
+    names = tuple(each.name for each in series)
+    found = JointFit(
+        logs, _settled(plant, values), None, fit.terms, values, spread, fit.freedom,
+        names, np.array(errors), np.array(plain), series, unclear, (),
+    )  # fmt: skip
+    refuse(data, fit, rest, found.intervals)
+    verdicts = judge(data, found, rest, plant, gains)
+    return replace(found, verdicts=(*verdicts, *not_shown(unclear)))
+
+
+def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the numbers of a fit to torques and their standard errors, by name.
+
+    Gravity is given by its size and the angle at which it vanishes.
+    """
+    values = dict(fit.values)
+    spread = dict(fit.spread)
+    for name, value in values.items():
+        if PARAMETERS[name].logarithmic:
+            spread[name] *= value
+    if "gravity" in fit.terms:
+        sine, cosine = (values.pop(name) for name in TERMS["gravity"])
+        values["gravity"] = float(np.hypot(sine, cosine))
+        values["offset"] = float(np.arctan2(-cosine, sine))
+        errors = [spread.pop(name) for name in TERMS["gravity"]]
+        spread["gravity"] = float(np.hypot(*errors))
+        spread["offset"] = spread["gravity"] / max(values["gravity"], 1e-300)
+    return values, spread
+
+
+def _settled(plant: Plant, values: Mapping[str, float]) -> Plant:
+    """Return the plant with what a fit to torques estimated: its inertia, less that of a known pendulum, and offset."""
+    inertia = (
+        max(values["inertia"] - plant.pendulum_inertia, 0.0)
+        if plant.inertia is None
+        else plant.inertia
+    )
+    # without a mass, the offset is 0 already
+    offset = values.get("offset", 0.0) if plant.offset is None else plant.offset
+    return replace(
+        plant, inertia=inertia, arm_mass=plant.arm_mass or 0.0, offset=offset
+    )

@@ -19,8 +19,15 @@ from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.geometry import rotate
 from planarfriction.limit_surface import LimitSurfaceEllipsoid
-from planarfriction.planning.contact_modes import STICK, TouchPoint, pushed_by
-from planarfriction.planning.pushing import Push, Pusher, Slider, push
+from planarfriction.planning.pushing import (
+    STICK,
+    Push,
+    Pusher,
+    Slider,
+    TouchPoint,
+    push,
+    pushed_by,
+)
 from planarfriction.scenes import Signal
 
 PARTS = 3
