@@ -67,7 +67,7 @@ def show(
         ["loaded cells", f"{patch.cells}"],
         ["centre of pressure [mm]", f"{centre[0]:.4g}, {centre[1]:.4g}"],
         ["contact radius r [mm]", f"{1e3 * shown.contact_radius:.4g}"],
-        ["second moment <rho^2> [mm^2]", f"{1e6 * float(patch.second_moment()):.4g}"],
+        ["second moment <rho^2> [mm^2]", f"{1e6 * patch.second_moment():.4g}"],
         [
             "largest distance from the ellipsoid [-]",
             f"{_distance_from_ellipsoid(shown):.3g}",
@@ -130,4 +130,4 @@ def _distance_from_ellipsoid(surface: Any) -> float:
     points, others = (
         scaled_samples(each, *_directions())[1] for each in (surface, ellipsoid)
     )
-    return float(np.linalg.norm(points - others, axis=1).max())
+    return np.linalg.norm(points - others, axis=1).max()

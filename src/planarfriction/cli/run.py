@@ -77,7 +77,7 @@ def largest_differences(
         - reference.histories[name].values[: len(time)]
         for name in ("x", "y", "theta")
     )
-    return float(np.hypot(dx, dy).max()), float(np.abs(dtheta).max())
+    return np.hypot(dx, dy).max(), np.abs(dtheta).max()
 
 
 def _last(solution: pf.Solution, name: str) -> float:
@@ -380,7 +380,7 @@ def _draw(
     if "animate" in pictures:
         for label, solution in solutions.items():
             path = folder / f"{name}-motion-{output.slug(label)}.gif"
-            end = float(solution.histories["time"].values[-1])
+            end = _last(solution, "time")
             with simulation_progress(f"drawing {path.name}", end) as progress:
                 solution.animate(path, progress=progress)
             note(f"wrote {path}")

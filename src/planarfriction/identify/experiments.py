@@ -304,7 +304,7 @@ class _Information:
         whole = jacobian.T @ jacobian
         of_log = [column.log is not None for column in problem.rig.columns]
         own = np.append(np.full(len(self.names), False), of_log).astype(bool)
-        inner = whole[np.ix_(own, own)] + np.eye(int(own.sum()))
+        inner = whole[np.ix_(own, own)] + np.eye(own.sum())
         both = whole[np.ix_(~own, own)]
         return whole[np.ix_(~own, ~own)] - both @ np.linalg.solve(inner, both.T)
 

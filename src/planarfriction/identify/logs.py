@@ -582,11 +582,10 @@ def unwrapped(
         (fast, steps, slower),
     ):
         if where.any():
-            i = int(np.argmax(where))
+            i = np.argmax(where)
             raise InvalidValueError(
                 f"{name} [rad]",
                 rule,
                 f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s",
             )
-    count = int(np.count_nonzero(turns))
-    return angle - TURN * np.append(0.0, np.cumsum(turns)), count
+    return angle - TURN * np.append(0.0, np.cumsum(turns)), int(np.count_nonzero(turns))

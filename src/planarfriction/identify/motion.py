@@ -216,7 +216,7 @@ class SlideProblem(LeastSquaresProblem):
         patch = self.patch
         radius = self.by_name(values).get("contact_radius")
         if radius is not None:
-            patch = scaled_patch(patch, radius / float(patch.contact_radius()))
+            patch = scaled_patch(patch, radius / patch.contact_radius())
         return self.build(patch, self.fitted_law(values))
 
     def poses(self, values: np.ndarray) -> Arrays:

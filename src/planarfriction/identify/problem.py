@@ -228,7 +228,7 @@ class LogProblem(LeastSquaresProblem):
         self.fingers = [name for name in self.names if name in SOFT_FINGER]
         loads = [mean_load(log) for log in logs]
         check_loads(logs, loads, patch, self.fingers)
-        self.reference_load = float(np.median(loads))
+        self.reference_load = np.median(loads)
         self.fixed_patch = patch
         if patch.depends_on_load:
             density = patch.weights(self.reference_load) / patch.areas
@@ -305,7 +305,7 @@ class LogProblem(LeastSquaresProblem):
 
     @property
     def numbers(self) -> int:
-        return int(self.channels.sum())
+        return self.channels.sum()
 
     def split_logs(self, rows: np.ndarray) -> Arrays:
         """Split rows `[T, ...]` of all samples into those of each log."""

@@ -258,7 +258,7 @@ def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, s
     found = {}
     for i, (time, speed, noise) in enumerate(seen):
         grown = speed - np.minimum.accumulate(speed)
-        last = int(grown.argmax())
+        last = grown.argmax()
         if grown[last] > max(GROWS * speed.max(), NOISE * noise):
             first = speed[: last + 1].min()
             found[i] = (

@@ -364,7 +364,7 @@ def pulls_of_held(fit: Fit, u: Uncertainty) -> list[Pull]:
     if not held:
         return []
     law = fitted_law(problem.law, problem.by_name(fit.values))
-    values = [float(getattr(law, name)) for name in held]
+    values = [getattr(law, name) for name in held]
     residual, slopes = problem.slopes_of(held, np.array(values), fit.values, fit.sigma)
     # values of the rig that lie on a bound count all the same
     free = ~fit.at_bound | (np.arange(len(fit.values)) >= count)

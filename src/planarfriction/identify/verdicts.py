@@ -460,7 +460,7 @@ def _partner(evidence: Evidence, i: int) -> tuple[str, float]:
     """Return the parameter from which another one cannot be separated, and their correlation; or nothing, and zero."""
     row = evidence.correlations[i].copy()
     row[i] = 0.0
-    j = int(np.argmax(np.abs(row)))
+    j = np.argmax(np.abs(row))
     return (evidence.names[j], row[j]) if abs(row[j]) > TOGETHER else ("", 0.0)
 
 

@@ -161,7 +161,7 @@ def identify_lugre(
         and models != (LEAD,)
         and load_ratio(logs) >= TWO_LOADS
     ):
-        usual = float(np.median([mean_load(log) for log in logs]))
+        usual = np.median([mean_load(log) for log in logs])
         kinds += [dataclasses.replace(law, reference_load=usual) for law in kinds]
     problems: list[LogProblem] = []
     guesses = []
@@ -386,5 +386,5 @@ def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
         radius = problem.maps[0].base[RADIUS]
         centre = np.array([given.get("centre_x", x), given.get("centre_y", y)])
         scale = given.get("contact_radius", radius) / radius
-        patch = scaled_patch(patch, float(scale), centre)
+        patch = scaled_patch(patch, scale, centre)
     return problem.kind.model(patch, law, surface)

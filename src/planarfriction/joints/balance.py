@@ -94,7 +94,7 @@ class Refined(NamedTuple):
     @property
     def score(self) -> float:
         """Sum of the scores."""
-        return float(self.scores.sum())
+        return self.scores.sum()
 
 
 def names_of(terms: Sequence[str], late: str = "delay") -> list[str]:
@@ -106,19 +106,19 @@ def names_of(terms: Sequence[str], late: str = "delay") -> list[str]:
 
 RANGES = {
     "load": (-np.inf, PARAMETERS["load"].high),
-    "delay": (float(DELAYS[0]), float(DELAYS[-1])),
+    "delay": (DELAYS[0], DELAYS[-1]),
 }
 """Ranges in which the errors change: beyond, an estimate is at its bound."""
 
 
-def limited(values: dict[str, float]) -> dict[str, float]:
+def limited(values: Values) -> dict[str, float]:
     """Return numbers within `RANGES`."""
     inside = {
         name: min(max(values[name], low), high)
         for name, (low, high) in RANGES.items()
         if name in values
     }
-    return values | inside
+    return {**values, **inside}
 
 
 def refine(
@@ -141,7 +141,7 @@ def refine(
     reversing = np.concatenate([each.reversing for each in rows])
     sizes = np.ones(2) if scatter is None else scatter
 
-    def weighted(values: dict[str, float]) -> np.ndarray:
+    def weighted(values: Values) -> np.ndarray:
         return errors(rows, limited(values)) / sizes[reversing]
 
     for _ in range(2 if scatter is None else 1):
@@ -182,7 +182,7 @@ def refine(
 def _scatter(error: np.ndarray, reversing: np.ndarray) -> np.ndarray:
     """Estimate the scatter of rows far from a reversal, and of those near one, by their medians."""
     size = np.abs(error)
-    least = max(0.3 * float(np.median(size)), 1e-12)
+    least = max(0.3 * np.median(size), 1e-12)
     groups = [size[reversing == kind] for kind in (0, 1)]
     return np.array(
         [
@@ -370,14 +370,14 @@ def _best(
         "asymmetry": values["torque_offset"],
         "mu_c": max(values["mu_c"], least),
         "rise": max(values.get("rise", 0.0), 1e-3 * least),
-        "v_s": float(grid.v_s[speed]),
+        "v_s": grid.v_s[speed],
         "load": min(max(values.get("load", 0.0), 0.0), PARAMETERS["load"].high - 0.05),
-        "sigma_0": max(values["mu_c"], 1e-9) / float(grid.bends[bend]),
+        "sigma_0": max(values["mu_c"], 1e-9) / grid.bends[bend],
         "sigma_1": 0.0,
-        "delay": float(DELAYS[delay]),
+        "delay": DELAYS[delay],
     }
     return Candidate(
-        terms, float(score), {name: (values | more)[name] for name in names_of(terms)}
+        terms, score, {name: (values | more)[name] for name in names_of(terms)}
     )
 
 

@@ -120,7 +120,7 @@ def speed_lag(log: JointLog) -> float:
         )
         for lag in LAGS
     ]
-    return float(LAGS[int(np.argmin(misses))])
+    return LAGS[np.argmin(misses)]
 
 
 def standing(log: JointLog) -> np.ndarray:
@@ -139,7 +139,7 @@ def standing(log: JointLog) -> np.ndarray:
 def lags(logs: Sequence[JointLog]) -> Iterator[Verdict]:
     """Yield a verdict on a reported speed that lags."""
     late = [speed_lag(log) for log in logs if log.dq is not None]
-    if late and abs(lag := float(np.median(late))) > LATE:
+    if late and abs(lag := np.median(late)) > LATE:
         text = f"the reported speed lags by {1e3 * lag:.0f} ms ({1e3 * min(late):.0f} to {1e3 * max(late):.0f})"
         yield Verdict("dq", False, f"{text}: the slope of q was used")
 
@@ -155,9 +155,9 @@ def _on_standing(kept: Trial, i: int, mask: np.ndarray) -> Iterator[Verdict]:
     most = joint.mu_s + np.abs(
         joint.load_motor * driven - joint.load_external * outside
     )
-    over = float(np.median(np.abs(driven + outside) - most))
+    over = np.median(np.abs(driven + outside) - most)
     if over > 0.0:
-        seconds = float(mask.sum() * np.median(np.diff(log.time)))
+        seconds = mask.sum() * np.median(np.diff(log.time))
         text = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
         text += f": this log contradicts the others, by which {over:.2g} N m are left over to move it"
         yield Verdict("fit", False, f"{text}; look for a current limit, heat or a stop")
@@ -230,7 +230,7 @@ class Trial:
         # Folds are alike: they differ that much less than samples drawn anew.
         more = np.sqrt(len(self.folds) - 1)
         return {
-            name: float(more * np.std([each[name] for each in self.folds]))
+            name: more * np.std([each[name] for each in self.folds])
             for name in self.values
         }
 

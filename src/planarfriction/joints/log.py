@@ -326,11 +326,11 @@ def as_joint_logs(
     if len({each.torque is None for each in result}) > 1:
         raise InvalidValueError("logs", "all hold a torque, or none", "some do")
     for log in result:
-        if (step := float(np.median(np.diff(log.time)))) > SLOW:
+        if (step := np.median(np.diff(log.time))) > SLOW:
             raise InvalidValueError(
                 f"time of {log.name}", "be in s", f"steps of {step:.3g}: is it in ms?"
             )
-        if plant.mass and (swing := float(np.ptp(log.q))) > TURNS * 2.0 * np.pi:
+        if plant.mass and (swing := np.ptp(log.q)) > TURNS * 2.0 * np.pi:
             raise InvalidValueError(
                 f"q of {log.name}",
                 "be in rad",
@@ -399,7 +399,7 @@ def _check_goal(log: JointLog) -> None:
             "swing as q does, in rad",
             f"{wide:.3g} beside {narrow:.3g} of q: is one of them in degrees?",
         )
-    correlation = float(np.corrcoef(goal, q)[0, 1])
+    correlation = np.corrcoef(goal, q)[0, 1]
     if correlation < OPPOSED:
         raise InvalidValueError(
             f"goal of {log.name}",

@@ -187,10 +187,8 @@ class JointFitProblem:
         found = min(ends, key=lambda each: np.square(errors(each)).sum())
         strong = np.abs(errors(zero))
         fast = max(np.abs(log.speed).max() for log in self.logs)
-        found["mu_c"] = max(found["mu_c"], 0.05 * float(np.median(strong)) + 1e-6)
-        found["sigma_2"] = max(
-            found["sigma_2"], 0.01 * float(strong.max() / max(fast, 1e-9))
-        )
+        found["mu_c"] = max(found["mu_c"], 0.05 * np.median(strong) + 1e-6)
+        found["sigma_2"] = max(found["sigma_2"], 0.01 * strong.max() / max(fast, 1e-9))
         return found
 
     def _balance(self, values: Values, log: JointLog) -> np.ndarray:
@@ -223,7 +221,7 @@ class JointFitProblem:
                 for external, motor in shares
             ]
         if term == "stribeck":
-            fast = max(float(np.quantile(np.abs(log.speed), 0.9)) for log in self.logs)
+            fast = max(np.quantile(np.abs(log.speed), 0.9) for log in self.logs)
             parts = itertools.product((0.1, 0.4), (0.01, 0.03, 0.1, 0.3))
             return [{"rise": share * mu_c, "v_s": part * fast} for share, part in parts]
         most = mu_c + values.get("rise", 0.0)

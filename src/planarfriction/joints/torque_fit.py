@@ -151,15 +151,13 @@ def prepare(logs: Sequence[JointLog]) -> Data:
         )
     torque = np.concatenate([each.measured(0.0) for each in rows])
     slow = np.sort(np.abs(speed))
-    fastest = float(np.percentile(slow, 99))
+    fastest = np.percentile(slow, 99)
     turning = np.concatenate(
         [np.abs(each.acceleration[each.reversals]) for each in rows]
     )
     # change of the speed within half a width of the kernel at a gentle reversal
-    crossed = (
-        0.5 * limits.width * float(np.percentile(turning, 20)) if len(turning) else 0.0
-    )
-    slowest_fall = float(max(1.5 * limits.slow, slow[min(40, len(slow) - 1)], crossed))
+    crossed = 0.5 * limits.width * np.percentile(turning, 20) if len(turning) else 0.0
+    slowest_fall = max(1.5 * limits.slow, slow[min(40, len(slow) - 1)], crossed)
     resolution = max(each.even.resolution for each in rows)
     least_bend = max(resolution, crossed * limits.width if len(turning) else 1.0, 1e-6)
     swing = np.ptp(np.concatenate([each.angle for each in rows]))
@@ -187,7 +185,7 @@ def choose(
     not show are left out of it. Without `auto`, only the set that was told is refined.
     """
     progress(_words(()))
-    start = {"inertia": 0.0, "mu_c": float(data.torque.std()), "sigma_2": 0.0}
+    start = {"inertia": 0.0, "mu_c": data.torque.std(), "sigma_2": 0.0}
     baseline = refine(data.rows, start, ())
     progress(f"first estimate, {_words(())}: {_level(baseline.values)}; all sets")
     allowed = data.allowed if auto else told
@@ -309,7 +307,7 @@ def doubt(data: Data, fit: Refined, term: str) -> str:
         return ""
     # the level of an asymmetry may as well be an offset of the torque
     names = [name for name in TERMS[term] if name not in (factor, "asymmetry")]
-    size = float(np.hypot.reduce([values[name] for name in names]))
+    size = np.hypot.reduce([values[name] for name in names])
     least = MATTERS * {"load": 1.0, "asymmetry": level / data.fastest}.get(term, level)
     clear = (
         max(abs(values[name]) / max(spread[name], 1e-300) for name in names) > SURE
@@ -431,18 +429,18 @@ def rest_of(data: Data, fit: Refined) -> Rest:
         + fit.values["inertia"] ** 2 * smoothed_noise(each.even.power, width, 2)
         for each in data.rows
     ]
-    noise = max(float(np.sqrt(np.mean(variances))), 1e-12)
+    noise = max(np.sqrt(np.mean(variances)), 1e-12)
     torques = predict(
         data.rows, {name: fit.values[name] for name in ("mu_c", "sigma_2")}
     )
     friction = np.concatenate(
         [torque[each.fitted] for torque, each in zip(torques, data.rows, strict=True)]
     )
-    square = float(np.square(fit.error).mean())
+    square = np.square(fit.error).mean()
     share = np.sqrt(
         max(square - noise**2, 0.0) / max(np.square(friction).mean(), 1e-24)
     )
-    return Rest(np.sqrt(square) / noise, float(share), float(fit.scatter[0]) / noise)
+    return Rest(np.sqrt(square) / noise, share, fit.scatter[0] / noise)
 
 
 def refuse(
@@ -659,7 +657,7 @@ def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float]]:
         values["gravity"] = float(np.hypot(sine, cosine))
         values["offset"] = float(np.arctan2(-cosine, sine))
         errors = [spread.pop(name) for name in TERMS["gravity"]]
-        spread["gravity"] = float(np.hypot(*errors))
+        spread["gravity"] = float(np.hypot.reduce(errors))
         spread["offset"] = spread["gravity"] / max(values["gravity"], 1e-300)
     return values, spread
 

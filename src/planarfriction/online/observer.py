@@ -116,7 +116,7 @@ class Estimate(NamedTuple):
             raise InvalidValueError("probability", "be between 0 and 1", probability)
         mean = np.stack([self.mu_c, self.mu_s, self.radius], axis=-1)
         sd = np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
-        reach = np.exp(float(ndtri(0.5 + 0.5 * probability)) * sd)
+        reach = np.exp(ndtri(0.5 + 0.5 * probability) * sd)
         return np.stack([mean / reach, mean * reach], axis=-1)
 
 
@@ -312,5 +312,5 @@ def _growth(patch: Any, load: float) -> float:
     """Return `d log r/d log f_N` of the contact radius at a load [N]."""
     if not patch.depends_on_load:
         return 0.0
-    small, large = (float(patch.contact_radius(share * load)) for share in (0.5, 2.0))
+    small, large = (patch.contact_radius(share * load) for share in (0.5, 2.0))
     return math.log(large / small) / math.log(4.0)

@@ -464,9 +464,9 @@ class _ProfileSearch:
         profiles = [values for _, values in found if values is not None]
         if not profiles:
             return -np.inf
-        cost = lambda values: float((self._residuals(values) ** 2).sum())
+        cost = lambda values: (self._residuals(values) ** 2).sum()
         costs = threads.each(cost, profiles)
-        best = int(np.argmin(costs))
+        best = np.argmin(costs)
         self._values = profiles[best]
         return -0.5 * costs[best]
 

@@ -85,7 +85,7 @@ def holding_load(
     # Bounds friction over mu.
     strongest = metric * (1.0 + np.hypot(*patch.asymmetries().T).max())
     force = max(np.hypot(*load[:2]), abs(load[2]) / reach)
-    low = float(force / (mu * strongest))
+    low = force / (mu * strongest)
     tried = low * (1.0 - 1e-9)
     for _ in range(_STEPS):
         if _needed(load, patch, mu, tried) <= tried:
@@ -220,4 +220,4 @@ def _slips(model: Any, body: Body, load: np.ndarray, grip: Signal) -> bool:
     way = np.hypot(dx, dy) + model.patch.contact_radius(force) * abs(theta)
     numbers = model.law.numbers
     bends = numbers.mu_s / (numbers.sigma_0 * model.law.stiffness_factor(force))
-    return bool(way > bends + SLIP)
+    return way > bends + SLIP
