@@ -332,11 +332,8 @@ def plan(
     load = normal_force[0] if normal_force else None
     measured = [pf.Log.from_csv(path, normal_force=load) for path in logs]
     patch, law = _known(measured, patch, names, values, spread)
-    loads = (
-        list(normal_force)
-        or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured})
-        or [1.0]
-    )
+    usual = sorted({float(f"{log.normal_force.mean():.3g}") for log in measured})
+    loads = normal_force or usual or [1.0]
     motions = candidate_motions(patch, law, normal_force=loads, **motion)
     chosen = None if wanted is None else [name.strip() for name in wanted.split(",")]
     found = design_experiment(

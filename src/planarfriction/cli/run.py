@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -154,9 +153,14 @@ def scene_makers(
     """Return functions that make the scenes of some values, by the kind of their model; "" for the file's own."""
     if t_end is not None:
         validation.positive("--t-end", t_end)
-    both = [BOTH if each == "both" else [each] for each in models]
-    kinds = list(dict.fromkeys(itertools.chain(*both)))
-    if Path(name).suffix.lower() in (".toml", ".json"):
+    kinds = [kind for each in models for kind in (BOTH if each == "both" else [each])]
+    from_file = Path(name).suffix.lower() in (".toml", ".json")
+    if not kinds and not from_file:
+        kinds = BOTH if name == "in-hand" else ["distributed"]
+    makes = {kind: MODELS[kind] for kind in kinds}
+    if makes:
+        _check_cells(cells, makes.values())
+    if from_file:
         return _makers_from_file(name, kinds, cells, patch, size or {})
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     of_scene = _USUAL.get(name, Usual())
@@ -165,16 +169,14 @@ def scene_makers(
     else:
         contact_patch = find_patch(patch, size or {}, of_scene.width)
     law = of_scene.law()
-    kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
-    _check_cells(cells, [MODELS[kind] for kind in kinds])
     options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if name == "free-slide":
         options["save_every"] = SLIDE_SAMPLING
-    made = {kind: _make(MODELS[kind], contact_patch, law, cells) for kind in kinds}
-    return {
-        kind: functools.partial(_ready, SCENES[name], model, options)
-        for kind, model in made.items()
-    }
+    found = {}
+    for kind, make in makes.items():
+        model = make(contact_patch, law, **_cells(make, cells))
+        found[kind] = functools.partial(_ready, SCENES[name], model, options)
+    return found
 
 
 def _ready(
@@ -206,29 +208,23 @@ def one_each(settings: Sequence[str]) -> dict[str, Any]:
     return {path: next(iter(values.values())) for path, values in several.items()}
 
 
-def _has_cells(make: Any) -> bool:
-    """Return True if models of a class stand on a number of cells."""
-    return "cells" in inspect.signature(make).parameters
+def _cells(make: Any, cells: int | None) -> dict[str, int]:
+    """Return the number of cells as an argument of a class of models, if it is given and these stand on one."""
+    takes = "cells" in inspect.signature(make).parameters
+    return {} if cells is None or not takes else {"cells": cells}
 
 
 def _check_cells(cells: int | None, makes: Iterable[Any]) -> None:
     if cells is None:
         return
     validation.count("--cells", cells)
-    if not any(map(_has_cells, makes)):
-        kinds = ", ".join(kind for kind, make in MODELS.items() if _has_cells(make))
+    if not any(_cells(make, cells) for make in makes):
+        kinds = ", ".join(kind for kind, make in MODELS.items() if _cells(make, cells))
         raise InvalidValueError(
             "--cells",
             f"be given only for a model that has a number of cells ({kinds})",
             cells,
         )
-
-
-def _make(make: Any, patch: pf.ContactPatch, law: Any, cells: int | None) -> Any:
-    """Make a model of a class, of so many `cells` if it has a number of them."""
-    if cells is None or not _has_cells(make):
-        return make(patch, law)
-    return make(patch, law, cells=cells)
 
 
 def _makers_from_file(
@@ -249,8 +245,6 @@ def _makers_from_file(
     contact_patch = None if patch is None else find_patch(patch, size)
     if not kinds and contact_patch is None and cells is None:
         return {"": make}
-    if kinds:
-        _check_cells(cells, [MODELS[kind] for kind in kinds])
 
     def changed(kind: str, /, **values: Any) -> pf.Scene:
         return _with_models(make(**values), kind, contact_patch, cells)
@@ -269,21 +263,20 @@ def _with_models(
 ) -> pf.Scene:
     """Return the scene with models of one kind on its own patches or on `patch`, laws as they are.
 
-    The kind is "" for that of the scene, "mixed" for each as it is; `cells` goes to models that have a number of them.
+    The kind is "" for each as it is; `cells` goes to models that have a number of them.
     """
     if not kind:
-        kind = _label(scene)
         _check_cells(cells, [type(contact.model) for contact in scene.contacts])
     contacts = []
     for contact in scene.contacts:
         model = contact.model
-        if patch is not None or kind not in ("mixed", MODELS.name_of(model)):
-            make = type(model) if kind == "mixed" else MODELS[kind]
+        make = MODELS[kind] if kind else type(model)
+        if patch is not None or make is not type(model):
             wanted = getattr(model, "cells", None) if cells is None else cells
             below = model.patch if patch is None else patch
-            model = _make(make, below, model.law, wanted)
-        elif cells is not None and _has_cells(type(model)):
-            model = dataclasses.replace(model, cells=cells)
+            model = make(below, model.law, **_cells(make, wanted))
+        elif given := _cells(make, cells):
+            model = dataclasses.replace(model, **given)
         contacts.append(dataclasses.replace(contact, model=model))
     return dataclasses.replace(scene, contacts=tuple(contacts))
 
