@@ -94,6 +94,7 @@ PATCH_HELP = (
     f"{', '.join(PUBLISHED_PATCHES)}, disc, rectangle, or a pressure map (.csv, .npy, .npz, .mat, .asf, grey image; "
     "row 0 is the top) with --cell-size or --width."
 )
+"""Text on the values that the option `--patch` takes."""
 
 
 class FilePath(click.Path):
@@ -111,6 +112,7 @@ class FilePath(click.Path):
 
 
 FILE = FilePath()
+"""Type of options that name files or folders."""
 
 
 def or_file(words: Mapping[str, Any], incomplete: str) -> list[CompletionItem]:

@@ -59,9 +59,10 @@ LEVERS = {
     32.0: "vx and vy in mm/s, or tau in N mm",
     1e3: "all lengths in mm but those of the patch",
 }
+"""Factors on the contact radius that a wrong unit explains; a factor shows as the root of `tau v/(f omega)`."""
+
 SAME_LEVER = 2.0
-"""Factors on the contact radius that a unit explains, and how near they have to be; a factor shows as the root of
-`tau v/(f omega)`."""
+"""Largest ratio of a factor on the contact radius to one of `LEVERS` that it is put down to."""
 
 HIGH = 4.0
 """Friction over load above which one of both has another unit or another scale."""
@@ -106,17 +107,16 @@ USUAL = 1.0
 """Friction over load of a slide above which angles may be misread."""
 
 HALF = 0.5
-"""Share of a slide's friction that it must stay below once its angles are read as
-degrees."""
+"""Largest friction of slides whose angles are read as degrees, over the friction as read, if they are misread."""
 
 STILL = 2
-"""Number of steps without motion that show a frozen tracker."""
+"""Number of steps in a row without motion that show a frozen tracker."""
 
 SLOWED = 0.1
-"""Speed of these steps over that behind the jump that ends them."""
+"""Largest speed of a frozen tracker, over the speed after the jump that ends the freeze."""
 
 JUMP = 2.0
-"""Speed of the jump over that behind it."""
+"""Least speed of the jump after a freeze, over the speed after the jump."""
 
 
 class Finding(NamedTuple):

@@ -19,9 +19,16 @@ from planarfriction.geometry import rotate
 from planarfriction.scenes import Solution
 
 TWIST = ("vx", "vy", "omega")
+"""Names of the columns of a twist."""
+
 MOTION = ("x", "y", "theta")
+"""Names of the columns of a pose."""
+
 WRENCH = ("fx", "fy", "tau")
+"""Names of the columns of a wrench."""
+
 LOAD = ("normal_force",)
+"""Name of the column of the load, as a tuple."""
 
 ALIASES = {
     "time": "t",
@@ -51,7 +58,7 @@ MESSAGES = {
     "position.x": "x",
     "position.y": "y",
 }
-"""Columns by the names of ROS messages; what stands before them, as in wrench.force.x, does not count."""
+"""Names of columns by the names of fields of ROS messages, without their prefix, such as wrench in wrench.force.x."""
 
 UNITS = {
     "t": ("s",),
@@ -69,8 +76,10 @@ UNITS = {
 """Units that may stand in brackets behind a name, or below it, in small letters and without spaces."""
 
 _MESSAGE = re.compile(r"(?:.*[./_])?(force|torque|linear|angular|position)[./_]([xyz])")
+"""Pattern of the name of a field of a ROS message."""
 
 _HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
+"""Pattern of a heading: a name, and a unit in brackets."""
 
 
 def find_columns(

@@ -64,6 +64,7 @@ DRY = LuGre(
 """Dry friction with bristles so stiff that only the coefficient counts."""
 
 CHANNELS = (("x", "m"), ("y", "m"), ("theta", "rad"))
+"""Names and units of the measured channels of a slide."""
 
 FIRST_NOISE = 1e-3
 """Noise of positions in the first fit [m], of angles over the contact radius."""

@@ -64,6 +64,7 @@ SOFT_FINGER = {
 """Constants of a `SoftFinger`: its radius `c f_N^n`, the exponent `k` of its profile."""
 
 ALL = {**LAW, **SHAPE, **SOFT_FINGER}
+"""All parameters by name."""
 
 USUAL = (
     "mu_c",

@@ -115,8 +115,11 @@ FINEST = 32
 """Most steps between two samples."""
 
 NEARBY = 0.03
-"""Change of the values, as a share, up to which derivatives are kept: it moves no estimate by more than this share of
-its standard error, as they decide on the way to the minimum, and meet residuals of noise there."""
+"""Change of the values, as a share, up to which derivatives are kept.
+
+Derivatives only decide on the way to the minimum. There they meet residuals of noise, so that old ones move no estimate
+by more than this share of its standard error.
+"""
 
 SOFT = 3.0
 """Residual over the noise at which "soft_l1" passes from squares to sizes."""

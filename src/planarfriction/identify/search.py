@@ -315,20 +315,19 @@ def misfit(problem: LogProblem, values: np.ndarray, noise: np.ndarray) -> float:
 
 
 REACH = 2.0
-"""Standard errors at which the cost is looked at."""
+"""Distance from an estimate, in standard errors, at which its profile of the cost is computed."""
 
 NEAR = 0.8
-"""Share of the rise that the cost should have there from which on no further value is
-tried."""
+"""Rise of the cost at `REACH` standard errors, over that of a parabola, from which on no further value is tried."""
 
 TRIES = 3
-"""Most values that are tried on a side."""
+"""Largest number of held values that are tried on one side of an estimate."""
 
 SURE = 0.02
 """Standard error, as a share of the estimate, below which a ridge looks straight."""
 
 STIFF = 1e4
-"""Weight of a value that is held, over its share off."""
+"""Weight of the relative deviation from the value at which a parameter is held."""
 
 SETTLED = 0.02
 """Change of the cost at which a search with a held value ends."""

@@ -71,12 +71,11 @@ LEAD = next(iter(SIMULATORS))
 """Name of the quickest model, which finds where the others begin."""
 
 WORSE = 2.0
-"""Ratio of the costs of two kinds of bristles above which other models do without the
-worse one."""
+"""Ratio of the costs of two kinds of bristles above which the worse kind is not fitted with other models."""
 
 EXPLAINED = 1.2
-"""Mean square of the residuals over the noise above which they do so only if that kind
-is near the data: the quickest model may be wrong."""
+"""Reduced chi-square of the better kind of bristles above which the worse kind is left out only if its fit is near the
+data: the quickest model may be wrong."""
 
 USUAL_BRISTLES = ElastoPlastic(0.9)
 """Bristles that "auto" compares with plain ones."""

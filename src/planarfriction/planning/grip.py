@@ -45,7 +45,7 @@ TURN = 1e-3
 """Unit of the residual of a turn where the goal is a slide [rad]."""
 
 ROUGH = 0.08
-"""Weight of a bend of the profile by the holding load [-]: it chooses among profiles that do the same."""
+"""Weight of the second differences of a profile over the holding load [-]: they decide between equal profiles."""
 
 
 class Aim(NamedTuple):
@@ -308,6 +308,7 @@ GAIN = 1e-3
 """Share of the cost that a further step must save."""
 
 MOST_KNOTS = 200
+"""Largest number of knots of a profile."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -296,8 +296,13 @@ class Pusher(Checked):
 
 
 END = "end"
+"""Kind of touch: an end of the pusher at an edge of the slider."""
+
 CORNER = "corner"
+"""Kind of touch: a corner of the slider at the face of the pusher."""
+
 FACE = "face"
+"""Kind of touch: the face of the pusher flush with an edge of the slider."""
 
 _LEAST = 1e-4
 """Least displacement between two looks at a free pusher, as a share of the slider's size: it may miss a graze."""

@@ -57,6 +57,7 @@ _BATCH = 64
 """Largest number of runs that are handed out together."""
 
 _ENDED = "the executor ended ({}): finished runs are kept, sweep again to continue"
+"""Message about an executor that ended, with its reason."""
 
 
 @described
