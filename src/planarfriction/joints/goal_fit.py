@@ -410,13 +410,15 @@ def result_of(
         trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first)
     ]
     doubts = [*_check_related(problem, runs[0])]
-    shifts = {name: abs(kept.again[name] - value) for name, value in values.items()}
     jackknife = kept.jackknife
     series = tuple(
         Series(log.name, log.time, log.q, fitted[:, 0], rest[:, 0])
         for log, fitted, rest in zip(problem.logs, *runs, strict=True)
     )
-    spread = {name: float(np.hypot(jackknife[name], shifts[name])) for name in values}
+    spread = {
+        name: float(np.hypot(jackknife[name], kept.again[name] - value))
+        for name, value in values.items()
+    }
     freedom = len(kept.folds) - 1
     unclear = {}
     for term in kept.terms:

@@ -304,6 +304,7 @@ class JointLog(ByValue):
         flags = [headings["enabled"]] if "enabled" in headings else []
         columns = table.numbers([headings[each] for each in names], flags=flags).T
         read: dict[str, Any] = dict(zip(names, columns, strict=True))
+        read["time"] = read.pop("t")
         duty = read.pop("duty", None)
         supply = read.pop("supply", None)
         if duty is not None and supply is not None and "voltage" not in read:
@@ -311,9 +312,7 @@ class JointLog(ByValue):
         if drive is not None and "goal" in read:
             read.pop("voltage", None)
         try:
-            return cls(
-                read.pop("t"), read.pop("q"), **read, drive=drive, name=path.stem
-            )
+            return cls(**read, drive=drive, name=path.stem)
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
 

@@ -60,12 +60,10 @@ class JointFitProblem:
     def names(self) -> tuple[str, ...]:
         """Names of the parameters that are estimated, `[P]`."""
         names = [each for each in UNKNOWN if getattr(self.plant, each) is None]
-        names += ["torque_gain"] if self.torque_gain is None else []
-        names += (
-            ["back_emf"]
-            if any((moving(log) & (log.on == 0.0)).any() for log in self.logs)
-            else []
-        )
+        if self.torque_gain is None:
+            names.append("torque_gain")
+        if any((moving(log) & (log.on == 0.0)).any() for log in self.logs):
+            names.append("back_emf")
         return (*names, "mu_c", "sigma_2", *self._more)
 
     @property
@@ -86,21 +84,16 @@ class JointFitProblem:
     def plant_numbers(self, values: Values, log: JointLog) -> PlantNumbers:
         """Return what the loops read of plant and drive."""
         plant = self.settled(values)
-        drive = log.drive if log.voltage is None else None
-        inertia = plant.inertia + plant.pendulum_inertia
-        gain = values.get("torque_gain", self.torque_gain or 0.0)
-        back_emf = values.get("back_emf", 0.0)
-        servo = (
-            (0.0, 0.0, 0.0)
-            if drive is None
-            else (drive.kp * drive.gain, drive.supply, drive.sag)
-        )
+        drive = log.drive
+        servo = (0.0, 0.0, 0.0)
+        if log.voltage is None and drive is not None:
+            servo = drive.kp * drive.gain, drive.supply, drive.sag
         return PlantNumbers(
-            max(inertia, LEAST_INERTIA),
+            max(plant.inertia + plant.pendulum_inertia, LEAST_INERTIA),
             plant.moment,
             plant.offset,
-            gain,
-            back_emf,
+            values.get("torque_gain", self.torque_gain or 0.0),
+            values.get("back_emf", 0.0),
             *servo,
         )
 
@@ -113,19 +106,18 @@ class JointFitProblem:
 
         Runs begin again at the measured motion every `span` [s].
         """
-        motions = [np.empty((len(log.time), 2)) for log in logs]
+        motions = []
         joint = friction_of(values).rigid_numbers
-        for log, motion in zip(logs, motions, strict=True):
-            plant = self.plant_numbers(values, log)
-            given = log.goal if log.voltage is None else log.voltage
-            again = int(
-                min(max(2.0, span * len(log.time) / (log.time[-1] - log.time[0])), 1e9)
-            )
+        for log in logs:
+            rate = len(log.time) / (log.time[-1] - log.time[0])
+            again = int(min(max(2.0, span * rate), 1e9))
+            motion = np.empty((len(log.time), 2))
+            motions.append(motion)
             run_plant(
                 joint,
-                plant,
+                self.plant_numbers(values, log),
                 log.time,
-                given,
+                log.goal if log.voltage is None else log.voltage,
                 log.on,
                 log.outside,
                 log.motion,
@@ -157,9 +149,8 @@ class JointFitProblem:
     @property
     def groups(self) -> list[str]:
         """Names of the groups that are left out in turn."""
-        parts = (
-            [f", part {k + 1}" for k in range(self.parts)] if self.parts > 1 else [""]
-        )
+        parts = [f", part {k + 1}" for k in range(self.parts)]
+        parts = parts if self.parts > 1 else [""]
         return [log.name + part for log in self.logs for part in parts]
 
     # ------------------------------------------------------------------ start
@@ -178,11 +169,8 @@ class JointFitProblem:
                 [self._balance(values, log)[moving(log)] for log in self.logs]
             )
 
-        starts = (
-            [zero | {"offset": angle} for angle in OFFSETS]
-            if "offset" in names
-            else [zero]
-        )
+        angles = OFFSETS if "offset" in names else [0.0]
+        starts = [zero | {"offset": angle} for angle in angles]
         ends = [least(errors, each, names, True) for each in starts]
         found = min(ends, key=lambda each: np.square(errors(each)).sum())
         strong = np.abs(errors(zero))

@@ -1,7 +1,5 @@
 """Time steps of samples from a clock that may stop, jump or run at a wrong rate."""
 
-from __future__ import annotations
-
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 

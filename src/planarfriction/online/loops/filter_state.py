@@ -1,7 +1,5 @@
 """State of the friction filter: unknowns, the root of their covariance, and what it remembers of samples."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from planarfriction.online.loops.square_root import N

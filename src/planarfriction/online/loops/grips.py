@@ -1,7 +1,5 @@
 """Grip forces of the controllers of `planarfriction.online`, for one sample of every part (docs/online.md)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Both are fields of a record s, as those of `planarfriction.online.loops.filter_state.STATE`.
 """
 
-from __future__ import annotations
-
 import math
 
 from planarfriction._engine.codegen.vectors import clear
