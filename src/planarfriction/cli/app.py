@@ -196,9 +196,7 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
 )
 @option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
 @option("--csv", type=FILE, help="Table of samples to write (.csv).")
-def limit_surface(
-    patch: str | None, pressure: Path | None, size: dict[str, Any], **options: Any
-) -> None:
+def limit_surface(**options: Any) -> None:
     """Show the limit surface of a contact patch: numbers, a picture (next to its ellipsoid), a table as CSV.
 
     The CSV has the columns vx vy omega fx fy tau: twists in all directions and their friction wrenches for mu f_N = 1,
@@ -212,7 +210,7 @@ def limit_surface(
     """
     from planarfriction.cli import limit_surface as command
 
-    command.show(command.choose_patch(patch, pressure, size), **options)
+    command.show(**options)
 
 
 @app.command(short_help="Compile everything in advance.")

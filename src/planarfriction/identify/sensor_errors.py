@@ -186,14 +186,13 @@ class Rig:
         ]
         scales = [each.name == "load_scale" for each in self.columns]
         wide = np.hypot(SCALE, 0.5 * max(ranges) / EDGE)
-        return np.where(np.array(scales, dtype=bool), wide, self.widths)
+        return np.where(scales, wide, self.widths)
 
     def strains(self, values: np.ndarray) -> list[tuple[float, str]]:
         """Return the size of each value `[K]` over its width and in words, the largest first."""
-        both = zip(self.columns, values, strict=True)
         words = [
             f"{column.name} {value:.2g} {column.unit}".removesuffix(" -")
-            for column, value in both
+            for column, value in zip(self.columns, values, strict=True)
         ]
         sizes = np.abs(values / self.with_drift(values))
         return sorted(zip(sizes.tolist(), words, strict=True), reverse=True)

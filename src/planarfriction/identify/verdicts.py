@@ -472,10 +472,8 @@ def speed_gap(speeds: np.ndarray, around: float) -> str:
     slow, fast = np.quantile(moving, [0.02, 0.98])
     if fast < NARROW * slow:
         return f"no sample below {1e3 * slow:.2g} and above {1e3 * fast:.2g} mm/s"
-    below = moving[moving <= around]
-    above = moving[moving > around]
-    low = below.max() if len(below) else 0.0
-    high = above.min() if len(above) else np.inf
+    low = moving[moving <= around].max(initial=0.0)
+    high = moving[moving > around].min(initial=np.inf)
     if high < GAP * low:
         return ""
     if not np.isfinite(high):
