@@ -319,9 +319,16 @@ def plan(
       planarfriction identify plan slow.csv --wanted sigma_1
     """
     from planarfriction.cli import output
-    from planarfriction.cli.console import note
-    from planarfriction.identify import candidate_motions, design_experiment
+    from planarfriction.cli.console import note, work_progress
+    from planarfriction.identify import (
+        FitOptions,
+        candidate_motions,
+        current_estimate,
+        design_experiment,
+        identify_lugre,
+    )
     from planarfriction.identify.logs import columns_of
+    from planarfriction.identify.wrenches import guessed_law
 
     patch = find_patch(patch_name, size)
     names = parse_names(parameters)
@@ -331,7 +338,20 @@ def plan(
         output.check_kind(out)
     load = normal_force[0] if normal_force else None
     measured = [pf.Log.from_csv(path, normal_force=load) for path in logs]
-    patch, law = _known(measured, patch, names, values, spread)
+    law = guessed_law(values)
+    if measured:
+        with work_progress("identifying") as progress:
+            fit = identify_lugre(
+                measured,
+                patch,
+                parameters=names,
+                start=values,
+                model="reduced-published",
+                options=FitOptions(noise=spread),
+                progress=progress,
+            )
+        note(fit.summary().replace("\n", " "))
+        patch, law = current_estimate(fit, patch, law)
     usual = sorted({float(f"{log.normal_force.mean():.3g}") for log in measured})
     loads = normal_force or usual or [1.0]
     motions = candidate_motions(patch, law, normal_force=loads, **motion)
@@ -350,35 +370,6 @@ def plan(
         output.write_csv(out, columns_of(found.best))
         note(f"wrote {out}, with the expected wrench")
     return 0
-
-
-def _known(
-    logs: list[pf.Log],
-    patch: pf.ContactPatch,
-    names: tuple[str, ...],
-    start: dict[str, float],
-    noise: list[float] | None,
-) -> tuple[pf.ContactPatch, pf.LuGre]:
-    """Find patch and law as the logs show them, or as guessed where there are none."""
-    from planarfriction.cli.console import note, work_progress
-    from planarfriction.identify import FitOptions, current_estimate, identify_lugre
-    from planarfriction.identify.wrenches import guessed_law
-
-    law = guessed_law(start)
-    if not logs:
-        return patch, law
-    with work_progress("identifying") as progress:
-        found = identify_lugre(
-            logs,
-            patch,
-            parameters=names,
-            start=start,
-            model="reduced-published",
-            options=FitOptions(noise=noise),
-            progress=progress,
-        )
-    note(found.summary().replace("\n", " "))
-    return current_estimate(found, patch, law)
 
 
 @command(

@@ -255,7 +255,13 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
     base = problem.start_values()
     law = problem.law
     speeds = problem.sliding(base)[0]
-    mu_c, mu_s = _friction(problem, speeds)
+    # friction of fast sliding, and the largest
+    coefficient = problem.coefficients(base)
+    usable = np.isfinite(coefficient)
+    coefficient = coefficient[usable]
+    fast = speeds[usable] >= np.quantile(speeds[usable], 0.7)
+    mu_c = np.clip(np.median(coefficient[fast]), 0.01, 10.0)
+    mu_s = np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c)
     wanted = [name for name in problem.names if name not in given]
     interval = min(log.interval for log in problem.logs)
     grid = itertools.product(
@@ -276,17 +282,6 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
         picked = {name: guess[name] for name in wanted if name in guess}
         results.append(np.array([*(problem.by_name(base) | picked).values()]))
     return results
-
-
-def _friction(problem: LogProblem, speeds: np.ndarray) -> tuple[float, float]:
-    """Estimate the friction coefficients of fast sliding and of the largest friction."""
-    coefficient = problem.coefficients(problem.start_values())
-    usable = np.isfinite(coefficient)
-    coefficient = coefficient[usable]
-    speed = speeds[usable]
-    fast = coefficient[speed >= np.quantile(speed, 0.7)]
-    mu_c = np.clip(np.median(fast), 0.01, 10.0)
-    return mu_c, np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c)
 
 
 def _speeds(speeds: np.ndarray) -> np.ndarray:

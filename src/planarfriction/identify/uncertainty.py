@@ -8,12 +8,11 @@ for each, one Gauss-Newton step of it together with all that was fitted, from wh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.identify.parameters import ALL, LAW, PRIOR, Coordinates, fitted_law
+from planarfriction.identify.parameters import ALL, LAW, Coordinates, fitted_law
 from planarfriction.identify.sensor_errors import TINY
 
 EXCESS = 1.25
@@ -283,32 +282,6 @@ def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
         strengths = np.maximum(strengths, 1e-12 * strengths[0])
         inner = (axes.T / strengths**2) @ axes
         result[np.ix_(seen, seen)] = inner / np.outer(size[seen], size[seen])
-    return result
-
-
-def draws(
-    names: Sequence[str],
-    values: np.ndarray,
-    errors: np.ndarray,
-    correlations: np.ndarray,
-    normal: np.ndarray,
-) -> np.ndarray:
-    """Return values `[n, F]` of parameters with these errors and correlations, from `normal` numbers `[n, F]`.
-
-    As in intervals, errors of values > 0 are factors: at most that of the prior (`parameters.PRIOR`). Others stay
-    within the bounds of a fit, and where no error is known at the estimate.
-    """
-    strengths, axes = np.linalg.eigh(correlations)
-    unit = normal @ (axes * np.sqrt(np.maximum(strengths, 0.0))) @ axes.T
-    result = np.empty_like(unit)
-    for i, (name, value, error) in enumerate(zip(names, values, errors, strict=True)):
-        own = ALL[name]
-        if own.logarithmic and value > 0.0:
-            # fmin: an error that is not known is the prior's
-            drawn = value * np.exp(np.fmin(error / value, PRIOR) * unit[:, i])
-        else:
-            drawn = value + finite(error) * unit[:, i]
-        result[:, i] = np.clip(drawn, own.low, own.high)
     return result
 
 

@@ -633,8 +633,15 @@ def fit_torques(
     errors = [np.abs(each.fitted - each.measured).mean() for each in series]
     plain = [np.abs(each.baseline - each.measured).mean() for each in series]
     names = tuple(each.name for each in series)
+    # the inertia less that of a known pendulum; without a mass, the offset is 0 already
+    settled = replace(plant, arm_mass=plant.arm_mass or 0.0)
+    if plant.inertia is None:
+        inertia = max(values["inertia"] - plant.pendulum_inertia, 0.0)
+        settled = replace(settled, inertia=inertia)
+    if plant.offset is None:
+        settled = replace(settled, offset=values.get("offset", 0.0))
     found = JointFit(
-        logs, _settled(plant, values), None, fit.terms, values, spread, fit.freedom,
+        logs, settled, None, fit.terms, values, spread, fit.freedom,
         names, np.array(errors), np.array(plain), series, unclear, (),
     )  # fmt: skip
     refuse(data, fit, rest, found.intervals)
@@ -660,17 +667,3 @@ def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float]]:
         spread["gravity"] = float(np.hypot.reduce(errors))
         spread["offset"] = spread["gravity"] / max(values["gravity"], 1e-300)
     return values, spread
-
-
-def _settled(plant: Plant, values: Mapping[str, float]) -> Plant:
-    """Return the plant with what a fit to torques estimated: its inertia, less that of a known pendulum, and offset."""
-    inertia = (
-        max(values["inertia"] - plant.pendulum_inertia, 0.0)
-        if plant.inertia is None
-        else plant.inertia
-    )
-    # without a mass, the offset is 0 already
-    offset = values.get("offset", 0.0) if plant.offset is None else plant.offset
-    return replace(
-        plant, inertia=inertia, arm_mass=plant.arm_mass or 0.0, offset=offset
-    )

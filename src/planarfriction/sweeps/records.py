@@ -199,15 +199,6 @@ def unpack(content: bytes) -> dict[str, Record]:
     return runs
 
 
-def failure(reason: str, scene: Scene | None) -> str:
-    """Return reason and scene of a failed run as JSON; `Scene.from_dict` reads the scene."""
-    try:
-        table: Any = None if scene is None else scene.to_dict()
-    except FrictionError as error:  # with a model that is not registered
-        table = str(error)
-    return json.dumps({"reason": reason, "scene": table}, indent=1) + "\n"
-
-
 MOST_NUMBERS = 2 * 10**9
 """Largest number of numbers of one variable in memory: 16 GB."""
 
@@ -279,9 +270,14 @@ class Bookkeeper:
                 self._open[key] = record
                 with contextlib.suppress(OSError):
                     failed.unlink()
-            elif key:  # there is a scene
+            elif scene is not None:
                 try:
-                    write_text(failed, failure(record.reason, scene))
+                    table: Any = scene.to_dict()
+                except FrictionError as error:  # with a model that is not registered
+                    table = str(error)
+                content = {"reason": record.reason, "scene": table}
+                try:
+                    write_text(failed, json.dumps(content, indent=1) + "\n")
                 except FileError:
                     if not failed.is_dir():
                         raise
@@ -332,14 +328,14 @@ class Bookkeeper:
         if not done:
             return {}
         time = instants(self._ends) if self.timed else None
-        first = _over(self.runs[done[0]][1], time)
+        first = over(self.runs[done[0]][1], time)
         check_names(self.grid, first)
         columns: dict[str, dict[Index, Any]] = {
             name: {} for name, each in first.items() if each.dims != (name,)
         }
         for index in done:
             key, record = self.runs[index]
-            found = _over(record, time)
+            found = over(record, time)
             if differing := difference(found, first):
                 record = record._replace(status=FAILED, reason=differing)
             else:
@@ -396,16 +392,13 @@ def instants(ends: Iterable[tuple[float, float]]) -> np.ndarray:
     return times[np.diff(times, prepend=-np.inf) > SAME_TIME]
 
 
-def _over(record: Record, time: np.ndarray | None) -> dict[str, History]:
-    """Return the variables of a run, over common instants if they are histories."""
-    return record.variables if time is None else on_instants(record, time)
-
-
-def on_instants(record: Record, time: np.ndarray) -> dict[str, History]:
-    """Return the variables of a run over common instants, NaN at those that it does not have.
+def over(record: Record, time: np.ndarray | None) -> dict[str, History]:
+    """Return the variables of a run; histories over common instants, if given, NaN at those that the run does not have.
 
     A body that came to rest keeps its last values until its run would have ended.
     """
+    if time is None:
+        return record.variables
     own = np.asarray(record.variables["time"].values)
     at = np.searchsorted(time, own - SAME_TIME)
     on = (at < len(time)) & (
