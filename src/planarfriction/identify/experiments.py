@@ -195,7 +195,15 @@ def design_experiment(
             raise InvalidValueError(
                 f"twist of {each.name}", "move the contact", "0 throughout"
             )
-    sigma = _noise(noise, before, candidates, patch, law)
+    if noise is not None:
+        sigma = check_noise("noise", noise)
+    elif before:
+        sigma = wrench_noise(before)
+    else:
+        load = max(each.normal_force.max() for each in candidates)
+        validation.positive("normal_force of the motions", load)
+        force = NOISE * law.mu_c * load
+        sigma = np.array([force, force, force * patch.contact_radius(load)])
     later = tuple(group for group in groups if group != "twist")
     information = _Information(patch, law, names, later, sigma)
     so_far = information.prior()
@@ -323,24 +331,6 @@ class _Information:
 def _entropy(covariance: np.ndarray, pick: Sequence[int]) -> float:
     """Compute the entropy of the picked coordinates [bit], up to a constant."""
     return 0.5 * np.linalg.slogdet(covariance[np.ix_(pick, pick)])[1] / np.log(2.0)
-
-
-def _noise(
-    given: Any,
-    logs: Sequence[Log],
-    motions: Sequence[Log],
-    patch: ContactPatch,
-    law: LuGre,
-) -> np.ndarray:
-    """Return the noise `[3]` of the wrenches: as given, that of the logs, or a share of friction."""
-    if given is not None:
-        return check_noise("noise", given)
-    if logs:
-        return wrench_noise(logs)
-    load = max(motion.normal_force.max() for motion in motions)
-    validation.positive("normal_force of the motions", load)
-    force = NOISE * law.mu_c * load
-    return np.array([force, force, force * patch.contact_radius(load)])
 
 
 # ---------------------------------------------------------------------- motions to choose from

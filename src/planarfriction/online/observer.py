@@ -193,6 +193,10 @@ class FrictionObserver:
         middle = np.log([numbers.mu_c, numbers.mu_s / numbers.mu_c, 1.0])
         frame = surface._frame()
         back = np.linalg.inv(frame)
+        growth = 0.0  # d log r/d log f_N of the contact radius
+        if model.depends_on_load:
+            small, large = (model.patch.contact_radius(c * load) for c in (0.5, 2.0))
+            growth = math.log(large / small) / math.log(4.0)
         quantum = sensors.quantum
         place = quantum / max(sensors.slip_rate, 1.0)
         noise = np.abs(back.T) @ (
@@ -208,7 +212,7 @@ class FrictionObserver:
             -back.T.copy(),
             surface.contact_radius,
             load,
-            _growth(model.patch, load),
+            growth,
             numbers.v_s,
             numbers.gamma,
             numbers.sigma_2,
@@ -306,11 +310,3 @@ def _planes(surface: LimitSurface) -> np.ndarray:
         [across * np.cos(azimuth), across * np.sin(azimuth), np.cos(polar)], axis=-1
     ).reshape(-1, 3)
     return units / np.einsum("mi,mi->m", surface.direction(units), units)[:, None]
-
-
-def _growth(patch: Any, load: float) -> float:
-    """Return `d log r/d log f_N` of the contact radius at a load [N]."""
-    if not patch.depends_on_load:
-        return 0.0
-    small, large = (patch.contact_radius(share * load) for share in (0.5, 2.0))
-    return math.log(large / small) / math.log(4.0)
