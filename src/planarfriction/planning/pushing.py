@@ -252,10 +252,19 @@ class Slider(ByValue):
         self._set(outline=corners)
 
     @cached_property
+    def _edges(self) -> np.ndarray:
+        """Vectors along the edges, counter-clockwise `[M, 2]` [m]; edge j begins at corner j."""
+        return np.roll(self.outline, -1, axis=0) - self.outline
+
+    @cached_property
+    def lengths(self) -> np.ndarray:
+        """Lengths of the edges `[M]` [m]."""
+        return np.hypot(*self._edges.T)
+
+    @cached_property
     def along(self) -> np.ndarray:
         """Unit vectors along the edges, counter-clockwise `[M, 2]`; edge j begins at corner j."""
-        edges = np.roll(self.outline, -1, axis=0) - self.outline
-        return edges / np.hypot(*edges.T)[:, None]
+        return self._edges / self.lengths[:, None]
 
     @cached_property
     def inward(self) -> np.ndarray:
@@ -337,8 +346,6 @@ class Scenery:
     def __post_init__(self) -> None:
         self._rates = np.diff(self.poses, axis=0) / np.diff(self.times)[:, None]
         self.near = _NEAR * self.slider.size
-        edges = np.roll(self.slider.outline, -1, axis=0) - self.slider.outline
-        self._lengths = np.hypot(*edges.T)
 
     def pose(self, t: float) -> np.ndarray:
         """Return the pose of the pusher `[3]`."""
@@ -422,7 +429,7 @@ class Scenery:
             return 0.5 * self.pusher.width - abs(self.corners(t, q)[contact.edge][1])
         if contact.kind == END:
             s = self.along(contact.edge, self.end(contact.end, t, q))
-            return min(s, self._lengths[contact.edge] - s)
+            return min(s, self.slider.lengths[contact.edge] - s)
         low, high = self.overlap(contact.edge, t, q)
         return high - low
 
@@ -433,7 +440,7 @@ class Scenery:
     def overlap(self, edge: int, t: float, q: np.ndarray) -> tuple[float, float]:
         """Return the part of an edge that the face covers, from its left to its right end as it looks [m]."""
         right, left = (self.along(edge, self.end(i, t, q)) for i in range(2))
-        return max(left, 0.0), min(right, self._lengths[edge])
+        return max(left, 0.0), min(right, self.slider.lengths[edge])
 
     def rate(self, t: float, forward: bool = False) -> np.ndarray:
         """Return the velocity of the pusher `[3]`."""
