@@ -190,15 +190,14 @@ class SlideProblem(LeastSquaresProblem):
 
     def __post_init__(self) -> None:
         self.starts = [start_of(slide) for slide in self.slides]
+        lengths = [len(slide.time) for slide in self.slides]
+        self.owner = np.repeat(np.arange(len(lengths)), lengths)
         # Of the first evaluation; later ones begin where the last one ended.
         self._turns = 3
 
     @property
     def numbers(self) -> int:
-        return sum(self.sizes())
-
-    def sizes(self) -> list[int]:
-        return [slide.pose.size for slide in self.slides]
+        return 3 * len(self.owner)
 
     def start_values(self) -> np.ndarray:
         """Return the values `[F]` of the names in the start."""
@@ -229,8 +228,7 @@ class SlideProblem(LeastSquaresProblem):
         ]
 
     def even_sigma(self, noise: np.ndarray) -> np.ndarray:
-        rows = np.broadcast_to(noise, (len(self.slides), 3))
-        return np.repeat(rows, [len(slide.time) for slide in self.slides], axis=0)
+        return np.broadcast_to(noise, (len(self.slides), 3))[self.owner]
 
     def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> Linear:
         """Estimate the noise `[S, 3]`, equal for x and y, from the residuals at `values`, and sigma of each sample."""

@@ -149,8 +149,8 @@ class LeastSquaresProblem:
 
     numbers: Any
     """Number of measured numbers."""
-    sizes: Any
-    """Return the number of residuals of each log or slide."""
+    owner: np.ndarray
+    """Number of the log or slide of each sample that is fitted."""
     linearised: Any
     """Return `Linear` residuals for values `[F + K]` and `sigma`."""
     even_sigma: Any
@@ -207,8 +207,9 @@ class LeastSquaresProblem:
 
     def by_log(self, rows: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the rows `[T, 3, C]` of each log or slide among flat ones `[M, C]`."""
-        for each in np.split(rows, np.cumsum(self.sizes())[:-1]):
-            yield each.reshape(-1, 3, rows.shape[1])
+        samples = rows.reshape(len(self.owner), 3, -1)
+        for i in range(self.owner[-1] + 1):
+            yield samples[self.owner == i]
 
 
 @dataclass(eq=False)
@@ -245,6 +246,7 @@ class LogProblem(LeastSquaresProblem):
         used = [np.isin(np.arange(len(log.time)), log.inner[first:]) for log in logs]
         self._log = np.repeat(np.arange(len(logs)), [len(each) for each in used])
         self.used = np.concatenate(used)
+        self.owner = self._log[self.used]
         self.measured = np.concatenate([log.wrench for log in logs])
         self.channels = np.array([log.channels for log in logs])[self._log]
         own = self._per_load if self.kind.own_radius else self.law
@@ -318,9 +320,6 @@ class LogProblem(LeastSquaresProblem):
         return Coordinates(
             self.names, start, self.law.mu_c, self.rig.widths, self.rig.limits
         )
-
-    def sizes(self) -> np.ndarray:
-        return 3 * np.bincount(self._log[self.used])
 
     def refine_steps(self, values: np.ndarray, sigma: np.ndarray) -> bool:
         """Take as many steps as keep the estimates within `COARSE` standard errors; returns True if these are more.

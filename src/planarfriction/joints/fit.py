@@ -8,7 +8,7 @@ from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints import balance, goal_fit, problem, torque_fit
 from planarfriction.joints.log import JointLog, Plant, as_joint_logs
-from planarfriction.joints.result import JointFit
+from planarfriction.joints.problem import JointFit
 
 Progress = Callable[[str], None]
 """Function that is told each step of a fit in words."""

@@ -16,10 +16,12 @@ from planarfriction.joints.problem import (
     NEEDS,
     SHORT,
     TERMS,
+    JointFit,
     JointFitProblem,
+    Series,
     friction_of,
+    not_shown,
 )
-from planarfriction.joints.result import JointFit, Series, not_shown
 
 LAGS = np.arange(-20, 61) * 1e-3
 """Delays of a reported speed that are tried [s]."""

@@ -22,7 +22,7 @@ from planarfriction.joints.balance import (
 from planarfriction.joints.goal_fit import lags
 from planarfriction.joints.log import JointLog, Plant
 from planarfriction.joints.numbers import PARAMETERS, Values
-from planarfriction.joints.result import JointFit, Series, not_shown
+from planarfriction.joints.problem import JointFit, Series, not_shown
 from planarfriction.joints.smoothing import (
     DELAYS,
     Rows,
