@@ -156,38 +156,50 @@ def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
     )
 
 
+def _into_size(ctx: click.Context, param: click.Parameter, value: Any) -> None:
+    """Put the value of an option into the argument `size` of its command, if it is given."""
+    size = ctx.params.setdefault("size", {})
+    if value is not None:
+        size[param.name] = value
+
+
+_map_option = functools.partial(option, expose_value=False, callback=_into_size)
+"""Maker of options that a command gets as parts of its argument `size`."""
+
 _MAP_OPTIONS = (
-    option("--cell-size", type=float, help="Side of a cell of a pressure map in m."),
-    option(
+    _map_option(
+        "--cell-size", type=float, help="Side of a cell of a pressure map in m."
+    ),
+    _map_option(
         "--width",
         type=float,
         help=f"Width in m of a patch. Default: {WIDTH}, or the scene's or map's.",
     ),
-    option(
+    _map_option(
         "--header/--no-header",
         default=None,
         help="First row of a CSV map: names, or pressures.",
     ),
-    option(
+    _map_option(
         "--index/--no-index",
         default=None,
         help="First column of a CSV map: labels, or pressures.",
     ),
-    option(
+    _map_option(
         "--frame", type=int, help="Frame or page of a map that has several, from 0."
     ),
-    option(
+    _map_option(
         "--frame-shape",
         type=(int, int),
         metavar="ROWS COLUMNS",
         help="Shape of frames that are rows.",
     ),
-    option(
+    _map_option(
         "--threshold",
         type=float,
         help="Share of the peak up to which cells of a map count as empty.",
     ),
-    option(
+    _map_option(
         "--invert/--no-invert",
         default=None,
         help="In an image, dark means pressure, or bright does.",
@@ -198,27 +210,9 @@ _MAP_OPTIONS = (
 
 def map_options(function: Any) -> Any:
     """Add the options of pressure maps; the command gets those that were given, by name, as `size`."""
-    names = (
-        "cell_size",
-        "width",
-        "header",
-        "index",
-        "frame",
-        "frame_shape",
-        "threshold",
-        "invert",
-    )
-
-    @functools.wraps(function)
-    def command(*arguments: Any, **options: Any) -> Any:
-        size = {
-            name: value for name in names if (value := options.pop(name)) is not None
-        }
-        return function(*arguments, size=size, **options)
-
     for add in reversed(_MAP_OPTIONS):
-        command = add(command)
-    return command
+        function = add(function)
+    return function
 
 
 def load_function(option: str, entry: str) -> tuple[str, Callable[[Any], Any]]:
