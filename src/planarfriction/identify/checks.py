@@ -43,8 +43,7 @@ MISREAD = 5.0
 may have been misread."""
 
 BETTER = 0.4
-"""Share to which another reading must lower that angle to be named: no reading lowers
-noise."""
+"""Largest angle of another reading over the angle as read, if that reading is to be named: no reading lowers noise."""
 
 NEAR = np.geomspace(1.0 / 3.0, 3.0, 9)
 """Factors on the estimated size of a patch that count as the same patch."""
@@ -94,14 +93,14 @@ VARIES = 0.1
 measured slides have 0.07."""
 
 STEADIER = 0.3
-"""Share to which degrees must lower the spread of friction in slides."""
+"""Largest spread of friction in slides if angles are read as degrees, over the spread as read, if they are degrees."""
 
 SURE = 0.3
 """Spread of the logarithm of friction from which on no other cause is left than misread
 angles."""
 
 FEW = 4
-"""Number of slides from which on their spread is judged."""
+"""Number of decelerations from which on their spread is judged."""
 
 USUAL = 1.0
 """Friction over load of a slide above which angles may be misread."""

@@ -537,6 +537,11 @@ def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.nda
     return result
 
 
+def runs(mask: np.ndarray) -> np.ndarray:
+    """Return the first index of each run of True, and the first behind it, `[N, 2]`."""
+    return np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
+
+
 def is_mean(time: np.ndarray, omega: np.ndarray, angle: np.ndarray) -> bool:
     """Return True if each `omega` `[T]` is the mean since the sample before, and not the spin at its own instant.
 

@@ -83,7 +83,7 @@ FEW = 10
 """Number of slides below which their spread gives only a rough error."""
 
 FADING = np.linspace(1.0, 0.0, 50)
-"""Speeds of a slide on its way to rest over its first one."""
+"""Speeds of a slide until it rests, over its first speed."""
 
 Build = Callable[..., Any]
 """Function that makes a friction model from a patch and a law."""

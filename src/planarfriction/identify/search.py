@@ -1,4 +1,4 @@
-"""The search for the best values: starting points, bounded least squares, noise from what is left, finer steps.
+"""Search for the best values: starting points, bounded least squares, noise from the residuals, finer steps.
 
 On curved ridges of the cost linear standard errors are too small: there intervals follow from its profile.
 """

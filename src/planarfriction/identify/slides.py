@@ -15,7 +15,7 @@ from numpy.polynomial import polynomial
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Checked, checked
 from planarfriction.derivatives.scene_inputs import STATES
-from planarfriction.identify.logs import Linear, increasing, unwrapped
+from planarfriction.identify.logs import Linear, increasing, runs, unwrapped
 from planarfriction.identify.problem import check_noise
 from planarfriction.identify.verdicts import Verdict, caution, few_of
 from planarfriction.scenes import simulate
@@ -37,10 +37,10 @@ NOISE = 6.0
 """Growth of the speed over the sigma of its noise beyond which a body was pushed."""
 
 FREE = 0.2
-"""Deceleration of a body without friction, as a share of the usual one."""
+"""Deceleration below which a body counts as free of friction, as a share of the usual deceleration."""
 
 LONG = 0.25
-"""Duration of a motion without friction, as a share of the whole."""
+"""Duration of a motion without friction, as a share of the slide, beyond which a body lost contact or was pushed."""
 
 MODEST = 2.5
 """Error of a slide over that of the median slide from which it counts less."""
@@ -276,21 +276,15 @@ def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, s
 
 def _brake(time: np.ndarray, speed: np.ndarray) -> float:
     """Compute the mean deceleration until the speed is a tenth of the first [m/s^2]."""
-    slow = np.flatnonzero(speed < 0.1 * speed[0])
-    last = slow[0] if len(slow) else len(speed) - 1
+    last = np.append(np.flatnonzero(speed < 0.1 * speed[0]), len(speed) - 1)[0]
     return (speed[0] - speed[last]) / (time[last] - time[0]) if last > 0 else 0.0
 
 
 def _free(time: np.ndarray, speed: np.ndarray, least: float) -> float:
     """Compute the longest time over which a moving body decelerates by less than `least` [m/s^2]."""
-    longest = since = 0.0
-    for k, step in enumerate(np.diff(time)):
-        before, after = speed[k : k + 2]
-        moves = min(before, after) > 0.25 * speed.max()
-        free = moves and before - after < least * step
-        since = since + step if free else 0.0
-        longest = max(longest, since)
-    return longest
+    moves = np.minimum(speed[:-1], speed[1:]) > 0.25 * speed.max()
+    free = moves & (-np.diff(speed) < least * np.diff(time))
+    return np.ptp(time[runs(free)], axis=1).max(initial=0.0)
 
 
 def weights(errors: np.ndarray) -> np.ndarray:

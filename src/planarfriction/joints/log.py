@@ -20,6 +20,7 @@ from planarfriction.identify.logs import (
     LEAST_SAMPLES,
     as_tuple,
     increasing,
+    runs,
     slopes,
     unwrapped,
 )
@@ -367,11 +368,6 @@ def _check_sensors(log: JointLog) -> None:
             "come to rest gradually (a dead sensor, or a stop: cut it out)",
             f"still for {seconds:.2g} s from t = {log.time[first]:g} s on, right after {before:.2g} rad/s",
         )
-
-
-def runs(mask: np.ndarray) -> np.ndarray:
-    """Return the first index of each run of True, and the first behind it, `[N, 2]`."""
-    return np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
 
 
 def _longest_run(values: np.ndarray) -> Sequence[int]:

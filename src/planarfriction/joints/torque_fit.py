@@ -69,7 +69,7 @@ LATEST = 7e-4
 """Delay of the torque [s] from which on it may be a low pass instead."""
 
 WIDER = 1.6
-"""Factor on the width of the kernel by which estimates are tried again."""
+"""Factor on the width of the kernel with which estimates are computed again."""
 
 MOST_RISE = 2.0
 """Rise of the level towards rest, over the Coulomb level, above which `BANDS` bands of speed must show it."""

@@ -367,7 +367,7 @@ def _unsure(c, e, dt, silence, seeks, lost):
 
 @kernel
 def _begin(c, value, most):
-    """Return the grip from which it first falls: the last `value` before the filters have settled."""
+    """Return the grip [N] from which a controller first lowers it: the last `value` before the filters have settled."""
     if c.start > LARGEST or c.age < SETTLED:
         c.start = value
     return min(c.start, most)
@@ -377,7 +377,7 @@ def _begin(c, value, most):
 def _set(c, asked, most):
     """Set the grip that is asked for; before the filters have settled and a slip velocity may have come, leave it.
 
-    It does not fall while wrench or load are missing, or a slip velocity is overdue.
+    The grip does not fall while wrench or load are missing, or a slip velocity is overdue.
     """
     asked = max(asked, c.grip) if c.mute > 0.0 or c.silent == OVERDUE else asked
     ready = c.age >= SETTLED and (c.span >= 0.0 or c.age >= PAUSE)
