@@ -149,7 +149,7 @@ class Descent:
 
     def _residual(self, x: np.ndarray) -> np.ndarray:
         self._last = condensed(*self.residuals(x))
-        cost = 0.5 * self._last[0] @ self._last[0]
+        cost = 0.5 * float(self._last[0] @ self._last[0])
         settled = abs(cost - self.cost) < self.share * cost
         if cost < self.cost:
             self.x = x.copy()

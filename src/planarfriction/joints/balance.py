@@ -283,8 +283,8 @@ def search(
         sums = []
         for columns in zip(load, falling, strict=True):
             table = np.hstack([linear, *columns, torques])
-            parts = [table[folds == i] for i in np.unique(folds)]
-            sums.append([each.T @ each for each in parts])
+            masks = [folds == i for i in np.unique(folds)]
+            sums.append([table[each].T @ table[each] for each in masks])
         found = [_best(each, np.array(sums), grid, weak) for each in sets]
         return sorted(found, key=lambda each: each.score)
 
