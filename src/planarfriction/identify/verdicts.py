@@ -277,32 +277,27 @@ def judge(
     for i, name in enumerate(evidence.names):
         verdict = judge_parameter(evidence, i)
         if verdict is None or verdict.identifiable:
-            reason = _depends(evidence, i, held, others)
+            error = evidence.errors[i]
+            low, high = interval(name, evidence.values[i], error)
+            reasons = [
+                f"it changes by {each.moves[i]:+.2g} if {each.name} is not held"
+                for each in held
+                if not each.agrees and abs(each.moves[i]) > MOVED * error
+            ]
+            reasons += [
+                f"depends on the model: {each}, which also fits, gives {each.estimates[name]:.3g}"
+                for each in others
+                if not low <= each.estimates[name] <= high
+            ]
             if u.rejected:
-                reason = f"{chosen.model} does not explain the data, so this value has no meaning"
-            if reason:
-                verdict = Verdict(name, False, reason)
+                reasons = [
+                    f"{chosen.model} does not explain the data, so this value has no meaning"
+                ]
+            if reasons:
+                verdict = Verdict(name, False, reasons[0])
         if verdict is not None:
             verdicts.append(verdict)
     return tuple(verdicts)
-
-
-def _depends(
-    evidence: Evidence, i: int, held: Sequence[Pull], others: Sequence[ModelScore]
-) -> str:
-    """Return the value that was held, or the other model that fits, on which an estimate depends, or nothing."""
-    error = evidence.errors[i]
-    for each in held:
-        if not each.agrees and abs(each.moves[i]) > MOVED * error:
-            return f"it changes by {each.moves[i]:+.2g} if {each.name} is not held"
-    name = evidence.names[i]
-    low, high = interval(name, evidence.values[i], error)
-    for other in others:
-        if not low <= (estimate := other.estimates[name]) <= high:
-            return (
-                f"depends on the model: {other}, which also fits, gives {estimate:.3g}"
-            )
-    return ""
 
 
 def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:

@@ -176,7 +176,8 @@ def plan_push(
     path = _path(slider, place, x, start)
     done = push(slider, pusher, path, start=start)
     for _ in range(ROUNDS):
-        aim = aim + rotate(goal - done.end, -start[2])
+        reached = rotate(done.end - start, -start[2])
+        aim = aim + rotate(goal - start, -start[2]) - reached
         length, x = _shortest(slider, place, largest, aim, x)
         if length == math.inf:
             break

@@ -100,6 +100,8 @@ def motion_at(
     All in the slider's axes; the pusher approaches, `velocity . normal > 0`. A mode that is `held` stays so beyond its
     end, where its slack is negative.
     """
+    from scipy.optimize import brentq
+
     if place.half_width > 0.0:
         return _flush(surface, place, mu, velocity, held)
     angle = math.atan(mu)
@@ -110,7 +112,15 @@ def motion_at(
         held = LEFT if wanted >= left else RIGHT
     mode = held or (LEFT if wanted >= left else RIGHT if wanted <= right else STICK)
     if mode == STICK:
-        twist, moved = _stuck(surface, place, angle + _BEYOND, wanted)
+        reach = angle + _BEYOND
+        off = lambda at: _angle(place, pushed_by(surface, place, at)[1]) - wanted
+        try:
+            found: float = brentq(off, -reach, reach, xtol=1e-13)  # pyright: ignore
+        except (
+            ValueError
+        ):  # far beyond the end of the mode: a step that will be taken back
+            found = math.copysign(reach, -off(reach))
+        twist, moved = pushed_by(surface, place, found)
         scale = math.hypot(*velocity[:2]) / math.hypot(*moved)
         return SliderMotion(scale * twist, mode, min(wanted - right, left - wanted))
     twist, moved = edges[mode == LEFT]
@@ -147,20 +157,6 @@ def pushed_by(
     twist = surface.twist((-fx, -fy, y * fx - x * fy))
     vx, vy, omega = twist.tolist()
     return twist, (vx - omega * y, vy + omega * x)
-
-
-def _stuck(
-    surface: LimitSurface, place: TouchPoint, angle: float, wanted: float
-) -> tuple[np.ndarray, Any]:
-    """Return the twist whose place has a velocity of the wanted angle, and that velocity."""
-    from scipy.optimize import brentq
-
-    off = lambda each: _angle(place, pushed_by(surface, place, each)[1]) - wanted
-    try:
-        found: float = brentq(off, -angle, angle, xtol=1e-13)  # pyright: ignore
-    except ValueError:  # far beyond the end of the mode: a step that will be taken back
-        found = math.copysign(angle, -off(angle))
-    return pushed_by(surface, place, found)
 
 
 # ---------------------------------------------------------------------- a face that lies flush
