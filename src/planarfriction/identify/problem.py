@@ -390,7 +390,12 @@ class LogProblem(LeastSquaresProblem):
 
     def linearised(self, values: np.ndarray, sigma: np.ndarray) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, and derivatives `[M, F + K]`, at `values` or nearby (`NEARBY`)."""
-        if self._slopes is None or not self._near(values, self._slopes[0]):
+        contact, _ = self.split(np.abs(values))
+        centre = np.isin(self.names, ("centre_x", "centre_y"))
+        sizes = np.maximum(contact, self.base["contact_radius"] * centre)
+        most = NEARBY * np.append(sizes, self.rig.widths)
+        known = self._slopes
+        if known is None or (np.abs(values - known[0]) > most).any():
             self._slopes = self._derive(values)
         rows = self._slopes[1] * (self.channels / sigma)[..., None]
         residual, factor = self._counted(values, sigma)
@@ -414,14 +419,6 @@ class LogProblem(LeastSquaresProblem):
             np.concatenate([values[:count], held, values[count:]]), sigma
         )
         return residual, slopes[:, count : count + len(names)]
-
-    def _near(self, values: np.ndarray, others: np.ndarray) -> bool:
-        """Return True if no value differs by more than `NEARBY` from another one, as a share of its size."""
-        contact, _ = self.split(np.abs(values))
-        centre = np.isin(self.names, ("centre_x", "centre_y"))
-        sizes = np.maximum(contact, self.base["contact_radius"] * centre)
-        most = NEARBY * np.append(sizes, self.rig.widths)
-        return bool((np.abs(values - others) <= most).all())
 
     def _derive(self, values: np.ndarray) -> Linear:
         """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`, and remember the wrenches."""

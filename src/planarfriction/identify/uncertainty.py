@@ -128,13 +128,20 @@ def uncertainty(fit: Fit) -> Uncertainty:
     problem = fit.problem
     count = len(problem.names)
     residual, jacobian = problem.linearised(fit.values, fit.sigma)
-    pull = _pull(fit)
+    coordinates = fit.coordinates
+    # the pull of contact and rig to their starts
+    pull = np.linalg.solve(coordinates.slopes(fit.x).T, coordinates.prior(fit.x)[1]).T
+    pull[count:, count:] = np.diag(1.0 / problem.rig.with_drift(fit.values[count:]))
     # A value that rests on zero is as uncertain as its neighbours let it be; other bounds are no estimates.
-    low = fit.coordinates.bounds()[0] == 0.0
-    free = ~fit.at_bound | (low & (fit.values <= 1e-9 + fit.coordinates.scale * 1e-9))
+    low = coordinates.bounds()[0] == 0.0
+    free = ~fit.at_bound | (low & (fit.values <= 1e-9 + coordinates.scale * 1e-9))
     measured = problem.channels[problem.used].sum()
     reduced_chi2 = float(residual @ residual / max(measured, 1))
-    neighbours = _neighbours(fit, residual)
+    rows = list(problem.by_log(residual[:, None]))
+    now = np.concatenate([each[1:].ravel() for each in rows])
+    before = np.concatenate([each[:-1].ravel() for each in rows])
+    pairs = 0.5 * (now @ now + before @ before)
+    neighbours = float(now @ before / pairs) if pairs > 0.0 else 0.0
     inverse = covariance_of(fit, np.concatenate([jacobian, pull]), free)
     plain = inverse * max(reduced_chi2, 1.0)
     bread = finite(inverse)
@@ -174,16 +181,6 @@ def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, ...]:
     return moved.T @ moved * len(votes) / (len(votes) - 1), moved, jacobian
 
 
-def _pull(fit: Fit) -> np.ndarray:
-    """Compute the derivatives `[F + K, F + K]` of the pull of contact and rig to their starts."""
-    problem = fit.problem
-    count = len(problem.names)
-    coordinates = fit.coordinates
-    result = np.linalg.solve(coordinates.slopes(fit.x).T, coordinates.prior(fit.x)[1]).T
-    result[count:, count:] = np.diag(1.0 / problem.rig.with_drift(fit.values[count:]))
-    return result
-
-
 def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Compute the covariance of the values with the `free` coordinates; infinite where the data say nothing."""
     slopes = fit.coordinates.slopes(fit.x)
@@ -191,15 +188,6 @@ def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
     result = slopes @ inner @ slopes.T
     unknown = np.diag(np.diag(result) >= 1e-50 * HUGE)
     return np.where(unknown, np.inf, result)
-
-
-def _neighbours(fit: Fit, residual: np.ndarray) -> float:
-    """Compute the correlation of scaled residuals one sample apart."""
-    rows = list(fit.problem.by_log(residual[:, None]))
-    now = np.concatenate([each[1:].ravel() for each in rows])
-    before = np.concatenate([each[:-1].ravel() for each in rows])
-    pairs = 0.5 * (now @ now + before @ before)
-    return float(now @ before / pairs) if pairs > 0.0 else 0.0
 
 
 def _over_time(
