@@ -75,8 +75,23 @@ def judge(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Ver
     yield from _on_drive(kept)
     yield from lags(kept.problem.logs)
     for i, log in enumerate(kept.problem.logs):
-        if (mask := standing(log)).any():
-            yield from _on_standing(kept, i, mask)
+        mask = standing(log)
+        if not mask.any():
+            continue
+        # a log that stands at full duty must lie within the level of friction that the others show
+        values = kept.folds[i * kept.problem.parts]
+        plant = kept.problem.plant_numbers(values, log)
+        joint = friction_of(values)
+        driven = plant.torque_gain * log.volts[mask]
+        outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
+        load = joint.load_motor * driven - joint.load_external * outside
+        over = np.median(np.abs(driven + outside) - joint.mu_s - np.abs(load))
+        if over > 0.0:
+            seconds = mask.sum() * np.median(np.diff(log.time))
+            text = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
+            text += f": this log contradicts the others, by which {over:.2g} N m are left over to move it"
+            text += "; look for a current limit, heat or a stop"
+            yield Verdict("fit", False, text)
 
 
 def _on_drive(kept: Trial) -> Iterator[Verdict]:
@@ -144,25 +159,6 @@ def lags(logs: Sequence[JointLog]) -> Iterator[Verdict]:
     if late and abs(lag := np.median(late)) > LATE:
         text = f"the reported speed lags by {1e3 * lag:.0f} ms ({1e3 * min(late):.0f} to {1e3 * max(late):.0f})"
         yield Verdict("dq", False, f"{text}: the slope of q was used")
-
-
-def _on_standing(kept: Trial, i: int, mask: np.ndarray) -> Iterator[Verdict]:
-    """Compare a log that stands at full duty with what the others say: it must lie within the level of friction."""
-    log = kept.problem.logs[i]
-    values = kept.folds[i * kept.problem.parts]
-    plant = kept.problem.plant_numbers(values, log)
-    joint = friction_of(values)
-    driven = plant.torque_gain * log.volts[mask]
-    outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
-    most = joint.mu_s + np.abs(
-        joint.load_motor * driven - joint.load_external * outside
-    )
-    over = np.median(np.abs(driven + outside) - most)
-    if over > 0.0:
-        seconds = mask.sum() * np.median(np.diff(log.time))
-        text = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
-        text += f": this log contradicts the others, by which {over:.2g} N m are left over to move it"
-        yield Verdict("fit", False, f"{text}; look for a current limit, heat or a stop")
 
 
 SPANS = (SHORT, 0.6, np.inf)
@@ -327,35 +323,6 @@ VAGUE = 0.5
 """Standard error over the value from which on the number of a term is not known."""
 
 
-def _check_related(
-    problem: JointFitProblem, runs: Sequence[np.ndarray]
-) -> Iterator[Verdict]:
-    """Yield a verdict on a log that the run from its goal does not resemble, though others do.
-
-    Raises InvalidValueError for several such logs, or one alone.
-    """
-    missed = {}
-    for run, log in zip(runs, problem.logs, strict=True):
-        error = np.abs(run[:, 0] - log.q).mean()
-        swing = np.abs(log.q - log.q.mean()).mean()
-        if error > UNRELATED * swing:
-            missed[log.name] = (
-                f"{error:.2g} rad left of a mean swing of {swing:.2g} rad about its mean"
-            )
-    if len(missed) > 1 or len(missed) == len(problem.logs):
-        raise InvalidValueError(
-            f"q of {', '.join(missed)}",
-            "follow from goal or voltage: check units, signs, gains, and that all belong to one joint",
-            next(iter(missed.values())),
-        )
-    for name, found in missed.items():
-        yield Verdict(
-            "fit",
-            False,
-            f"{name}: {found}: this log contradicts the others; check its gains and units, or leave it out",
-        )
-
-
 def fit_goals(
     base: JointFitProblem,
     chosen: Sequence[str],
@@ -404,14 +371,38 @@ def result_of(
 ) -> JointFit:
     """Return the result of the trial that was kept: its intervals, and verdicts.
 
-    Estimates also move if runs begin again at the measured motion: intervals count that shift.
+    Estimates also move if runs begin again at the measured motion: intervals count that shift. A verdict names a log
+    that the run from its goal does not resemble, though others do.
+
+    Raises InvalidValueError for several such logs, or one alone.
     """
     problem = kept.problem
     values = kept.values
     runs = [
         trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first)
     ]
-    doubts = [*_check_related(problem, runs[0])]
+    missed = {}
+    for run, log in zip(runs[0], problem.logs, strict=True):
+        error = np.abs(run[:, 0] - log.q).mean()
+        swing = np.abs(log.q - log.q.mean()).mean()
+        if error > UNRELATED * swing:
+            missed[log.name] = (
+                f"{error:.2g} rad left of a mean swing of {swing:.2g} rad about its mean"
+            )
+    if len(missed) > 1 or len(missed) == len(problem.logs):
+        raise InvalidValueError(
+            f"q of {', '.join(missed)}",
+            "follow from goal or voltage: check units, signs, gains, and that all belong to one joint",
+            next(iter(missed.values())),
+        )
+    doubts = [
+        Verdict(
+            "fit",
+            False,
+            f"{name}: {found}: this log contradicts the others; check its gains and units, or leave it out",
+        )
+        for name, found in missed.items()
+    ]
     jackknife = kept.jackknife
     series = tuple(
         Series(log.name, log.time, log.q, fitted[:, 0], rest[:, 0])

@@ -608,8 +608,20 @@ def fit_torques(
     data = prepare(logs)
     ranked, baseline = choose(data, chosen, auto, progress)
     fit = finish(data, ranked, chosen, auto, progress)
-    values, spread = numbers_of(fit)
     rest = rest_of(data, fit)
+    values = dict(fit.values)
+    spread = dict(fit.spread)
+    for name, value in values.items():
+        if PARAMETERS[name].logarithmic:
+            spread[name] *= value
+    # gravity is given by its size and the angle at which it vanishes
+    if "gravity" in fit.terms:
+        sine, cosine = (values.pop(name) for name in TERMS["gravity"])
+        values["gravity"] = float(np.hypot(sine, cosine))
+        values["offset"] = float(np.arctan2(-cosine, sine))
+        of_both = [spread.pop(name) for name in TERMS["gravity"]]
+        spread["gravity"] = float(np.hypot.reduce(of_both))
+        spread["offset"] = spread["gravity"] / max(values["gravity"], 1e-300)
     scores = {each.terms: each.score for each in ranked}
     gains = {}
     for term in fit.terms:
@@ -647,23 +659,3 @@ def fit_torques(
     refuse(data, fit, rest, found.intervals)
     verdicts = judge(data, found, rest, plant, gains)
     return replace(found, verdicts=(*verdicts, *not_shown(unclear)))
-
-
-def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the numbers of a fit to torques and their standard errors, by name.
-
-    Gravity is given by its size and the angle at which it vanishes.
-    """
-    values = dict(fit.values)
-    spread = dict(fit.spread)
-    for name, value in values.items():
-        if PARAMETERS[name].logarithmic:
-            spread[name] *= value
-    if "gravity" in fit.terms:
-        sine, cosine = (values.pop(name) for name in TERMS["gravity"])
-        values["gravity"] = float(np.hypot(sine, cosine))
-        values["offset"] = float(np.arctan2(-cosine, sine))
-        errors = [spread.pop(name) for name in TERMS["gravity"]]
-        spread["gravity"] = float(np.hypot.reduce(errors))
-        spread["offset"] = spread["gravity"] / max(values["gravity"], 1e-300)
-    return values, spread
