@@ -161,7 +161,21 @@ def scene_makers(
     if makes:
         _check_cells(cells, makes.values())
     if from_file:
-        return _makers_from_file(name, kinds, cells, patch, size or {})
+        from planarfriction.sweeps.settings import Settable
+
+        make = Settable(name)
+        if patch is None and size:
+            first, value = next(iter(size.items()))
+            raise InvalidValueError(
+                f"--{first.replace('_', '-')}", "be given only with --patch", value
+            )
+        below = None if patch is None else find_patch(patch, size or {})
+        if not kinds and below is None and cells is None:
+            return {"": make}
+        return {
+            kind: functools.partial(_with_models, make, kind, below, cells)
+            for kind in kinds or [""]
+        }
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     of_scene = _USUAL.get(name, Usual())
     if patch is None and not size and of_scene.patch is not None:
@@ -227,31 +241,6 @@ def _check_cells(cells: int | None, makes: Iterable[Any]) -> None:
         )
 
 
-def _makers_from_file(
-    path: str,
-    kinds: Sequence[str],
-    cells: int | None,
-    patch: str | None,
-    size: Mapping[str, Any],
-) -> dict[str, Callable[..., pf.Scene]]:
-    from planarfriction.sweeps.settings import Settable
-
-    make = Settable(path)
-    if patch is None and size:
-        name, value = next(iter(size.items()))
-        raise InvalidValueError(
-            f"--{name.replace('_', '-')}", "be given only with --patch", value
-        )
-    contact_patch = None if patch is None else find_patch(patch, size)
-    if not kinds and contact_patch is None and cells is None:
-        return {"": make}
-
-    def changed(kind: str, /, **values: Any) -> pf.Scene:
-        return _with_models(make(**values), kind, contact_patch, cells)
-
-    return {kind: functools.partial(changed, kind) for kind in kinds or [""]}
-
-
 def _label(scene: pf.Scene) -> str:
     """Return the kind of model that all contacts of a scene have, or "mixed"."""
     kinds = {MODELS.name_of(contact.model) for contact in scene.contacts}
@@ -259,12 +248,18 @@ def _label(scene: pf.Scene) -> str:
 
 
 def _with_models(
-    scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, cells: int | None
+    make_scene: Callable[..., pf.Scene],
+    kind: str,
+    patch: pf.ContactPatch | None,
+    cells: int | None,
+    /,
+    **values: Any,
 ) -> pf.Scene:
-    """Return the scene with models of one kind on its own patches or on `patch`, laws as they are.
+    """Make a scene of some values with models of one kind on its own patches or on `patch`, laws as they are.
 
     The kind is "" for each as it is; `cells` goes to models that have a number of them.
     """
+    scene = make_scene(**values)
     if not kind:
         _check_cells(cells, [type(contact.model) for contact in scene.contacts])
     contacts = []

@@ -390,8 +390,9 @@ def plan_grip(
         raise InvalidValueError("friction", "be below 1", friction)
     validation.choice("aim", aim, ("nominal", "worst"))
     chosen = scene.contacts[index]
-    patch = chosen.model.patch
-    law = chosen.model.law.numbers
+    model = chosen.model
+    patch = model.patch
+    law = model.law.numbers
     first = load_on(scene, index, 0.0, np.zeros(2), 0.0)
     at_start = holding_load(first, patch, law.mu_c)
     if at_start == 0.0:
@@ -399,7 +400,14 @@ def plan_grip(
             "scene", "have a load that moves the body", "no gravity and no force"
         )
     last = load_on(scene, index, angle or 0.0, slide, scene.t_end)
-    at_end = _holding_at(scene, index, last)
+    at_end = holding_load(last, patch, law.mu_c)
+    # laws that creep, and models whose bristles cannot start in equilibrium, have the load of mu_c alone
+    if model.law.holds_at_rest and hasattr(model, "state_of"):
+        apart = np.subtract(scene.body.position, grip_position(scene, index))
+        mass = scene.body.mass
+        inertia = scene.body.inertia + mass * float(apart @ apart)
+        own = {"mass": mass / chosen.count, "inertia": inertia / chosen.count}
+        at_end = max(at_end, dynamic_holding_load(last, model, **own))
     low, high = _bounds(bounds, at_start)
     least = (1.0 + validation.non_negative("margin", margin)) * at_end
     if least > high:
@@ -582,23 +590,6 @@ def _contact_of(scene: Any, name: str | None) -> int:
             "contact", f"be given if there are several ({', '.join(names)})", name
         )
     return 0 if name is None else names.index(validation.choice("contact", name, names))
-
-
-def _holding_at(scene: Scene, contact: int, load: np.ndarray) -> float:
-    """Return the normal force [N] that stops and holds a load `[3]` on a contact, however quickly the grip falls to it.
-
-    Laws that creep, and models whose bristles cannot start in equilibrium, have that of mu_c alone.
-    """
-    body = scene.body
-    chosen = scene.contacts[contact]
-    model = chosen.model
-    apart = np.subtract(body.position, grip_position(scene, contact))
-    stops = holding_load(load, model.patch, model.law.numbers.mu_c)
-    if not (model.law.holds_at_rest and hasattr(model, "state_of")):
-        return stops
-    mass = body.mass / chosen.count
-    inertia = (body.inertia + body.mass * float(apart @ apart)) / chosen.count
-    return max(stops, dynamic_holding_load(load, model, mass=mass, inertia=inertia))
 
 
 def _goal(goal: Any) -> tuple[float | None, np.ndarray]:

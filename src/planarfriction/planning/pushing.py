@@ -612,6 +612,10 @@ def push(
     poses = path.values if path.columns == 3 else np.pad(path.values, ((0, 0), (0, 1)))
     scenery = Scenery(slider, pusher, path.times, poses)
     time = np.linspace(path.times[0], path.times[-1], count)
+    if scenery.gap(time[0], start) < -1e-6 * slider.size:
+        raise InvalidValueError(
+            "path", "begin outside the slider", scenery.pose(time[0]).tolist()
+        )
     pose, modes, places = _follow(scenery, start, time, rtol)
     at = np.array([scenery.pose(t) for t in time])
     return Push(slider, pusher, time, pose, at, np.array(modes), places)
@@ -628,10 +632,6 @@ def _follow(
     places = np.full((len(time), 2), np.nan)
     slider = scenery.slider
     mu = scenery.pusher.mu
-    if scenery.gap(time[0], start) < -1e-6 * slider.size:
-        raise InvalidValueError(
-            "path", "begin outside the slider", scenery.pose(time[0]).tolist()
-        )
     now = time[0]
     q = start
     held = ""
@@ -654,11 +654,16 @@ def _follow(
             contact = None
             continue
         first = motion_at(slider.surface, place, mu, velocity)
-        mode = (
-            first.mode
-            if first.mode != held
-            else _neighbour(slider, place, mu, velocity, held)
-        )
+        mode = first.mode
+        # after a mode that has come to its end, rounding may still take its neighbour for it
+        if mode == held == STICK:
+            left, right = (
+                motion_at(slider.surface, place, mu, velocity, each).slack
+                for each in (LEFT, RIGHT)
+            )
+            mode = LEFT if left > right else RIGHT
+        elif mode == held:
+            mode = STICK
         held = ""
         if first.leans:
             contact = flush_after(scenery, contact, now, q, first.leans)
@@ -707,16 +712,6 @@ def _follow(
             f"t = {now:g} s",
         )
     return poses, modes, places
-
-
-def _neighbour(
-    slider: Slider, place: TouchPoint, mu: float, velocity: np.ndarray, held: str
-) -> str:
-    """Return the mode after one that has come to its end, where rounding still takes it for the old one."""
-    if held != STICK:
-        return STICK
-    slack = lambda mode: motion_at(slider.surface, place, mu, velocity, mode).slack
-    return LEFT if slack(LEFT) > slack(RIGHT) else RIGHT
 
 
 def _phase(scenery: Scenery, contact: Touch, mode: str) -> tuple[Any, dict[str, Any]]:
