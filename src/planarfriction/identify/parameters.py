@@ -16,9 +16,9 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.logs import Linear, Log
+from planarfriction.identify.logs import Linear
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.patch import ContactPatch, SoftFinger
+from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 
 
@@ -128,41 +128,6 @@ def check_patch(patch: Any, by: str) -> None:
     """Raise InvalidValueError unless `by` can take a patch: a ContactPatch without a friction metric."""
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, by)
-
-
-def check_loads(
-    logs: Sequence[Log],
-    loads: Sequence[float],
-    patch: ContactPatch,
-    names: Sequence[str],
-) -> None:
-    """Check that a fit can take the logs and their mean loads on a patch, and estimate `names` of a soft finger."""
-    if names and not isinstance(patch.pressure, SoftFinger):
-        raise InvalidValueError(
-            "patch",
-            f"have a SoftFinger pressure to estimate {', '.join(names)}",
-            patch.name,
-        )
-    for name in ("k", "k_per_newton"):
-        if name in names and getattr(patch.pressure, name) is None:
-            raise InvalidValueError(
-                "parameters", f"contain {name} only if the SoftFinger has it", name
-            )
-    for log, load in zip(logs, loads, strict=True):
-        if not log.wrench.any():
-            raise InvalidValueError(
-                f"wrench of {log.name}", "not be 0 throughout", "0 in every sample"
-            )
-        if (
-            patch.depends_on_load
-            and np.abs(log.normal_force / load - 1.0).max() > CONSTANT
-        ):
-            rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
-            raise InvalidValueError(
-                f"normal_force of {log.name}",
-                rule,
-                f"{log.normal_force.min():g} .. {log.normal_force.max():g} N",
-            )
 
 
 class Coordinates:

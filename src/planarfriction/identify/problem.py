@@ -17,12 +17,12 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify.decimation import redrawn
 from planarfriction.identify.logs import Arrays, Linear, Log, mean_load
 from planarfriction.identify.parameters import (
+    CONSTANT,
     RADIUS,
     SECOND_MOMENT,
     SOFT_FINGER,
     Coordinates,
     VectorMap,
-    check_loads,
 )
 from planarfriction.identify.sensor_errors import (
     GROUPS,
@@ -42,7 +42,7 @@ from planarfriction.identify.uncertainty import covariance, finite
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
-from planarfriction.patch import ContactPatch
+from planarfriction.patch import ContactPatch, SoftFinger
 
 
 def check_noise(name: str, noise: Any) -> np.ndarray:
@@ -231,7 +231,29 @@ class LogProblem(LeastSquaresProblem):
         self.kind = SIMULATORS[self.model]
         self.fingers = [name for name in self.names if name in SOFT_FINGER]
         loads = [mean_load(log) for log in logs]
-        check_loads(logs, loads, patch, self.fingers)
+        if self.fingers and not isinstance(patch.pressure, SoftFinger):
+            raise InvalidValueError(
+                "patch",
+                f"have a SoftFinger pressure to estimate {', '.join(self.fingers)}",
+                patch.name,
+            )
+        for name in ("k", "k_per_newton"):
+            if name in self.fingers and getattr(patch.pressure, name) is None:
+                raise InvalidValueError(
+                    "parameters", f"contain {name} only if the SoftFinger has it", name
+                )
+        for log, load in zip(logs, loads, strict=True):
+            if not log.wrench.any():
+                raise InvalidValueError(
+                    f"wrench of {log.name}", "not be 0 throughout", "0 in every sample"
+                )
+            varies = np.abs(log.normal_force / load - 1.0).max() > CONSTANT
+            if patch.depends_on_load and varies:
+                raise InvalidValueError(
+                    f"normal_force of {log.name}",
+                    "stay within 10 % of its mean if the patch changes with the load (make one log for each load)",
+                    f"{log.normal_force.min():g} .. {log.normal_force.max():g} N",
+                )
         self.reference_load = np.median(loads)
         self.fixed_patch = patch
         if patch.depends_on_load:

@@ -374,7 +374,12 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
             )
     rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
     if evidence.at_bound[i] and not rests_on_zero:
-        return doubt(_on_bound(evidence, i))
+        mu_c = evidence.value("mu_c", evidence.held_mu_c)
+        if name == "mu_s" and value <= SAME * mu_c:
+            return doubt(
+                f"{evidence.gap or 'no friction above mu_c was seen'}: equal to mu_c"
+            )
+        return doubt(f"the fit ran into the bound {value:.3g} {kind.unit}")
     if name in ("v_s", "gamma") and (reason := _no_stribeck(evidence)):
         return doubt(reason)
     size = abs(value)
@@ -440,15 +445,6 @@ def _no_stribeck(evidence: Evidence) -> str:
     if evidence.at_bound[s] or not difference > TWO_SIDED * error:
         return evidence.gap or "mu_s cannot be distinguished from mu_c"
     return ""
-
-
-def _on_bound(evidence: Evidence, i: int) -> str:
-    name = evidence.names[i]
-    value = evidence.values[i]
-    mu_c = evidence.value("mu_c", evidence.held_mu_c)
-    if name == "mu_s" and value <= SAME * mu_c:
-        return f"{evidence.gap or 'no friction above mu_c was seen'}: equal to mu_c"
-    return f"the fit ran into the bound {value:.3g} {ALL[name].unit}"
 
 
 def _partner(evidence: Evidence, i: int) -> tuple[str, float]:

@@ -146,7 +146,18 @@ def refine(
 
     for _ in range(2 if scatter is None else 1):
         if scatter is None:
-            sizes = _scatter(weighted(values) * sizes[reversing], reversing)
+            size = np.abs(weighted(values) * sizes[reversing])
+            least_size = max(0.3 * np.median(size), 1e-12)
+            # of rows far from a reversal, and of those near one
+            groups = (size[reversing == kind] for kind in (0, 1))
+            sizes = np.array(
+                [
+                    max(NORMAL * np.median(each), least_size)
+                    if len(each) > 20
+                    else least_size
+                    for each in groups
+                ]
+            )
         settings = {"loss": "huber", "f_scale": HUBER, "max_nfev": STEPS}
         values = limited(least(weighted, values, names, False, **settings))
     error = weighted(values)
@@ -176,19 +187,6 @@ def refine(
         max(spare, 2),
         scores,
         sizes,
-    )
-
-
-def _scatter(error: np.ndarray, reversing: np.ndarray) -> np.ndarray:
-    """Estimate the scatter of rows far from a reversal, and of those near one, by their medians."""
-    size = np.abs(error)
-    least = max(0.3 * np.median(size), 1e-12)
-    groups = [size[reversing == kind] for kind in (0, 1)]
-    return np.array(
-        [
-            max(NORMAL * np.median(each), least) if len(each) > 20 else least
-            for each in groups
-        ]
     )
 
 

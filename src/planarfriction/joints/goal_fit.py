@@ -72,29 +72,6 @@ def judge(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Ver
         if term == "load":
             numbers += f", b = {trial.values['load']:.2g}"
         yield Verdict(term, good, f"{WORDS[term][0 if good else 1]} ({numbers})")
-    yield from _on_drive(kept)
-    yield from lags(kept.problem.logs)
-    for i, log in enumerate(kept.problem.logs):
-        mask = standing(log)
-        if not mask.any():
-            continue
-        # a log that stands at full duty must lie within the level of friction that the others show
-        values = kept.folds[i * kept.problem.parts]
-        plant = kept.problem.plant_numbers(values, log)
-        joint = friction_of(values)
-        driven = plant.torque_gain * log.volts[mask]
-        outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
-        load = joint.load_motor * driven - joint.load_external * outside
-        over = np.median(np.abs(driven + outside) - joint.mu_s - np.abs(load))
-        if over > 0.0:
-            seconds = mask.sum() * np.median(np.diff(log.time))
-            text = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
-            text += f": this log contradicts the others, by which {over:.2g} N m are left over to move it"
-            text += "; look for a current limit, heat or a stop"
-            yield Verdict("fit", False, text)
-
-
-def _on_drive(kept: Trial) -> Iterator[Verdict]:
     problem = kept.problem
     values = kept.values
     gain = values.get("torque_gain", problem.torque_gain or 0.0)
@@ -122,6 +99,25 @@ def _on_drive(kept: Trial) -> Iterator[Verdict]:
         share = 0.5 / problem.plant.mass  # half the mass of an arm counts, in %
         text = f"an arm without mass is assumed: all torques grow by {share:.2g} % for each 10 g of an arm"
         yield Verdict("arm_mass", False, text)
+    yield from lags(problem.logs)
+    for i, log in enumerate(problem.logs):
+        mask = standing(log)
+        if not mask.any():
+            continue
+        # a log that stands at full duty must lie within the level of friction that the others show
+        values = kept.folds[i * problem.parts]
+        plant = problem.plant_numbers(values, log)
+        joint = friction_of(values)
+        driven = plant.torque_gain * log.volts[mask]
+        outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
+        load = joint.load_motor * driven - joint.load_external * outside
+        over = np.median(np.abs(driven + outside) - joint.mu_s - np.abs(load))
+        if over > 0.0:
+            seconds = mask.sum() * np.median(np.diff(log.time))
+            text = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
+            text += f": this log contradicts the others, by which {over:.2g} N m are left over to move it"
+            text += "; look for a current limit, heat or a stop"
+            yield Verdict("fit", False, text)
 
 
 def speed_lag(log: JointLog) -> float:

@@ -520,42 +520,7 @@ def judge(
             False,
             f"{text}: backlash, heat, place or another load; intervals need not hold the truth",
         )
-    yield from _on_scale(found, plant)
-    late = "low_pass" if "low_pass" in found.values else "delay"
-    low, high = found.intervals[late] or (0.0, 0.0)
-    if low > LATE or high < -LATE:
-        what = (
-            "filtered by a low pass of"
-            if late == "low_pass"
-            else "late by"
-            if low > 0.0
-            else "early by"
-        )
-        yield Verdict(
-            "torque",
-            False,
-            f"it is {what} {1e3 * abs(found.values[late]):.1f} ms, which was corrected",
-        )
-    offset = found.intervals.get("torque_offset")
-    if offset is not None and not offset[0] <= 0.0 <= offset[1]:
-        value = found.values["torque_offset"]
-        text = f"an offset of {value:.3g} N m: of the sensor, or friction of different level in both"
-        yield Verdict(
-            "torque_offset", False, f"{text} directions, which no log tells apart"
-        )
-    used = [each.name for each in found.series]
-    if still := [log.name for log in found.logs if log.name not in used]:
-        yield Verdict("fit", False, f"{', '.join(still)}: hardly moves, left out")
-    for log in found.logs:
-        if log.turns:
-            yield Verdict(
-                "q", True, f"{log.name}: {log.turns} jumps by a whole turn were removed"
-            )
-    yield from lags(found.logs)
-
-
-def _on_scale(found: JointFit, plant: Plant) -> Iterator[Verdict]:
-    """Compare gravity and inertia as they show in the torque with those that are known."""
+    # gravity and inertia as they show in the torque, beside those that are known
     known: dict[str, float] = {}
     if plant.mass and plant.arm_mass is not None:
         known["gravity"] = plant.moment
@@ -592,6 +557,37 @@ def _on_scale(found: JointFit, plant: Plant) -> Iterator[Verdict]:
     if not known:
         text = "neither gravity nor inertia is known: a wrong torque constant would scale all results"
         yield Verdict("torque", False, text)
+    late = "low_pass" if "low_pass" in found.values else "delay"
+    low, high = found.intervals[late] or (0.0, 0.0)
+    if low > LATE or high < -LATE:
+        what = (
+            "filtered by a low pass of"
+            if late == "low_pass"
+            else "late by"
+            if low > 0.0
+            else "early by"
+        )
+        yield Verdict(
+            "torque",
+            False,
+            f"it is {what} {1e3 * abs(found.values[late]):.1f} ms, which was corrected",
+        )
+    offset = found.intervals.get("torque_offset")
+    if offset is not None and not offset[0] <= 0.0 <= offset[1]:
+        value = found.values["torque_offset"]
+        text = f"an offset of {value:.3g} N m: of the sensor, or friction of different level in both"
+        yield Verdict(
+            "torque_offset", False, f"{text} directions, which no log tells apart"
+        )
+    used = [each.name for each in found.series]
+    if still := [log.name for log in found.logs if log.name not in used]:
+        yield Verdict("fit", False, f"{', '.join(still)}: hardly moves, left out")
+    for log in found.logs:
+        if log.turns:
+            yield Verdict(
+                "q", True, f"{log.name}: {log.turns} jumps by a whole turn were removed"
+            )
+    yield from lags(found.logs)
 
 
 def fit_torques(
