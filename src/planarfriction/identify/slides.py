@@ -265,7 +265,10 @@ def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, s
                 f"its speed grows from {first:.2g} to {speed[last]:.2g} m/s: it was pushed"
             )
             continue
-        free = _free(time, speed, FREE * usual)
+        moves = np.minimum(speed[:-1], speed[1:]) > 0.25 * speed.max()
+        slow = -np.diff(speed) < FREE * usual * np.diff(time)
+        # the longest time over which the moving body hardly decelerates
+        free = np.ptp(time[runs(moves & slow)], axis=1).max(initial=0.0)
         most = max(LONG * np.ptp(time), 1.5 * np.diff(time[:2]).sum())
         if len(slides) > 2 and free > most:
             found[i] = (
@@ -278,13 +281,6 @@ def _brake(time: np.ndarray, speed: np.ndarray) -> float:
     """Compute the mean deceleration until the speed is a tenth of the first [m/s^2]."""
     last = np.append(np.flatnonzero(speed < 0.1 * speed[0]), len(speed) - 1)[0]
     return (speed[0] - speed[last]) / (time[last] - time[0]) if last > 0 else 0.0
-
-
-def _free(time: np.ndarray, speed: np.ndarray, least: float) -> float:
-    """Compute the longest time over which a moving body decelerates by less than `least` [m/s^2]."""
-    moves = np.minimum(speed[:-1], speed[1:]) > 0.25 * speed.max()
-    free = moves & (-np.diff(speed) < least * np.diff(time))
-    return np.ptp(time[runs(free)], axis=1).max(initial=0.0)
 
 
 def weights(errors: np.ndarray) -> np.ndarray:

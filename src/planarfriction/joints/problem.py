@@ -170,9 +170,22 @@ class JointFitProblem:
         zero = dict.fromkeys(names, 0.0)
 
         def errors(values: Values) -> np.ndarray:
-            return np.concatenate(
-                [self._balance(values, log)[moving(log)] for log in self.logs]
-            )
+            """Return the torques that are missing in the balance [N m]."""
+            missing = []
+            for log in self.logs:
+                plant = self.plant_numbers(values, log)
+                v = log.speed
+                driven = plant.torque_gain * log.volts - plant.back_emf * log.on * v
+                outside = log.outside - plant.moment * np.sin(log.q - plant.offset)
+                torque = (
+                    plant.inertia * log.acceleration
+                    - outside
+                    + values["mu_c"] * np.sign(v)
+                    + values["sigma_2"] * v
+                    - driven
+                )
+                missing.append(torque[moving(log)])
+            return np.concatenate(missing)
 
         angles = OFFSETS if "offset" in names else [0.0]
         starts = [zero | {"offset": angle} for angle in angles]
@@ -183,20 +196,6 @@ class JointFitProblem:
         found["mu_c"] = max(found["mu_c"], 0.05 * np.median(strong) + 1e-6)
         found["sigma_2"] = max(found["sigma_2"], 0.01 * strong.max() / max(fast, 1e-9))
         return found
-
-    def _balance(self, values: Values, log: JointLog) -> np.ndarray:
-        """Compute the torque that is missing in the balance of rigid friction [N m], `[T]`."""
-        plant = self.plant_numbers(values, log)
-        v = log.speed
-        driven = plant.torque_gain * log.volts - plant.back_emf * log.on * v
-        outside = log.outside - plant.moment * np.sin(log.q - plant.offset)
-        return (
-            plant.inertia * log.acceleration
-            - outside
-            + values["mu_c"] * np.sign(v)
-            + values["sigma_2"] * v
-            - driven
-        )
 
     def guesses(self, term: str, values: Values) -> list[dict[str, float]]:
         """Return starts of a term beside the values of a fit without it; the first changes little."""

@@ -174,13 +174,24 @@ def dynamic_holding_load(
     body = Body(mass, inertia, gravity=(0.0, 0.0))
 
     def slips(share: float) -> bool:
+        """Return True if the body slips as the grip falls to a share of the slow load."""
         high = max(fall, share) * slow
         low = share * slow
         grip = Signal.sampled([0.0, BEFORE], [high, low])
         if BEFORE + ramp > BEFORE:  # else it is nothing, or less than times tell apart
             times = [0.0, BEFORE, BEFORE + ramp]
             grip = Signal.sampled(times, [high, high, low], "linear")
-        return _slips(model, body, load, grip)
+        end = grip.times[-1] + AFTER
+        contact = Contact(model, grip)
+        scene = Scene(
+            body, contact, end, force=load, save_every=end, start="equilibrium"
+        )
+        data = simulate(scene).data
+        moved = np.array([data[name][-1] for name in ("x", "y", "theta")])
+        dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(low))
+        way = np.hypot(dx, dy) + model.patch.contact_radius(low) * abs(theta)
+        bends = law.numbers.mu_s / (law.numbers.sigma_0 * law.stiffness_factor(low))
+        return way > bends + SLIP
 
     return (1.0 + margin) * slow * _least_share(slips)
 
@@ -206,18 +217,3 @@ def _least_share(slips: Any) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if slips(middle) else (low, middle)
     return high
-
-
-def _slips(model: Any, body: Body, load: np.ndarray, grip: Signal) -> bool:
-    """Return True if a body under a constant load `[3]` slips as the grip changes."""
-    end = grip.times[-1] + AFTER
-    contact = Contact(model, grip)
-    scene = Scene(body, contact, end, force=load, save_every=end, start="equilibrium")
-    data = simulate(scene).data
-    force = grip.values[-1]
-    moved = np.array([data[name][-1] for name in ("x", "y", "theta")])
-    dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(force))
-    way = np.hypot(dx, dy) + model.patch.contact_radius(force) * abs(theta)
-    numbers = model.law.numbers
-    bends = numbers.mu_s / (numbers.sigma_0 * model.law.stiffness_factor(force))
-    return way > bends + SLIP
