@@ -14,8 +14,7 @@ from planarfriction.joints.goal_fit import (
     speed_lag,
     standing,
 )
-from planarfriction.joints.numbers import interval
-from planarfriction.joints.problem import JointFitProblem
+from planarfriction.joints.problem import JointFitProblem, interval
 
 SERVO = {
     "inertia": 2e-3,

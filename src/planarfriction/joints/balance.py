@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.joints.loops.balance import Balance, follow_path, slide
-from planarfriction.joints.numbers import PARAMETERS, Values, least, slopes
+from planarfriction.joints.problem import PARAMETERS, Values, least, slopes
 from planarfriction.joints.smoothing import DELAYS, NORMAL, Rows
 
 TERMS: dict[str, tuple[str, ...]] = {

@@ -11,7 +11,6 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.joints.log import JointLog, runs
-from planarfriction.joints.numbers import Values, interval, least, quantile
 from planarfriction.joints.problem import (
     NEEDS,
     SHORT,
@@ -19,8 +18,12 @@ from planarfriction.joints.problem import (
     JointFit,
     JointFitProblem,
     Series,
+    Values,
     friction_of,
+    interval,
+    least,
     not_shown,
+    quantile,
 )
 
 LAGS = np.arange(-20, 61) * 1e-3

@@ -21,8 +21,13 @@ from planarfriction.joints.balance import (
 )
 from planarfriction.joints.goal_fit import lags
 from planarfriction.joints.log import JointLog, Plant
-from planarfriction.joints.numbers import PARAMETERS, Values
-from planarfriction.joints.problem import JointFit, Series, not_shown
+from planarfriction.joints.problem import (
+    PARAMETERS,
+    JointFit,
+    Series,
+    Values,
+    not_shown,
+)
 from planarfriction.joints.smoothing import (
     DELAYS,
     Rows,
