@@ -20,7 +20,7 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction.planning import GripPlan, holding_load, plan_grip
-from planarfriction.planning.motions import ROUGH, Aim
+from planarfriction.planning.grip import ROUGH, Aim
 
 LAW = pf.LuGre(mu_c=0.6, mu_s=0.7, sigma_0=1e5, sigma_1=100.0, elasto_plastic=0.9)
 PARAMS = [1e5, 100.0, 0.2, 0.6, 0.7, 1e-3, 0.9]  # in the order of friction_params

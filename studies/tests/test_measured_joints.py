@@ -5,7 +5,7 @@ import pytest
 
 from planarfriction.cli import main
 from planarfriction.joints import identify_joint
-from planarfriction.joints.goal_verdicts import speed_lag
+from planarfriction.joints.goal_fit import speed_lag
 from planarfriction_studies.measured.joints import PENDULUM, read_logs
 from planarfriction_studies.measured.synthetic_joints import ENCODER, synthetic_joint
 

@@ -43,8 +43,8 @@ def test_a_search_ends_where_a_promised_gain_is_not_there(promised):
 def test_bristles_to_try_bend_fully_after_a_tenth_of_a_step_to_a_tenth_of_all():
     """Steps of 1, 2 and 3 mm, and one at rest: 0.2 mm to 0.6 mm; the longer is at least ten times the shorter."""
     log = SimpleNamespace(durations=np.full(4, 0.1))
-    speeds = [np.array([0.01, 0.02, 0.03, 0.0])]
+    speeds = np.array([0.01, 0.02, 0.03, 0.0])
     few = _stiffnesses(SimpleNamespace(logs=[log]), speeds, 0.5)
     assert few[[0, -1]] == pytest.approx([0.5 / 2e-4, 0.5 / 2e-3])
-    many = _stiffnesses(SimpleNamespace(logs=[log] * 100), speeds * 100, 0.5)
+    many = _stiffnesses(SimpleNamespace(logs=[log] * 100), np.tile(speeds, 100), 0.5)
     assert many[[0, -1]] == pytest.approx([0.5 / 2e-4, 0.5 / 0.06])

@@ -64,8 +64,11 @@ def test_held_out_errors_count_by_what_noise_explains():
     slopes = slopes.reshape(-1, 2)
     noise = random.normal(size=3 * samples)
     residual = noise - slopes @ np.linalg.lstsq(slopes, noise, rcond=None)[0]
-    log = SimpleNamespace(channels=np.full(3, True))
-    problem = SimpleNamespace(by_log=lambda rows: [rows.reshape(-1, 3, 1)], logs=[log])
+    problem = SimpleNamespace(
+        by_log=lambda rows: [rows.reshape(-1, 3, 1)],
+        channels=np.full((samples, 3), True),
+        used=np.full(samples, True),
+    )
     fit = SimpleNamespace(problem=problem, values=np.zeros(2))
     found, unseen = _held_out(fit, residual, slopes, np.zeros((2, 2)))
     assert np.sqrt(np.mean(unseen**2)) > 3.0
@@ -86,14 +89,14 @@ def test_slides_vote_as_one_observation_each():
             linearised=lambda values, sigma: (residual, slopes), by_log=lambda rows: rows.reshape(4, 2, 3, 2)
         ),
         coordinates=SimpleNamespace(slopes=lambda x: np.eye(2)), x=np.zeros(2), values=np.zeros(2),
-        at_bound=np.zeros(2, dtype=bool), sigma=[np.ones((2, 3))] * 4,
+        at_bound=np.zeros(2, dtype=bool), noise=np.ones((4, 3)), sigma=np.ones((8, 3)),
     )  # fmt: skip
     found, moved, _ = uncertainty_over_slides(fit)
     np.testing.assert_allclose(
         found, bread @ (votes.T @ votes) @ bread * 4.0 / 3.0, rtol=1e-9
     )
     np.testing.assert_allclose(moved, votes @ bread, rtol=1e-9)
-    fit.sigma = [np.ones((2, 3))] + [np.full((2, 3), np.inf)] * 3
+    fit.noise[1:] = np.inf
     np.testing.assert_allclose(uncertainty_over_slides(fit)[0], bread, rtol=1e-9)
 
 

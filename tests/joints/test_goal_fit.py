@@ -7,10 +7,14 @@ import pytest
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.joints import Drive, JointLog, Plant, identify_joint
-from planarfriction.joints.goal_fit import Trial, improves, result_of
-from planarfriction.joints.goal_verdicts import speed_lag, standing
-from planarfriction.joints.numbers import interval
-from planarfriction.joints.problem import JointFitProblem
+from planarfriction.joints.goal_fit import (
+    Trial,
+    improves,
+    result_of,
+    speed_lag,
+    standing,
+)
+from planarfriction.joints.problem import JointFitProblem, interval
 
 SERVO = {
     "inertia": 2e-3,

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from planarfriction.joints import Drive, JointLog, Plant, numbers
+from planarfriction.joints import Drive, JointLog, Plant
 from planarfriction.joints import problem as problems
 from planarfriction.joints.problem import JointFitProblem
 
@@ -39,7 +39,7 @@ def test_a_run_is_smooth_in_its_numbers(terms, span):
     problem = servo(terms)
     values = {name: VALUES[name] for name in problem.names}
     errors = lambda values: problem.errors(values, span)
-    slopes = numbers.slopes(errors, values, problem.names, errors(values))
+    slopes = problems.slopes(errors, values, problem.names, errors(values))
     for i, name in enumerate(problem.names):
         step = 1e-6 * abs(values[name])
         more, less = (

@@ -156,7 +156,9 @@ def test_bad_samples_are_said_and_lose_nothing(what):
             time = sample.time if flag == 2 else each.time + 5e-4
             odd = own.update(sample._replace(time=time))
             assert odd.flags & flag
-            assert np.isfinite(own.state[: filter_state.TIME]).all()
+            assert all(
+                np.isfinite(own.state[name]).all() for name in ("x", "root", "slip")
+            )
     assert found.flags == 0
     assert found.mu_c == pytest.approx(float(clean.mu_c), rel=1e-3)
     assert found.radius == pytest.approx(float(clean.radius), rel=1e-2)
@@ -351,7 +353,7 @@ def test_a_copy_of_the_state_is_a_checkpoint():
     end = taken(own, samples[200:])
     assert taken(other, samples[200:]) == end
     assert taken(pickled, samples[200:]) == end
-    own.state[:] = kept
+    own.state[...] = kept
     assert taken(own, samples[200:]) == end
 
 
@@ -386,11 +388,10 @@ def updated(state, h, column):
 def test_measurements_and_spreads_are_those_of_a_kalman_filter():
     rng = np.random.default_rng(0)
     n = kernels.N
-    state = np.zeros(filter_state.STATE)
+    state = np.zeros(1, filter_state.STATE)[0]
     column = np.zeros(n)
-    root = np.tril(rng.normal(size=(n, n)))
-    state[kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
-    state[:n] = mean = rng.normal(size=n)
+    state["root"] = root = np.tril(rng.normal(size=(n, n)))
+    state["x"] = mean = rng.normal(size=n)
     covariance = root @ root.T
     h = rng.normal(size=n)
     updated(state, h, column)
@@ -400,9 +401,9 @@ def test_measurements_and_spreads_are_those_of_a_kalman_filter():
     covariance[1] = 0.0
     covariance[:, 1] = 0.0
     covariance[1, 1] = 0.25
-    found = state[kernels.ROOT : kernels.ROOT + n * n].reshape(n, n)
+    found = state["root"]
     assert found @ found.T == pytest.approx(covariance, abs=1e-12)
-    assert state[:n] == pytest.approx(
+    assert state["x"] == pytest.approx(
         np.where(np.arange(n) == 1, 5.0, mean + 0.7 * gain)
     )
 
@@ -419,26 +420,25 @@ def test_errors_of_the_count_do_not_add_up():
     span = 1.0 / 120.0
     own = observer()._filter
     column = np.zeros(n)
-    state = np.zeros(filter_state.STATE)
-    root = np.tril(rng.normal(size=(n, n)))
-    state[kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
-    state[:3] = (1e-6, 2e-6, -1e-6)
-    state[filter_state.CHAIN] = 3.0
-    state[filter_state.OLD + 8] = span
-    state[filter_state.OLD + 5 : filter_state.OLD + 8] = 0.01, 0.02, 0.03
-    before = state[:3].copy()
+    state = np.zeros(1, filter_state.STATE)[0]
+    state["root"] = root = np.tril(rng.normal(size=(n, n)))
+    state["x"][:3] = (1e-6, 2e-6, -1e-6)
+    state["chain"] = 3.0
+    state["span"] = span
+    state["velocity"] = 0.01, 0.02, 0.03
+    before = state["x"][:3].copy()
     moved(own, state, column)
     map_ = np.eye(n)
     map_[:6, :6] = 0.0
     map_[3:6, :3] = np.eye(3) / span
     new = np.zeros((n, 3))
     new[:3], new[3:6] = np.diag(own.remainder), -np.diag(own.remainder) / span
-    found = state[kernels.ROOT : kernels.ROOT + n * n].reshape(n, n)
+    found = state["root"]
     assert found @ found.T == pytest.approx(
         map_ @ root @ root.T @ map_.T + new @ new.T, rel=1e-9, abs=1e-15
     )
-    assert state[3:6] == pytest.approx((0.01, 0.02, 0.03) + before / span)
-    assert not state[:3].any()
+    assert state["x"][3:6] == pytest.approx((0.01, 0.02, 0.03) + before / span)
+    assert not state["x"][:3].any()
 
 
 def test_an_empty_hand_gives_the_bias():

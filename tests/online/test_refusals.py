@@ -41,7 +41,7 @@ REFUSED = [
     (lambda: observer(tolerance=0.0), "tolerance must be > 0, got 0.0"),
     (
         lambda: observer(sensors=Sensors),
-        "sensors must be Sensors, got <class 'planarfriction.online.sensors.Sensors'>",
+        "sensors must be Sensors, got <class 'planarfriction.online.observer.Sensors'>",
     ),
     (
         lambda: observer(batch=2).update(Measurement(0.0, np.zeros((3, 3)), 1.0)),

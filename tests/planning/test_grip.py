@@ -10,10 +10,10 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.planning import holding_load, plan_grip
-from planarfriction.planning.grip import _bounds
-from planarfriction.planning.motions import (
+from planarfriction.planning.grip import (
     Aim,
     Grips,
+    _bounds,
     grip_position,
     load_on,
     report_of,

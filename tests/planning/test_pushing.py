@@ -7,15 +7,16 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
-from planarfriction.planning.contact_modes import TouchPoint, motion_at
 from planarfriction.planning.push_plans import PushReport
-from planarfriction.planning.slider import (
+from planarfriction.planning.pushing import (
     CORNER,
     END,
     FACE,
     Scenery,
     Touch,
+    TouchPoint,
     flush_after,
+    motion_at,
     place_of,
     touch_after,
 )
@@ -334,7 +335,7 @@ def test_the_geometry_of_a_push_is_that_of_complex_numbers():
         2.0
     ) == pytest.approx(poses[1] - poses[0])
     assert scenery.rate(2.0, forward=True) == pytest.approx(rate)
-    assert (scenery.piece_end(1.0), scenery.piece_end(2.0), scenery.path_end) == (
+    assert (scenery.piece_end(1.0), scenery.piece_end(2.0), scenery.times[-1]) == (
         2.0,
         4.0,
         4.0,

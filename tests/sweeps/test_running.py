@@ -25,7 +25,7 @@ import pytest
 import planarfriction as pf
 from planarfriction import sweeps
 from planarfriction.errors import FileError, SweepError, SweepInterrupted
-from planarfriction.sweeps import bookkeeping, keys, records, running
+from planarfriction.sweeps import keys, records, running
 from planarfriction.sweeps.settings import grid_of
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
@@ -467,9 +467,9 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
 
 KILLED = """
 import sys, numpy as np, planarfriction as pf
-from planarfriction.sweeps import bookkeeping
+from planarfriction.sweeps import records
 from tests.sweeps import test_running as t
-bookkeeping.BETWEEN = 0.01
+records.BETWEEN = 0.01
 pf.sweep(t.grip, {"grip": np.linspace(1.0, 3.0, int(sys.argv[2]))}, out=sys.argv[1], measure=t.end)
 """
 
@@ -523,8 +523,8 @@ def test_ten_thousand_runs_go_on_after_kills(tmp_path):
 def test_long_sweeps_have_few_files(tmp_path, monkeypatch):
     """A file comes after half a second and a fiftieth of the time so far, and holds the runs since the last one."""
     clock = itertools.count()
-    monkeypatch.setattr(bookkeeping, "monotonic", lambda: 0.1 * next(clock))
-    book = bookkeeping.Bookkeeper(grid_of({"a": [1.0]}), False, tmp_path)
+    monkeypatch.setattr(records, "monotonic", lambda: 0.1 * next(clock))
+    book = records.Bookkeeper(grid_of({"a": [1.0]}), False, tmp_path)
     for number in range(10_000):  # 1,000 s
         book.add((0,), str(number), records.Record("success", "", {}), None)
         book.flush()
@@ -759,7 +759,7 @@ def test_what_is_left_is_said_in_the_unit_that_one_would_use(seconds, words):
 
 
 def test_the_first_failure_is_that_of_the_grid_whatever_ends_first():
-    book = bookkeeping.Bookkeeper(grid_of({"load": [1.0, 2.0]}), False)
+    book = records.Bookkeeper(grid_of({"load": [1.0, 2.0]}), False)
     for i in (1, 0):
         book.add((i,), "", records.Record(records.FAILED, f"reason {i}", {}), None)
     assert book.first_failure() == "load=1.0: reason 0"

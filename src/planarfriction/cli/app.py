@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click import argument, option
 from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
@@ -110,8 +111,8 @@ def app() -> None:
 
 
 @app.command(short_help="Simulate a ready scene or a scene file.")
-@click.argument("scene", shell_complete=complete_scene)
-@click.option(
+@argument("scene", shell_complete=complete_scene)
+@option(
     "--model",
     type=MemberOf(MODELS, "both"),
     multiple=True,
@@ -121,31 +122,29 @@ def app() -> None:
 @cells_option
 @patch_option("Default: the scene's (mostly Circle), or the file's.")
 @map_options
-@click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
-@click.option(
+@option("--t-end", type=float, help="Duration in s. Default: the scene's.")
+@option(
     "--rtol", type=float, help="Relative tolerance of the solver. Default: the scene's."
 )
-@click.option(
+@option(
     "--max-steps",
     type=int,
     help="Largest number of steps of the solver. Default: 50 million.",
 )
-@click.option(
+@option(
     "--set",
     "settings",
     metavar="PATH=VALUE",
     multiple=True,
     help="Change a value of the scene; may be repeated.",
 )
-@click.option(
-    "--out", type=FILE, help="Folder for the data (NetCDF, CSV) and the pictures."
-)
-@click.option(
+@option("--out", type=FILE, help="Folder for the data (NetCDF, CSV) and the pictures.")
+@option(
     "--plot",
     is_flag=True,
     help="Draw histories, motion and patch as PNG (in out/ by default).",
 )
-@click.option(
+@option(
     "--animate",
     is_flag=True,
     help="Draw motion and slip as an animated GIF (in out/ by default).",
@@ -182,24 +181,22 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
     name="limit-surface", short_help="Print, draw or tabulate a limit surface."
 )
 @patch_option("Default: Circle.")
-@click.option("--pressure", type=FILE, help="Pressure map, as with --patch.")
+@option("--pressure", type=FILE, help="Pressure map, as with --patch.")
 @map_options
-@click.option(
+@option(
     "--surface",
     type=MemberOf(SURFACES),
     default="exact",
     help="Kind of limit surface.",
 )
-@click.option(
+@option(
     "--out",
     type=FILE,
     help="Picture to write (.png, .pdf, .svg, or .html to rotate it with the mouse).",
 )
-@click.option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
-@click.option("--csv", type=FILE, help="Table of samples to write (.csv).")
-def limit_surface(
-    patch: str | None, pressure: Path | None, size: dict[str, Any], **options: Any
-) -> None:
+@option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
+@option("--csv", type=FILE, help="Table of samples to write (.csv).")
+def limit_surface(**options: Any) -> None:
     """Show the limit surface of a contact patch: numbers, a picture (next to its ellipsoid), a table as CSV.
 
     The CSV has the columns vx vy omega fx fy tau: twists in all directions and their friction wrenches for mu f_N = 1,
@@ -213,7 +210,7 @@ def limit_surface(
     """
     from planarfriction.cli import limit_surface as command
 
-    command.show(command.choose_patch(patch, pressure, size), **options)
+    command.show(**options)
 
 
 @app.command(short_help="Compile everything in advance.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import click
+from click import argument, command, option
 
 import planarfriction as pf
 from planarfriction.cli.options import FILE, complete_scene
@@ -46,21 +46,21 @@ def read_model(file: Path, contact: str | None) -> Any:
     return models[validation.choice("--contact", contact, models)]
 
 
-@click.command(short_help="Write the friction model of a file as C source.")
-@click.argument("file", type=FILE, shell_complete=complete_scene)
-@click.option("--out", type=FILE, required=True, help="Folder for the files.")
-@click.option(
+@command(short_help="Write the friction model of a file as C source.")
+@argument("file", type=FILE, shell_complete=complete_scene)
+@option("--out", type=FILE, required=True, help="Folder for the files.")
+@option(
     "--name",
     default="friction",
     help="Name of the files, and prefix of the names in them.",
 )
-@click.option("--precision", default="double", help="double or float.")
-@click.option(
+@option("--precision", default="double", help="double or float.")
+@option(
     "--patches",
     default=1,
     help="Patches of this model below a body.",
 )
-@click.option(
+@option(
     "--contact",
     metavar="NAME",
     help="Contact whose model is exported, if a scene has different ones.",

@@ -9,11 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click import argument, command, option
 from click.shell_completion import CompletionItem
 
 import planarfriction as pf
 from planarfriction.cli import INTERRUPTED
-from planarfriction.cli.options import FILE, find_patch, map_options, patch_option
+from planarfriction.cli.options import (
+    FILE,
+    find_patch,
+    map_options,
+    or_file,
+    patch_option,
+)
 from planarfriction.errors import IdentificationInterrupted, InvalidValueError
 
 
@@ -39,13 +46,12 @@ class FitOrPlan(click.Command):
     ) -> None:
         """Write the options, then the other commands."""
         super().format_options(ctx, formatter)
+        rows = [
+            (name, f"{each.short_help} See identify {name} --help.")
+            for name, each in OTHERS.items()
+        ]
         with formatter.section("Commands"):
-            formatter.write_dl(
-                [
-                    (name, f"{each.short_help} See identify {name} --help.")
-                    for name, each in OTHERS.items()
-                ]
-            )
+            formatter.write_dl(rows)
 
 
 def complete_log(
@@ -53,19 +59,15 @@ def complete_log(
 ) -> list[CompletionItem]:
     """Return completions of a log: files, and the names of subcommands where they may stand."""
     others = {} if ctx.params.get("logs") else OTHERS
-    words = [
-        CompletionItem(name, help=each.short_help)
-        for name, each in others.items()
-        if name.startswith(incomplete)
-    ]
-    return [*words, CompletionItem(incomplete, type="file")]
+    words = {name: each.short_help for name, each in others.items()}
+    return or_file(words, incomplete)
 
 
-@click.command(
+@command(
     cls=FitOrPlan,
     short_help="Estimate friction parameters from logs; plan the next measurement.",
 )
-@click.argument(
+@argument(
     "logs",
     metavar="LOG...",
     type=FILE,
@@ -75,59 +77,57 @@ def complete_log(
 )
 @patch_option("Default: Circle.")
 @map_options
-@click.option(
+@option(
     "--parameters",
     metavar="NAMES",
     help="What to estimate, separated by commas. Default: law and radius.",
 )
-@click.option(
+@option(
     "--start",
     metavar="NAME=VALUE",
     multiple=True,
     help="Initial guess, or fixed value if not estimated.",
 )
-@click.option(
+@option(
     "--normal-force",
     type=float,
     help="Normal force in N, if the logs have no such column.",
 )
-@click.option(
+@option(
     "--contact",
     metavar="NAME",
     help="Contact whose columns (NAME.vx) are read, if there are several.",
 )
-@click.option(
+@option(
     "--noise",
     metavar="FX,FY,TAU",
     help="Noise of the measured wrench in N and N m. Default: estimated.",
 )
-@click.option(
+@option(
     "--plain", is_flag=True, help="Use plain LuGre bristles. Default: what fits better."
 )
-@click.option(
-    "--steady", is_flag=True, help="The logs begin in steady sliding, not at rest."
-)
-@click.option(
+@option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
+@option(
     "--model",
     default="auto",
     help="reduced-published, reduced, distributed, or auto.",
 )
-@click.option(
+@option(
     "--nuisance",
     metavar="NAMES",
     help="Rig disturbances: delay,bias,load,twist or none. Default: all.",
 )
-@click.option(
+@option(
     "--starts",
     default=4,
     help="Number of starting points of the search.",
 )
-@click.option(
+@option(
     "--seed",
     default=0,
     help="Random seed of the starting points.",
 )
-@click.option(
+@option(
     "--out",
     type=FILE,
     help="Folder for the estimates (JSON) and the residual plot (PNG).",
@@ -172,11 +172,13 @@ def identify(
     given = find_patch(patch, size)
     names = parse_names(parameters)
     guess = parse_start(start)
+    if nuisance is not None:
+        groups = [name.strip() for name in nuisance.split(",")]
+        search["nuisance"] = () if groups == ["none"] else groups
     options = FitOptions(
         noise=parse_noise(noise),
         elasto_plastic=None if plain else "auto",
         begins="steady" if steady else "rest",
-        nuisance=parse_nuisance(nuisance),
         **search,
     )
     if out is not None:
@@ -201,8 +203,12 @@ def identify(
             print(stop)
             return INTERRUPTED
     samples = sum(len(log.time) for log in read)
-    title = f"{', '.join(log.name for log in read)}: {samples} samples, {given.name}"
-    print(title, "", found.table(), sep="\n")
+    print(
+        f"{', '.join(log.name for log in read)}: {samples} samples, {given.name}",
+        "",
+        found.table(),
+        sep="\n",
+    )
     note(f"{found.starts[0]} of {found.starts[1]} starting points led to this minimum")
     if out is not None:
         stem = slug(read[0].name)
@@ -236,16 +242,6 @@ def parse_names(text: str | None) -> tuple[str, ...]:
     return check_names([name.strip() for name in text.split(",") if name.strip()])
 
 
-def parse_nuisance(text: str | None) -> tuple[str, ...]:
-    """Parse the names of `--nuisance`, separated by commas; all without it."""
-    from planarfriction.identify.sensor_errors import GROUPS
-
-    if text is None:
-        return GROUPS
-    names = tuple(name.strip() for name in text.split(","))
-    return () if names == ("none",) else names
-
-
 def parse_noise(text: str | None) -> list[float] | None:
     """Parse the three numbers of `--noise`."""
     from planarfriction._support import validation
@@ -255,50 +251,50 @@ def parse_noise(text: str | None) -> list[float] | None:
     return [validation.number_in("--noise", part) for part in text.split(",")]
 
 
-@click.command(short_help="Suggest which motion to measure next.")
-@click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
+@command(short_help="Suggest which motion to measure next.")
+@argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
 @patch_option("Default: Circle.", "patch_name")
 @map_options
-@click.option(
+@option(
     "--parameters",
     metavar="NAMES",
     help="What to estimate, separated by commas. Default: law and radius.",
 )
-@click.option(
+@option(
     "--wanted",
     metavar="NAMES",
     help="Parameters whose information counts. Default: all.",
 )
-@click.option(
+@option(
     "--start",
     metavar="NAME=VALUE",
     multiple=True,
     help="Guess of a parameter, or fixed value.",
 )
-@click.option(
+@option(
     "--normal-force",
     type=float,
     multiple=True,
     help="Load in N; may be repeated. Default: the logs', or 1.",
 )
-@click.option("--speed", default=0.05, help="Largest speed in m/s.")
-@click.option(
+@option("--speed", default=0.05, help="Largest speed in m/s.")
+@option(
     "--spin",
     type=float,
     help="Largest angular speed in rad/s. Default: the rim as fast as --speed.",
 )
-@click.option(
+@option(
     "--duration",
     default=2.0,
     help="Length of a motion in s.",
 )
-@click.option("--rate", default=1000.0, help="Samples per second.")
-@click.option(
+@option("--rate", default=1000.0, help="Samples per second.")
+@option(
     "--noise",
     metavar="FX,FY,TAU",
     help="Noise of the measured wrench in N and N m. Default: the logs', else 1 %.",
 )
-@click.option("--out", type=FILE, help="File for the best motion (.csv).")
+@option("--out", type=FILE, help="File for the best motion (.csv).")
 def plan(
     logs: tuple[Path, ...],
     patch_name: str | None,
@@ -323,9 +319,16 @@ def plan(
       planarfriction identify plan slow.csv --wanted sigma_1
     """
     from planarfriction.cli import output
-    from planarfriction.cli.console import note
-    from planarfriction.identify import candidate_motions, design_experiment
+    from planarfriction.cli.console import note, work_progress
+    from planarfriction.identify import (
+        FitOptions,
+        candidate_motions,
+        current_estimate,
+        design_experiment,
+        identify_lugre,
+    )
     from planarfriction.identify.logs import columns_of
+    from planarfriction.identify.wrenches import guessed_law
 
     patch = find_patch(patch_name, size)
     names = parse_names(parameters)
@@ -335,16 +338,33 @@ def plan(
         output.check_kind(out)
     load = normal_force[0] if normal_force else None
     measured = [pf.Log.from_csv(path, normal_force=load) for path in logs]
-    patch, law = _known(measured, patch, names, values, spread)
-    loads = (
-        list(normal_force)
-        or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured})
-        or [1.0]
-    )
+    law = guessed_law(values)
+    if measured:
+        with work_progress("identifying") as progress:
+            fit = identify_lugre(
+                measured,
+                patch,
+                parameters=names,
+                start=values,
+                model="reduced-published",
+                options=FitOptions(noise=spread),
+                progress=progress,
+            )
+        note(fit.summary().replace("\n", " "))
+        patch, law = current_estimate(fit, patch, law)
+    usual = sorted({float(f"{log.normal_force.mean():.3g}") for log in measured})
+    loads = normal_force or usual or [1.0]
     motions = candidate_motions(patch, law, normal_force=loads, **motion)
     chosen = None if wanted is None else [name.strip() for name in wanted.split(",")]
-    options = {"parameters": names, "wanted": chosen, "noise": spread}
-    found = design_experiment(patch, law, logs=measured, motions=motions, **options)
+    found = design_experiment(
+        patch,
+        law,
+        logs=measured,
+        motions=motions,
+        parameters=names,
+        wanted=chosen,
+        noise=spread,
+    )
     print(found.table())
     if out is not None:
         output.write_csv(out, columns_of(found.best))
@@ -352,76 +372,47 @@ def plan(
     return 0
 
 
-def _known(
-    logs: list[pf.Log],
-    patch: pf.ContactPatch,
-    names: tuple[str, ...],
-    start: dict[str, float],
-    noise: list[float] | None,
-) -> tuple[pf.ContactPatch, pf.LuGre]:
-    """Find patch and law as the logs show them, or as guessed where there are none."""
-    from planarfriction.cli.console import note, work_progress
-    from planarfriction.identify import FitOptions, current_estimate, identify_lugre
-    from planarfriction.identify.wrenches import guessed_law
-
-    law = guessed_law(start)
-    if not logs:
-        return patch, law
-    with work_progress("identifying") as progress:
-        found = identify_lugre(
-            logs,
-            patch,
-            parameters=names,
-            start=start,
-            model="reduced-published",
-            options=FitOptions(noise=noise),
-            progress=progress,
-        )
-    note(found.summary().replace("\n", " "))
-    return current_estimate(found, patch, law)
-
-
-@click.command(
+@command(
     short_help="Estimate the friction of a joint from a torque, a voltage or the goal of a servo."
 )
-@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True)
-@click.option("--mass", default=0.0, help="Mass at the end of a pendulum in kg.")
-@click.option("--length", default=0.0, help="Length of the pendulum in m.")
-@click.option("--arm-mass", type=float, help="Mass of its arm in kg.")
-@click.option(
+@argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True)
+@option("--mass", default=0.0, help="Mass at the end of a pendulum in kg.")
+@option("--length", default=0.0, help="Length of the pendulum in m.")
+@option("--arm-mass", type=float, help="Mass of its arm in kg.")
+@option(
     "--offset",
     type=float,
     help="Angle in rad at which the pendulum hangs. Default: estimated.",
 )
-@click.option(
+@option(
     "--inertia",
     type=float,
     help="Moment of inertia, without the pendulum, in kg m^2. Default: estimated.",
 )
-@click.option("--torque-gain", type=float, help="kt/R in N m/V. Default: estimated.")
-@click.option(
+@option("--torque-gain", type=float, help="kt/R in N m/V. Default: estimated.")
+@option(
     "--kp",
     type=float,
     multiple=True,
     help="Gain of the servo; once for each log, or once for all.",
 )
-@click.option(
+@option(
     "--gain",
     default=1.0,
     help="Duty per rad at a gain of 1.",
 )
-@click.option("--supply", type=float, help="Voltage of the servo in V.")
-@click.option(
+@option("--supply", type=float, help="Voltage of the servo in V.")
+@option(
     "--sag",
     default=0.0,
     help="Voltage lost at full duty in V.",
 )
-@click.option(
+@option(
     "--terms",
     default="auto",
     help="gravity,stribeck,load,bristles,asymmetry for torques, load,stribeck,bristles,directional for goals; or auto.",
 )
-@click.option(
+@option(
     "--out",
     type=FILE,
     help="Folder for the estimates (JSON), the picture (PNG) and C source.",
@@ -486,8 +477,7 @@ def joint(
             files += export_joint_c(fit.friction, out, name="friction")
         for file in files:
             note(f"wrote {file}")
-        if fit.unclear:
-            unclear = ", ".join(fit.unclear)
+        if unclear := ", ".join(fit.unclear):
             note(
                 f"no C source: leave out the terms that these logs do not show ({unclear})"
             )

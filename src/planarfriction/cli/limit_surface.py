@@ -32,54 +32,62 @@ AZIMUTH_SAMPLES = 72
 """Samples around the direction sphere in the CSV: every five degrees."""
 
 
-def choose_patch(
-    patch: str | None, pressure: Path | None, size: Mapping[str, Any]
-) -> pf.ContactPatch:
-    """Return the patch of `--patch` or of `--pressure`, of which at most one is given; Circle without either."""
-    if patch is not None and pressure is not None:
-        raise InvalidValueError(
-            "--patch", "not be given together with --pressure", patch
-        )
-    if pressure is not None:
-        return pressure_map(pressure, size)
-    return find_patch(patch, size)
-
-
 def show(
-    patch: pf.ContactPatch,
     *,
+    patch: str | None,
+    pressure: Path | None,
+    size: Mapping[str, Any],
     surface: str,
     out: Path | None,
     alone: bool,
     csv: Path | None,
 ) -> None:
-    """Print the numbers of a limit surface; write its picture (alone or beside the ellipsoid) and its samples."""
+    """Print the numbers of a limit surface; write its picture (alone or beside the ellipsoid) and its samples.
+
+    The patch is that of `--patch` or of `--pressure`, of which at most one is given; Circle without either.
+    """
+    from planarfriction.plots.limit_surface import sample_limit_surface, scaled_samples
+
+    if patch is not None and pressure is not None:
+        raise InvalidValueError(
+            "--patch", "not be given together with --pressure", patch
+        )
+    if pressure is None:
+        contact = find_patch(patch, size)
+    else:
+        contact = pressure_map(pressure, size)
     if out is not None:
         check_kind(out, (*PICTURES, HTML), "a picture")
     elif alone:
         raise InvalidValueError("--alone", "be given together with --out", alone)
     if csv is not None:
         check_kind(csv)
-    shown = SURFACES[surface](patch)
+    shown = SURFACES[surface](contact)
     # No -0 and no rounding errors of symmetric patches.
     centre = np.round(1e3 * shown.centre_of_pressure, 9) + 0.0
+    ellipsoid = pf.LimitSurfaceEllipsoid(contact, normal_force=shown.normal_force)
+    points, others = (
+        scaled_samples(each, *_directions())[1] for each in (shown, ellipsoid)
+    )
+    # of (fx, fy, tau/r) at the same directions of sliding
+    distance = np.linalg.norm(points - others, axis=1).max()
     rows = [
-        ["loaded cells", f"{patch.cells}"],
+        ["loaded cells", f"{contact.cells}"],
         ["centre of pressure [mm]", f"{centre[0]:.4g}, {centre[1]:.4g}"],
         ["contact radius r [mm]", f"{1e3 * shown.contact_radius:.4g}"],
-        ["second moment <rho^2> [mm^2]", f"{1e6 * float(patch.second_moment()):.4g}"],
-        [
-            "largest distance from the ellipsoid [-]",
-            f"{_distance_from_ellipsoid(shown):.3g}",
-        ],
+        ["second moment <rho^2> [mm^2]", f"{1e6 * contact.second_moment():.4g}"],
+        ["largest distance from the ellipsoid [-]", f"{distance:.3g}"],
     ]
-    rows += _grid_errors(patch)
+    # what the cells cost against the continuous patch, and what finer ones would; points have no errors
+    if contact.cell_extents().any():
+        rows.append(["errors of these cells", f"{contact.grid_error()}"])
+        if contact.cells * FINER**2 <= MOST_FINER:
+            errors = contact.grid_error(refined=FINER)
+            rows.append([f"errors of refined({FINER})", f"{errors}"])
     print_table(
-        f"Limit surface of {patch.name} ({surface})", ["mu f_N = 1", "value"], rows
+        f"Limit surface of {contact.name} ({surface})", ["mu f_N = 1", "value"], rows
     )
     if csv is not None:
-        from planarfriction.plots.limit_surface import sample_limit_surface
-
         columns = np.hstack(sample_limit_surface(shown, *_directions())).T
         names = ("vx", "vy", "omega", "fx", "fy", "tau")
         write_csv(csv, dict(zip(names, columns, strict=True)))
@@ -97,18 +105,6 @@ def show(
         note(f"wrote {out}")
 
 
-def _grid_errors(patch: pf.ContactPatch) -> list[list[str]]:
-    """Return rows on what the cells cost against the continuous patch, and on what finer ones would; none of points."""
-    if not patch.cell_extents().any():
-        return []
-    rows = [["errors of these cells", f"{patch.grid_error()}"]]
-    if patch.cells * FINER**2 <= MOST_FINER:
-        rows.append(
-            [f"errors of refined({FINER})", f"{patch.grid_error(refined=FINER)}"]
-        )
-    return rows
-
-
 def _directions() -> tuple[np.ndarray, np.ndarray]:
     """Return the polar angle and azimuth [rad] of the samples, `[M]`: every direction once."""
     polar, azimuth = np.meshgrid(
@@ -118,16 +114,3 @@ def _directions() -> tuple[np.ndarray, np.ndarray]:
     )
     polar = np.concatenate([[0.0], polar.ravel(), [np.pi]])
     return polar, np.pad(azimuth.ravel(), 1)
-
-
-def _distance_from_ellipsoid(surface: Any) -> float:
-    """Return the largest distance of (fx, fy, tau/r) from those of the ellipsoid at the same directions of sliding."""
-    from planarfriction.plots.limit_surface import scaled_samples
-
-    ellipsoid = pf.LimitSurfaceEllipsoid(
-        surface.patch, normal_force=surface.normal_force
-    )
-    points, others = (
-        scaled_samples(each, *_directions())[1] for each in (surface, ellipsoid)
-    )
-    return float(np.linalg.norm(points - others, axis=1).max())

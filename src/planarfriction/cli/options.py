@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click import option
 from click.shell_completion import CompletionItem
 
 import planarfriction as pf
@@ -47,10 +48,11 @@ def find_patch(
     if make := makers.get(text.lower()):
         for name in size:
             if name != "width":
-                option = f"--{name.replace('_', '-')}"
-                given = f"{size[name]} for the patch {text}"
-                rule = "be given only for a pressure map"
-                raise InvalidValueError(option, rule, given)
+                raise InvalidValueError(
+                    f"--{name.replace('_', '-')}",
+                    "be given only for a pressure map",
+                    f"{size[name]} for the patch {text}",
+                )
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
         from planarfriction._support import validation  # loads NumPy
@@ -92,6 +94,7 @@ PATCH_HELP = (
     f"{', '.join(PUBLISHED_PATCHES)}, disc, rectangle, or a pressure map (.csv, .npy, .npz, .mat, .asf, grey image; "
     "row 0 is the top) with --cell-size or --width."
 )
+"""Text on the values that the option `--patch` takes."""
 
 
 class FilePath(click.Path):
@@ -109,33 +112,32 @@ class FilePath(click.Path):
 
 
 FILE = FilePath()
+"""Type of options that name files or folders."""
+
+
+def or_file(words: Mapping[str, Any], incomplete: str) -> list[CompletionItem]:
+    """Return completions by names that begin with the typed text in any case, with their descriptions, and by files."""
+    typed = incomplete.lower()
+    names = [name for name in words if name.lower().startswith(typed)]
+    items = [CompletionItem(name, help=words[name]) for name in names]
+    return [*items, CompletionItem(incomplete, type="file")]
 
 
 def complete_scene(
     context: object, parameter: object, incomplete: str
 ) -> list[CompletionItem]:
     """Return completions of a scene: ready scenes that begin with the typed text, and files."""
-    names = [
-        CompletionItem(name, help=SCENES.words(name))
-        for name in SCENES
-        if name.startswith(incomplete)
-    ]
-    return [*names, CompletionItem(incomplete, type="file")]
+    return or_file({name: SCENES.words(name) for name in SCENES}, incomplete)
 
 
 def complete_patch(
     context: object, parameter: object, incomplete: str
 ) -> list[CompletionItem]:
     """Return completions of a patch: names that begin with the typed text in any case, and files."""
-    names = [
-        CompletionItem(name)
-        for name in patch_names()
-        if name.lower().startswith(incomplete.lower())
-    ]
-    return [*names, CompletionItem(incomplete, type="file")]
+    return or_file(dict.fromkeys(patch_names()), incomplete)
 
 
-cells_option = click.option(
+cells_option = option(
     "--cells",
     type=int,
     help="Number of discs of the reduced model. Default: 24, or the file's.",
@@ -145,46 +147,59 @@ cells_option = click.option(
 
 def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
     """Make the option `--patch`, given to a command as `name`; `default` says what is taken without it."""
-    words = f"Contact patch: {PATCH_HELP} {default}"
-    return click.option(
-        "--patch", name, metavar="PATCH", shell_complete=complete_patch, help=words
+    return option(
+        "--patch",
+        name,
+        metavar="PATCH",
+        shell_complete=complete_patch,
+        help=f"Contact patch: {PATCH_HELP} {default}",
     )
 
 
+def _into_size(ctx: click.Context, param: click.Parameter, value: Any) -> None:
+    """Put the value of an option into the argument `size` of its command, if it is given."""
+    size = ctx.params.setdefault("size", {})
+    if value is not None:
+        size[param.name] = value
+
+
+_map_option = functools.partial(option, expose_value=False, callback=_into_size)
+"""Maker of options that a command gets as parts of its argument `size`."""
+
 _MAP_OPTIONS = (
-    click.option(
+    _map_option(
         "--cell-size", type=float, help="Side of a cell of a pressure map in m."
     ),
-    click.option(
+    _map_option(
         "--width",
         type=float,
         help=f"Width in m of a patch. Default: {WIDTH}, or the scene's or map's.",
     ),
-    click.option(
+    _map_option(
         "--header/--no-header",
         default=None,
         help="First row of a CSV map: names, or pressures.",
     ),
-    click.option(
+    _map_option(
         "--index/--no-index",
         default=None,
         help="First column of a CSV map: labels, or pressures.",
     ),
-    click.option(
+    _map_option(
         "--frame", type=int, help="Frame or page of a map that has several, from 0."
     ),
-    click.option(
+    _map_option(
         "--frame-shape",
         type=(int, int),
         metavar="ROWS COLUMNS",
         help="Shape of frames that are rows.",
     ),
-    click.option(
+    _map_option(
         "--threshold",
         type=float,
         help="Share of the peak up to which cells of a map count as empty.",
     ),
-    click.option(
+    _map_option(
         "--invert/--no-invert",
         default=None,
         help="In an image, dark means pressure, or bright does.",
@@ -195,27 +210,9 @@ _MAP_OPTIONS = (
 
 def map_options(function: Any) -> Any:
     """Add the options of pressure maps; the command gets those that were given, by name, as `size`."""
-    names = (
-        "cell_size",
-        "width",
-        "header",
-        "index",
-        "frame",
-        "frame_shape",
-        "threshold",
-        "invert",
-    )
-
-    @functools.wraps(function)
-    def command(*arguments: Any, **options: Any) -> Any:
-        size = {
-            name: value for name in names if (value := options.pop(name)) is not None
-        }
-        return function(*arguments, size=size, **options)
-
-    for option in reversed(_MAP_OPTIONS):
-        command = option(command)
-    return command
+    for add in reversed(_MAP_OPTIONS):
+        function = add(function)
+    return function
 
 
 def load_function(option: str, entry: str) -> tuple[str, Callable[[Any], Any]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import functools
 import inspect
-import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,30 +32,21 @@ def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
     ends = {name: [_last(each, name) for each in every] for name in ("x", "y", "theta")}
     length = unit_for("length", ends["x"], ends["y"])
     angle = unit_for("angle", ends["theta"])
+    units = {"x": length, "y": length, "angle": angle}
     rows = [
         [
             f"final {called} [{unit.label}]",
             *(f"{unit.factor * end:.5g}" for end in each),
         ]
-        for (called, unit), each in zip(
-            (("x", length), ("y", length), ("angle", angle)), ends.values(), strict=True
-        )
+        for (called, unit), each in zip(units.items(), ends.values(), strict=True)
     ]
     if len(every) > 1:
-        ways, angles = zip(
-            *(largest_differences(each, every[0]) for each in every[1:]), strict=True
-        )
+        off = [largest_differences(each, every[0]) for each in every[1:]]
+        ways = (f"{1e3 * way:.4g}" for way, _ in off)
+        angles = (f"{np.degrees(angle):.4g}" for _, angle in off)
         rows += [
-            [
-                "largest difference, position [mm]",
-                "",
-                *(f"{1e3 * d:.4g}" for d in ways),
-            ],
-            [
-                "largest difference, angle [deg]",
-                "",
-                *(f"{np.degrees(d):.4g}" for d in angles),
-            ],
+            ["largest difference, position [mm]", "", *ways],
+            ["largest difference, angle [deg]", "", *angles],
         ]
     statistics = [each.statistics for each in every]
     rows += [
@@ -86,7 +76,7 @@ def largest_differences(
         - reference.histories[name].values[: len(time)]
         for name in ("x", "y", "theta")
     )
-    return float(np.hypot(dx, dy).max()), float(np.abs(dtheta).max())
+    return np.hypot(dx, dy).max(), np.abs(dtheta).max()
 
 
 def _last(solution: pf.Solution, name: str) -> float:
@@ -163,10 +153,29 @@ def scene_makers(
     """Return functions that make the scenes of some values, by the kind of their model; "" for the file's own."""
     if t_end is not None:
         validation.positive("--t-end", t_end)
-    both = [BOTH if each == "both" else [each] for each in models]
-    kinds = list(dict.fromkeys(itertools.chain(*both)))
-    if Path(name).suffix.lower() in (".toml", ".json"):
-        return _makers_from_file(name, kinds, cells, patch, size or {})
+    kinds = [kind for each in models for kind in (BOTH if each == "both" else [each])]
+    from_file = Path(name).suffix.lower() in (".toml", ".json")
+    if not kinds and not from_file:
+        kinds = BOTH if name == "in-hand" else ["distributed"]
+    makes = {kind: MODELS[kind] for kind in kinds}
+    if makes:
+        _check_cells(cells, makes.values())
+    if from_file:
+        from planarfriction.sweeps.settings import Settable
+
+        make = Settable(name)
+        if patch is None and size:
+            first, value = next(iter(size.items()))
+            raise InvalidValueError(
+                f"--{first.replace('_', '-')}", "be given only with --patch", value
+            )
+        below = None if patch is None else find_patch(patch, size or {})
+        if not kinds and below is None and cells is None:
+            return {"": make}
+        return {
+            kind: functools.partial(_with_models, make, kind, below, cells)
+            for kind in kinds or [""]
+        }
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     of_scene = _USUAL.get(name, Usual())
     if patch is None and not size and of_scene.patch is not None:
@@ -174,16 +183,14 @@ def scene_makers(
     else:
         contact_patch = find_patch(patch, size or {}, of_scene.width)
     law = of_scene.law()
-    kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
-    _check_cells(cells, [MODELS[kind] for kind in kinds])
     options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if name == "free-slide":
         options["save_every"] = SLIDE_SAMPLING
-    made = {kind: _make(MODELS[kind], contact_patch, law, cells) for kind in kinds}
-    return {
-        kind: functools.partial(_ready, SCENES[name], model, options)
-        for kind, model in made.items()
-    }
+    found = {}
+    for kind, make in makes.items():
+        model = make(contact_patch, law, **_cells(make, cells))
+        found[kind] = functools.partial(_ready, SCENES[name], model, options)
+    return found
 
 
 def _ready(
@@ -207,58 +214,31 @@ def one_each(settings: Sequence[str]) -> dict[str, Any]:
     several = parse_all(settings)
     for path, values in several.items():
         if len(values) > 1:
-            rule = "be one value (planarfriction sweep takes several)"
-            raise InvalidValueError(f"--set {path}", rule, ", ".join(map(str, values)))
+            raise InvalidValueError(
+                f"--set {path}",
+                "be one value (planarfriction sweep takes several)",
+                ", ".join(map(str, values)),
+            )
     return {path: next(iter(values.values())) for path, values in several.items()}
 
 
-def _has_cells(make: Any) -> bool:
-    """Return True if models of a class stand on a number of cells."""
-    return "cells" in inspect.signature(make).parameters
+def _cells(make: Any, cells: int | None) -> dict[str, int]:
+    """Return the number of cells as an argument of a class of models, if it is given and these stand on one."""
+    takes = "cells" in inspect.signature(make).parameters
+    return {} if cells is None or not takes else {"cells": cells}
 
 
 def _check_cells(cells: int | None, makes: Iterable[Any]) -> None:
     if cells is None:
         return
     validation.count("--cells", cells)
-    if not any(map(_has_cells, makes)):
-        kinds = ", ".join(kind for kind, make in MODELS.items() if _has_cells(make))
-        rule = f"be given only for a model that has a number of cells ({kinds})"
-        raise InvalidValueError("--cells", rule, cells)
-
-
-def _make(make: Any, patch: pf.ContactPatch, law: Any, cells: int | None) -> Any:
-    """Make a model of a class, of so many `cells` if it has a number of them."""
-    if cells is None or not _has_cells(make):
-        return make(patch, law)
-    return make(patch, law, cells=cells)
-
-
-def _makers_from_file(
-    path: str,
-    kinds: Sequence[str],
-    cells: int | None,
-    patch: str | None,
-    size: Mapping[str, Any],
-) -> dict[str, Callable[..., pf.Scene]]:
-    from planarfriction.sweeps.settings import Settable
-
-    make = Settable(path)
-    if patch is None and size:
-        name, value = next(iter(size.items()))
+    if not any(_cells(make, cells) for make in makes):
+        kinds = ", ".join(kind for kind, make in MODELS.items() if _cells(make, cells))
         raise InvalidValueError(
-            f"--{name.replace('_', '-')}", "be given only with --patch", value
+            "--cells",
+            f"be given only for a model that has a number of cells ({kinds})",
+            cells,
         )
-    contact_patch = None if patch is None else find_patch(patch, size)
-    if not kinds and contact_patch is None and cells is None:
-        return {"": make}
-    if kinds:
-        _check_cells(cells, [MODELS[kind] for kind in kinds])
-
-    def changed(kind: str, /, **values: Any) -> pf.Scene:
-        return _with_models(make(**values), kind, contact_patch, cells)
-
-    return {kind: functools.partial(changed, kind) for kind in kinds or [""]}
 
 
 def _label(scene: pf.Scene) -> str:
@@ -268,25 +248,30 @@ def _label(scene: pf.Scene) -> str:
 
 
 def _with_models(
-    scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, cells: int | None
+    make_scene: Callable[..., pf.Scene],
+    kind: str,
+    patch: pf.ContactPatch | None,
+    cells: int | None,
+    /,
+    **values: Any,
 ) -> pf.Scene:
-    """Return the scene with models of one kind on its own patches or on `patch`, laws as they are.
+    """Make a scene of some values with models of one kind on its own patches or on `patch`, laws as they are.
 
-    The kind is "" for that of the scene, "mixed" for each as it is; `cells` goes to models that have a number of them.
+    The kind is "" for each as it is; `cells` goes to models that have a number of them.
     """
+    scene = make_scene(**values)
     if not kind:
-        kind = _label(scene)
         _check_cells(cells, [type(contact.model) for contact in scene.contacts])
     contacts = []
     for contact in scene.contacts:
         model = contact.model
-        if patch is not None or kind not in ("mixed", MODELS.name_of(model)):
-            make = type(model) if kind == "mixed" else MODELS[kind]
+        make = MODELS[kind] if kind else type(model)
+        if patch is not None or make is not type(model):
             wanted = getattr(model, "cells", None) if cells is None else cells
             below = model.patch if patch is None else patch
-            model = _make(make, below, model.law, wanted)
-        elif cells is not None and _has_cells(type(model)):
-            model = dataclasses.replace(model, cells=cells)
+            model = make(below, model.law, **_cells(make, wanted))
+        elif given := _cells(make, cells):
+            model = dataclasses.replace(model, **given)
         contacts.append(dataclasses.replace(contact, model=model))
     return dataclasses.replace(scene, contacts=tuple(contacts))
 
@@ -383,7 +368,7 @@ def _draw(
     if "animate" in pictures:
         for label, solution in solutions.items():
             path = folder / f"{name}-motion-{output.slug(label)}.gif"
-            end = float(solution.histories["time"].values[-1])
+            end = _last(solution, "time")
             with simulation_progress(f"drawing {path.name}", end) as progress:
                 solution.animate(path, progress=progress)
             note(f"wrote {path}")

@@ -6,7 +6,7 @@ import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
+from click import argument, command, option
 
 from planarfriction.cli.options import (
     FILE,
@@ -29,9 +29,9 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
 """Kinds of quantities, by their SI units."""
 
 
-@click.command(short_help="Simulate a scene for every combination of values.")
-@click.argument("scene", shell_complete=complete_scene)
-@click.option(
+@command(short_help="Simulate a scene for every combination of values.")
+@argument("scene", shell_complete=complete_scene)
+@option(
     "--set",
     "settings",
     metavar="PATH=VALUES",
@@ -39,19 +39,19 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
     required=True,
     help="START:STOP:COUNT, both ends included, or VALUE,VALUE,...; may be repeated.",
 )
-@click.option(
+@option(
     "--model", metavar="NAME", help="Friction model. Default: the file's, or reduced."
 )
 @cells_option
 @patch_option("Default: Circle, or the file's.")
 @map_options
-@click.option("--t-end", type=float, help="Duration of a ready scene in s.")
-@click.option(
+@option("--t-end", type=float, help="Duration of a ready scene in s.")
+@option(
     "--measure",
     metavar="FILE.py:NAME",
     help="Function of a solution that returns what to keep. Default: all.",
 )
-@click.option(
+@option(
     "--out",
     type=FILE,
     default=Path("sweep"),
@@ -142,24 +142,25 @@ def _show(data: xr.Dataset, out: Path) -> None:
     if data.status.size > MOST_ROWS:
         import numpy as np
 
-        known = {name: each[np.isfinite(each)] for name, each in columns.items()}
-        ranges = {
-            name: np.quantile(each, [0.0, 0.5, 1.0])
-            for name, each in known.items()
-            if each.size
-        }
-        rows = [
-            [name, *(f"{value:.3g}" for value in each)] for name, each in ranges.items()
-        ]
+        rows = []
+        for name, each in columns.items():
+            known = each[np.isfinite(each)]
+            if known.size:
+                ranges = np.quantile(known, [0.0, 0.5, 1.0])
+                rows.append([name, *(f"{value:.3g}" for value in ranges)])
         print_table(title, ["", "smallest", "median", "largest"], rows)
         return
     labels = itertools.product(*(data[name].values.tolist() for name in swept))
-    values = zip(
-        *([f"{value:.3g}" for value in each.tolist()] for each in columns.values()),
-        strict=True,
-    )
-    rows = [[*(f"{each:.4g}" if isinstance(each, float) else str(each) for each in label), *row]
-            for label, row in zip(labels, values, strict=True)]  # fmt: skip
+    rows = [
+        [
+            *(
+                f"{each:.4g}" if isinstance(each, float) else str(each)
+                for each in label
+            ),
+            *(f"{each[i]:.3g}" for each in columns.values()),
+        ]
+        for i, label in enumerate(labels)
+    ]
     print_table(title, [*map(str, swept), *columns], rows)
 
 

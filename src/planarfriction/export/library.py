@@ -47,7 +47,6 @@ def grip_of(controller: Any, name: str) -> dict[str, Any]:
     observer = controller.observer
     writer = Writer()
     own = observer._filter
-    state = observer.state
     if own.kind == CELLS:
         rule = "know an ellipsoid or a table as its surface"
         raise InvalidValueError("controller", rule, type(observer.surface).__name__)
@@ -60,15 +59,19 @@ def grip_of(controller: Any, name: str) -> dict[str, Any]:
         Array(f"own_{n}", v.shape, fixed=True) if n in arrays else Fixed(v)
         for n, v in own._asdict().items()
     ]
-    estimate = friction_filter.ESTIMATE
-    control = grips.STATE
-    loops = Loops(writer, {estimate: f"{name}_estimate", control: f"{name}_control"})
+    structs = {
+        "estimate": friction_filter.ESTIMATE,
+        "observer": observer.state.dtype,
+        "control": controller.state.dtype,
+    }
+    estimate, state, control = structs.values()
+    loops = Loops(writer, {each: f"{name}_{own}" for own, each in structs.items()})
     found = Array("found", (1,), estimate)
     loops.add(
         friction_filter.update,
         (
             own._make(known),
-            Array("states", (1, len(state))),
+            Array("states", (1,), state),
             Array("samples", (1, 8)),
             found,
         ),
@@ -85,9 +88,10 @@ def grip_of(controller: Any, name: str) -> dict[str, Any]:
             if f"own_{each}[" in functions
         },
         "functions": functions,
-        "state": [writer.constant(float(x)) for x in state],
-        "control": ", ".join(_fresh(controller.state, writer)),
-        "structs": {"estimate": _fields(estimate), "control": _fields(control)},
+        "fresh": [
+            ", ".join(_fresh(each.state, writer)) for each in (observer, controller)
+        ],
+        "structs": {own: _fields(each) for own, each in structs.items()},
     }
 
 

@@ -86,9 +86,8 @@ class Loops:
         key = kernel, kinds_of(arguments)
         if key not in self._made:
             own = (_Traced if straight else _Translated)(self, kernel, arguments)
-            own.name += "_again" * sum(
-                own.name == name for name, _, _ in self._made.values()
-            )
+            while any(own.name == name for name, _, _ in self._made.values()):
+                own.name += "_again"
             self.functions.append(own.source())
             self._made[key] = own.name, own.taken, own.result
         return self._made[key]

@@ -12,7 +12,7 @@ from planarfriction.identify.experiments import (
 )
 from planarfriction.identify.logs import Log, differentiated
 from planarfriction.identify.motion import identify_motion
-from planarfriction.identify.options import FitOptions
+from planarfriction.identify.problem import FitOptions
 from planarfriction.identify.result import Identification
 from planarfriction.identify.slides import (
     MassProperties,

@@ -43,8 +43,7 @@ MISREAD = 5.0
 may have been misread."""
 
 BETTER = 0.4
-"""Share to which another reading must lower that angle to be named: no reading lowers
-noise."""
+"""Largest angle of another reading over the angle as read, if that reading is to be named: no reading lowers noise."""
 
 NEAR = np.geomspace(1.0 / 3.0, 3.0, 9)
 """Factors on the estimated size of a patch that count as the same patch."""
@@ -59,9 +58,10 @@ LEVERS = {
     32.0: "vx and vy in mm/s, or tau in N mm",
     1e3: "all lengths in mm but those of the patch",
 }
+"""Factors on the contact radius that a wrong unit explains; a factor shows as the root of `tau v/(f omega)`."""
+
 SAME_LEVER = 2.0
-"""Factors on the contact radius that a unit explains, and how near they have to be; a factor shows as the root of
-`tau v/(f omega)`."""
+"""Largest ratio of a factor on the contact radius to one of `LEVERS` that it is put down to."""
 
 HIGH = 4.0
 """Friction over load above which one of both has another unit or another scale."""
@@ -93,30 +93,29 @@ VARIES = 0.1
 measured slides have 0.07."""
 
 STEADIER = 0.3
-"""Share to which degrees must lower the spread of friction in slides."""
+"""Largest spread of friction in slides if angles are read as degrees, over the spread as read, if they are degrees."""
 
 SURE = 0.3
 """Spread of the logarithm of friction from which on no other cause is left than misread
 angles."""
 
 FEW = 4
-"""Number of slides from which on their spread is judged."""
+"""Number of decelerations from which on their spread is judged."""
 
 USUAL = 1.0
 """Friction over load of a slide above which angles may be misread."""
 
 HALF = 0.5
-"""Share of a slide's friction that it must stay below once its angles are read as
-degrees."""
+"""Largest friction of slides whose angles are read as degrees, over the friction as read, if they are misread."""
 
 STILL = 2
-"""Number of steps without motion that show a frozen tracker."""
+"""Number of steps in a row without motion that show a frozen tracker."""
 
 SLOWED = 0.1
-"""Speed of these steps over that behind the jump that ends them."""
+"""Largest speed of a frozen tracker, over the speed after the jump that ends the freeze."""
 
 JUMP = 2.0
-"""Speed of the jump over that behind it."""
+"""Least speed of the jump after a freeze, over the speed after the jump."""
 
 
 class Finding(NamedTuple):
@@ -178,16 +177,21 @@ def with_findings(
         ]
         odd += filter(None, rates)
         if None not in rates:
-            text = "no log is sampled at twice the corner frequency of the bristles"
-            verdicts.append(Verdict("sigma_1", False, text))
+            verdicts.append(
+                Verdict(
+                    "sigma_1",
+                    False,
+                    "no log is sampled at twice the corner frequency of the bristles",
+                )
+            )
     verdicts += (Verdict("fit", False, str(finding)) for finding in odd)
     return dataclasses.replace(result, verdicts=(*result.verdicts, *verdicts))
 
 
 def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
     """Check one log: sign of the work, axes and units, displacement between samples, friction against load."""
-    size = size_of(log, patch)
-    sliding = Sliding.of(log, patch)
+    size = size_at(load_of(log), patch)
+    sliding = Sliding.of(log, patch, size)
     found = (
         check_work(log, sliding) or check_directions(log, sliding, size),
         check_times(log, size),
@@ -217,10 +221,10 @@ class Sliding(NamedTuple):
     """Mask of the measured channels, `[3]`."""
 
     @classmethod
-    def of(cls, log: Log, patch: ContactPatch) -> Sliding:
+    def of(cls, log: Log, patch: ContactPatch, radius: float) -> Sliding:
         """Select the fast samples under load, at most `MOST` of them."""
         few = patch.discs(FEW_DISCS) if patch.cells > MOST_CELLS else patch
-        size = [1.0, 1.0, size_of(log, patch)]
+        size = [1.0, 1.0, radius]
         speed = np.linalg.norm(log.twist * size, axis=1)
         force = np.linalg.norm(log.wrench / size, axis=1)
         fast = speed >= FAST * np.quantile(speed, 0.95)
@@ -236,7 +240,7 @@ class Sliding(NamedTuple):
             log.wrench[rows],
             np.append(0.0, np.cumsum(turns))[rows],
             few.levers(),
-            few.weights(_load(log)),
+            few.weights(load_of(log)),
             log.channels,
         )
 
@@ -273,8 +277,12 @@ def check_work(log: Log, sliding: Sliding) -> Finding | None:
     if len(power) < LEAST or power[driving].sum() <= AGAINST * np.abs(power).sum():
         return None
     rule = f"act on the moving body, against its motion (it does {_best_reading(sliding)[1]})"
-    found = f"power > 0 in {100.0 * driving.mean():.4g} % of the samples that slide"
-    return Finding(f"wrench of {log.name}", rule, found, refuses=True)
+    return Finding(
+        f"wrench of {log.name}",
+        rule,
+        f"power > 0 in {100.0 * driving.mean():.4g} % of the samples that slide",
+        refuses=True,
+    )
 
 
 def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
@@ -295,8 +303,11 @@ def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
     if angle > BETTER * as_read:
         return None
     rule = "point in the direction of friction on the patch"
-    text = f"a median deviation of {as_read:.0f} deg, and {angle:.0f} deg {words}"
-    return Finding(f"wrench of {log.name}", rule, text)
+    return Finding(
+        f"wrench of {log.name}",
+        rule,
+        f"a median deviation of {as_read:.0f} deg, and {angle:.0f} deg {words}",
+    )
 
 
 def _best_reading(sliding: Sliding) -> tuple[float, str]:
@@ -344,8 +355,11 @@ def check_times(log: Log, size: float) -> Finding | None:
     if log.interval >= SLOW and moved > TRAVEL * size:
         return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
     if speed > SPEEDY or moved > size:
-        text = f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
-        return Finding(f"twist of {log.name}", "be in m/s and rad/s", text)
+        return Finding(
+            f"twist of {log.name}",
+            "be in m/s and rad/s",
+            f"{seen}: are vx and vy in mm/s, or omega in deg/s?",
+        )
     return None
 
 
@@ -358,8 +372,11 @@ def check_friction(log: Log, size: float) -> Finding | None:
     force = np.quantile(np.linalg.norm(shares[:, :2], axis=1), 0.9)
     torque = np.quantile(np.abs(shares[:, 2]) / size, 0.9)
     if force > HIGH:
-        text = f"friction of {force:.3g} times the load: is normal_force in kg or kN?"
-        return Finding(f"normal_force of {log.name}", "be in N", text)
+        return Finding(
+            f"normal_force of {log.name}",
+            "be in N",
+            f"friction of {force:.3g} times the load: is normal_force in kg or kN?",
+        )
     if torque > HIGH:
         rule = "be in N m about the origin of the contact frame"
         text = f"a torque of {torque:.3g} times the load and the contact radius: is it in N mm, or about another point?"
@@ -389,8 +406,11 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
     if rate >= 2.0 * corner:
         return None
     why = f"to determine sigma_1 (corner frequency sigma_0/(2 pi sigma_1): {corner:.3g} Hz)"
-    rule = f"be taken at {2.0 * corner:.3g} Hz or more {why}"
-    return Finding(f"samples of {log.name}", rule, f"{rate:.3g} Hz")
+    return Finding(
+        f"samples of {log.name}",
+        f"be taken at {2.0 * corner:.3g} Hz or more {why}",
+        f"{rate:.3g} Hz",
+    )
 
 
 # ---------------------------------------------------------------------- slides
@@ -401,7 +421,7 @@ def check_slide_units(
 ) -> Finding | None:
     """Check that decelerations are those of friction, and alike in all windows of all slides, for times in s, places in
     m and angles in rad: of 281 measured slides, one at a time, 245 are doubted if they are in deg, and none in rad."""
-    size = _size_at(body.mass * body.gravity, patch)
+    size = size_at(body.mass * body.gravity, patch)
     as_read = _friction_of_slides(slides, body, size, 1.0)
     if len(as_read) == 0:
         return None
@@ -412,8 +432,9 @@ def check_slide_units(
     steadier = np.std(np.log(in_degrees))
     text = f"friction of {friction:.3g} times the load"
     if friction < LOW:
-        text = f"{text}: is it in ms?"
-        return Finding("time of the slides", "be in s", text, refuses=True)
+        return Finding(
+            "time of the slides", "be in s", f"{text}: is it in ms?", refuses=True
+        )
     if (spread > VARIES and steadier < STEADIER * spread) or (
         friction > USUAL and less < HALF * friction
     ):
@@ -422,8 +443,9 @@ def check_slide_units(
         sure = (len(as_read) >= FEW and spread > SURE) or friction > HIGH
         return Finding("theta of the slides", "be in rad", text, refuses=bool(sure))
     if friction > HIGH:
-        text = f"{text}: are they in mm?"
-        return Finding("x and y of the slides", "be in m", text, refuses=True)
+        return Finding(
+            "x and y of the slides", "be in m", f"{text}: are they in mm?", refuses=True
+        )
     return None
 
 
@@ -459,21 +481,21 @@ def check_frozen(slide: Slide) -> Finding | None:
     return None
 
 
-def _load(log: Log) -> float:
+def load_of(log: Log) -> float:
+    """Return the median load of the samples under load [N], 1 without any."""
     loaded = log.normal_force[log.normal_force > 0.0]
     return np.median(loaded) if len(loaded) else 1.0
 
 
-def size_of(log: Log, patch: ContactPatch) -> float:
-    """Return the length that turns spin into speed [m]: the contact radius at the load of the log."""
-    return _size_at(_load(log), patch)
+def size_at(load: float, patch: ContactPatch) -> float:
+    """Return the length that turns spin into speed [m]: the contact radius at a load.
 
-
-def _size_at(load: float, patch: ContactPatch) -> float:
-    """Return the contact radius at a load [m]. Raises InvalidValueError for a single point."""
+    Raises InvalidValueError for a single point.
+    """
     size = patch.contact_radius(load)
     if not size > 0.0:
         rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"
-        found = f"{patch.cells} cell with a contact radius of {size:g} m"
-        raise InvalidValueError("patch", rule, found)
+        raise InvalidValueError(
+            "patch", rule, f"{patch.cells} cell with a contact radius of {size:g} m"
+        )
     return size

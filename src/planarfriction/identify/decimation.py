@@ -26,8 +26,8 @@ GROWTH = 1.03
 window are then off by 3e-4 of the largest at most (by 2e-2 with a ratio of 1.15)."""
 
 LEVELS = 600
-"""Number of these distances: they span a factor of 5e7, the last one a part of the
-deflection of a bristle."""
+"""Number of distances from a window at which steps begin: they span a factor of 5e7, down to a part of the deflection
+of a bristle."""
 
 LEAST_SPEED = 1e-3
 """Speed below which windows count as alike, as a share of the largest speed."""

@@ -24,7 +24,6 @@ from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import Log, as_tuple
-from planarfriction.identify.options import FitOptions, check_noise
 from planarfriction.identify.parameters import (
     ALL,
     LAW,
@@ -38,7 +37,7 @@ from planarfriction.identify.parameters import (
     check_patch,
     fitted_law,
 )
-from planarfriction.identify.problem import LogProblem
+from planarfriction.identify.problem import FitOptions, LogProblem, check_noise
 from planarfriction.identify.result import WIDTH, Identification
 from planarfriction.identify.sensor_errors import GROUPS, check_groups, wrench_noise
 from planarfriction.identify.uncertainty import finite
@@ -193,9 +192,18 @@ def design_experiment(
     candidates = as_tuple("motions", motions, Log)
     for each in candidates:
         if not each.twist.any():
-            rule = "move the contact"
-            raise InvalidValueError(f"twist of {each.name}", rule, "0 throughout")
-    sigma = _noise(noise, before, candidates, patch, law)
+            raise InvalidValueError(
+                f"twist of {each.name}", "move the contact", "0 throughout"
+            )
+    if noise is not None:
+        sigma = check_noise("noise", noise)
+    elif before:
+        sigma = wrench_noise(before)
+    else:
+        load = max(each.normal_force.max() for each in candidates)
+        validation.positive("normal_force of the motions", load)
+        force = NOISE * law.mu_c * load
+        sigma = np.array([force, force, force * patch.contact_radius(load)])
     later = tuple(group for group in groups if group != "twist")
     information = _Information(patch, law, names, later, sigma)
     so_far = information.prior()
@@ -203,24 +211,24 @@ def design_experiment(
         so_far = so_far + information.of_logs(before, groups)
     start = information.covariance(so_far)
     pick = [names.index(name) for name in chosen]
-    expected = []
-    gains = []
-    errors = []
+    found = []
     for each in candidates:
         motion = information.expected(each)
-        added = information.of_logs((information.measured(motion),), later)
+        # a torque of 0 throughout would count as not measured
+        measured = dataclasses.replace(motion, wrench=motion.wrench + finite(sigma))
+        added = information.of_logs((measured,), later)
         after = information.covariance(so_far + added)
-        expected.append(motion)
-        gains.append(_entropy(start, pick) - _entropy(after, pick))
-        errors.append(information.errors(after))
-    order = np.argsort(-np.array(gains), kind="stable")
+        gain = _entropy(start, pick) - _entropy(after, pick)
+        found.append((gain, motion, information.errors(after)))
+    found.sort(key=lambda each: -each[0])
+    gains, expected, errors = zip(*found, strict=True)
     return MotionPlan(
         names,
         information.values,
-        tuple(expected[i] for i in order),
-        np.array(gains)[order],
+        expected,
+        np.array(gains),
         information.errors(start),
-        np.array(errors)[order],
+        np.array(errors),
     )
 
 
@@ -251,27 +259,22 @@ def current_estimate(
     return patch, fitted_law(law, given)
 
 
+@dataclass(eq=False)
 class _Information:
     """Information of logs on the coordinates `[F]` of the contact and the disturbances `[S]` that all logs share."""
 
-    def __init__(
-        self,
-        patch: ContactPatch,
-        law: LuGre,
-        names: tuple[str, ...],
-        groups: tuple[str, ...],
-        noise: np.ndarray,
-    ) -> None:
-        self.patch = patch
-        self.law = law
-        self.names = names
-        self.groups = groups
-        self.noise = noise
+    patch: ContactPatch
+    law: LuGre
+    names: tuple[str, ...]
+    groups: tuple[str, ...]
+    noise: np.ndarray
+
+    def __post_init__(self) -> None:
         ones = np.ones((10, 3))
         probe = Log(np.linspace(0.0, 1.0, 10), ones, ones, 1.0)
-        self._probe = self.problem([probe], groups)
+        self._probe = self.problem([probe], self.groups)
         self.values = self._probe.start_values()
-        coordinates = Coordinates(names, self.values, law.mu_c)
+        coordinates = Coordinates(self.names, self.values, self.law.mu_c)
         self._scale = coordinates.scale
         self._slopes = coordinates.slopes(coordinates.of(self.values))
 
@@ -297,11 +300,7 @@ class _Information:
         """Return the motion with its expected wrenches."""
         unmeasured = dataclasses.replace(motion, wrench=np.ones_like(motion.twist))
         problem = self.problem([unmeasured], ())
-        return dataclasses.replace(motion, wrench=problem.shown(self.values)[0])
-
-    def measured(self, log: Log) -> Log:
-        """Return the log with its noise added to the wrenches: a torque of 0 throughout would count as not measured."""
-        return dataclasses.replace(log, wrench=log.wrench + finite(self.noise))
+        return dataclasses.replace(motion, wrench=problem.shown(self.values))
 
     def of_logs(self, logs: Sequence[Log], groups: Sequence[str]) -> np.ndarray:
         """Compute the information `[F + S, F + S]` of logs, with the disturbances of each log estimated along."""
@@ -313,7 +312,7 @@ class _Information:
         whole = jacobian.T @ jacobian
         of_log = [column.log is not None for column in problem.rig.columns]
         own = np.append(np.full(len(self.names), False), of_log).astype(bool)
-        inner = whole[np.ix_(own, own)] + np.eye(int(own.sum()))
+        inner = whole[np.ix_(own, own)] + np.eye(own.sum())
         both = whole[np.ix_(~own, own)]
         return whole[np.ix_(~own, ~own)] - both @ np.linalg.solve(inner, both.T)
 
@@ -332,24 +331,6 @@ class _Information:
 def _entropy(covariance: np.ndarray, pick: Sequence[int]) -> float:
     """Compute the entropy of the picked coordinates [bit], up to a constant."""
     return 0.5 * np.linalg.slogdet(covariance[np.ix_(pick, pick)])[1] / np.log(2.0)
-
-
-def _noise(
-    given: Any,
-    logs: Sequence[Log],
-    motions: Sequence[Log],
-    patch: ContactPatch,
-    law: LuGre,
-) -> np.ndarray:
-    """Return the noise `[3]` of the wrenches: as given, that of the logs, or a share of friction."""
-    if given is not None:
-        return check_noise("noise", given)
-    if logs:
-        return wrench_noise(logs)
-    load = max(motion.normal_force.max() for motion in motions)
-    validation.positive("normal_force of the motions", load)
-    force = NOISE * law.mu_c * load
-    return np.array([force, force, force * patch.contact_radius(load)])
 
 
 # ---------------------------------------------------------------------- motions to choose from

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,184 @@ from numpy.typing import ArrayLike
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Kept
 from planarfriction._support.reading import Table
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import FileError, InvalidValueError, shown
 from planarfriction.geometry import rotate
-from planarfriction.identify.columns import LOAD, MOTION, TWIST, WRENCH, find_columns
 from planarfriction.scenes import Solution
+
+TWIST = ("vx", "vy", "omega")
+"""Names of the columns of a twist."""
+
+MOTION = ("x", "y", "theta")
+"""Names of the columns of a pose."""
+
+WRENCH = ("fx", "fy", "tau")
+"""Names of the columns of a wrench."""
+
+LOAD = ("normal_force",)
+"""Name of the column of the load, as a tuple."""
+
+ALIASES = {
+    "time": "t",
+    "time_s": "t",
+    "t_s": "t",
+    "wz": "omega",
+    "fn": "normal_force",
+    "fz": "normal_force",
+    "mz": "tau",
+    "tz": "tau",
+    "force": "fx",
+    "velocity": "vx",
+    "position": "x",
+    "torque": "tau",
+    "angle": "theta",
+}
+"""Other names of columns, in small letters."""
+
+MESSAGES = {
+    "force.x": "fx",
+    "force.y": "fy",
+    "force.z": "normal_force",
+    "torque.z": "tau",
+    "linear.x": "vx",
+    "linear.y": "vy",
+    "angular.z": "omega",
+    "position.x": "x",
+    "position.y": "y",
+}
+"""Names of columns by the names of fields of ROS messages, without their prefix, such as wrench in wrench.force.x."""
+
+UNITS = {
+    "t": ("s",),
+    "vx": ("m/s",),
+    "vy": ("m/s",),
+    "omega": ("rad/s", "1/s"),
+    "x": ("m",),
+    "y": ("m",),
+    "theta": ("rad",),
+    "fx": ("n",),
+    "fy": ("n",),
+    "normal_force": ("n",),
+    "tau": ("nm", "n*m", "n.m", "n·m"),
+}
+"""Units that may stand in brackets behind a name, or below it, in small letters and without spaces."""
+
+_MESSAGE = re.compile(r"(?:.*[./_])?(force|torque|linear|angular|position)[./_]([xyz])")
+"""Pattern of the name of a field of a ROS message."""
+
+_HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
+"""Pattern of a heading: a name, and a unit in brackets."""
+
+
+def find_columns(
+    path: Path, headings: Sequence[str], *, contact: str | None, with_load: bool
+) -> dict[str, str]:
+    """Find the heading of each column of a log: `t`, twist or else motion, wrench, and normal force if it is there.
+
+    An angle beside a twist is found too: it shows if the twist is a mean (see `Log.held`). Names are read without
+    regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named "contact.vx", those of
+    `contact` are taken, or of the only contact that has them all.
+
+    Raises FileError for a column that is missing, that is there twice, or that has another unit.
+    """
+    named = _named(path, headings)
+    contacts = sorted({name.rpartition(".")[0] for name in named} - {""})
+    lacks = {each: _missing(named, each, with_load) for each in ("", *contacts)}
+    if contact is None:
+        whole = [each for each in contacts if not lacks[each]]
+        if lacks[""] and len(whole) > 1:
+            raise FileError(
+                f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them"
+            )
+        # If all lack something, the message is about the nearest.
+        contact = min(lacks, key=lambda each: len(lacks[each]))
+    elif not contacts:
+        raise FileError(
+            f"{path}: contact must be left out: no column is named as pad.vx, got {shown(repr(contact))}"
+        )
+    else:
+        try:
+            validation.choice("contact", contact, contacts)
+        except InvalidValueError as error:
+            raise FileError(f"{path}: {error}") from None
+    if lacks[contact]:
+        raise FileError(
+            f"{path}: has no column {', '.join(lacks[contact])}; found {shown(', '.join(headings))}; needed t, "
+            f"{', '.join(TWIST)} (or {', '.join(MOTION)}), {', '.join((*WRENCH, *LOAD))}"
+        )
+    own = _of_contact(named, contact)
+    wanted = [name for name in ("t", *_measured(own), *LOAD) if name in own]
+    found = {name: own[name] for name in wanted}
+    for name, heading in found.items():
+        unit = _parts(heading)[1]
+        if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
+            raise FileError(
+                f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}"
+            )
+    angle = own.get("theta") or named.get("theta")
+    if angle is not None and (_parts(angle)[1] or "rad").strip().lower() == "rad":
+        found.setdefault("theta", angle)
+    return found
+
+
+def _named(path: Path, headings: Sequence[str]) -> dict[str, str]:
+    """Map names of columns to headings; an alias counts only where the name itself is missing."""
+    named: dict[str, str] = {}
+    for heading in headings:
+        name = _column_name(_parts(heading)[0])
+        if name in named:
+            raise FileError(
+                f"{path}: columns {shown(repr(named[name]))} and {shown(repr(heading))} are the same"
+            )
+        if name:
+            named[name] = heading
+    for name in list(named):
+        prefix, dot, last = name.rpartition(".")
+        if last in ALIASES:
+            named.setdefault(prefix + dot + ALIASES[last], named[name])
+    return named
+
+
+def _column_name(heading: str) -> str:
+    """Return the name of a column without its unit: "contact.vx" with a small vx, or that of a message's number."""
+    message = _MESSAGE.fullmatch(heading.lower())
+    if message is not None and ".".join(message.groups()) in MESSAGES:
+        return MESSAGES[".".join(message.groups())]
+    prefix, dot, name = heading.rpartition(".")
+    return prefix + dot + name.lower()
+
+
+def _parts(heading: str) -> tuple[str, str | None]:
+    """Split a heading such as "vx [m/s]" into name and unit."""
+    match = _HEADING.fullmatch(heading)
+    return (heading, None) if match is None else (match["name"].strip(), match["unit"])
+
+
+def _of_contact(named: dict[str, str], contact: str) -> dict[str, str]:
+    """Return the headings of one contact by the names of their columns, and that of the times, which all share."""
+    prefix = f"{contact}." if contact else ""
+    own = {
+        name.removeprefix(prefix): named[name]
+        for name in named
+        if name.startswith(prefix)
+    }
+    return {"t": named["t"], **own} if "t" in named else own
+
+
+def _measured(named: Collection[str]) -> Sequence[str]:
+    """Return the names of the columns of motion and wrench that a file should have: of one axis, if it has no other."""
+    there = {*TWIST, *MOTION, *WRENCH}.intersection(named)
+    for speed, place, wrench in zip(TWIST, MOTION, WRENCH, strict=True):
+        if wrench in there and there <= {speed, place, wrench} and len(there) > 1:
+            return (speed if speed in there else place), wrench
+    placed = {*MOTION} <= there and not {*TWIST} <= there
+    return *(MOTION if placed else TWIST), *WRENCH
+
+
+def _missing(named: dict[str, str], contact: str, with_load: bool) -> list[str]:
+    own = _of_contact(named, contact)
+    wanted = ("t", *_measured(own), *(LOAD if with_load else ()))
+    return [name for name in wanted if name not in own]
+
 
 Arrays = Sequence[np.ndarray]
 """Several arrays, such as one of each log or slide."""
@@ -96,8 +271,9 @@ class Log(ByValue):
         load = np.broadcast_to(load, len(time)) if load.ndim == 0 else load
         if (load <= 0.0).all() and (load < 0.0).any():
             rule = "be >= 0; negate it if the sensor counts pressure as negative"
-            found = f"{load.min():.3g} to {load.max():.3g} N"
-            raise InvalidValueError("normal_force", rule, found)
+            raise InvalidValueError(
+                "normal_force", rule, f"{load.min():.3g} to {load.max():.3g} N"
+            )
         load = validation.non_negative_array("normal_force", load, (len(time),))
         self._set(time=time, twist=twist, wrench=wrench, normal_force=load)
         for value in (time, twist, wrench, load):
@@ -287,13 +463,6 @@ def as_tuple(name: str, value: Any, kind: type) -> tuple[Any, ...]:
     return result
 
 
-def one_coordinate(logs: Sequence[Log]) -> bool:
-    """Return True if all logs have one wrench channel only, and move only along it."""
-    measured = np.any([log.channels for log in logs], axis=0)
-    moving = np.any([log.twist.any(axis=0) for log in logs], axis=0)
-    return bool(measured.sum() == 1 and not (moving & ~measured).any())
-
-
 def load_ratio(logs: Sequence[Log]) -> float:
     """Return the largest load over the least, of which no log has 5 % of its samples beyond."""
     spans = np.array([np.quantile(loads(log), (0.05, 0.95)) for log in logs])
@@ -309,8 +478,9 @@ def loads(log: Log) -> np.ndarray:
     """Return the loads > 0 of a log [N], or raise InvalidValueError if there is none."""
     found = log.normal_force[log.normal_force > 0.0]
     if not len(found):
-        name = f"normal_force of {log.name}"
-        raise InvalidValueError(name, "be > 0 somewhere", "0 everywhere")
+        raise InvalidValueError(
+            f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere"
+        )
     return found
 
 
@@ -367,6 +537,11 @@ def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.nda
     return result
 
 
+def runs(mask: np.ndarray) -> np.ndarray:
+    """Return the first index of each run of True, and the first behind it, `[N, 2]`."""
+    return np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
+
+
 def is_mean(time: np.ndarray, omega: np.ndarray, angle: np.ndarray) -> bool:
     """Return True if each `omega` `[T]` is the mean since the sample before, and not the spin at its own instant.
 
@@ -421,8 +596,10 @@ def unwrapped(
         (fast, steps, slower),
     ):
         if where.any():
-            i = int(np.argmax(where))
-            found = f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s"
-            raise InvalidValueError(f"{name} [rad]", rule, found)
-    count = int(np.count_nonzero(turns))
-    return angle - TURN * np.append(0.0, np.cumsum(turns)), count
+            i = np.argmax(where)
+            raise InvalidValueError(
+                f"{name} [rad]",
+                rule,
+                f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s",
+            )
+    return angle - TURN * np.append(0.0, np.cumsum(turns)), int(np.count_nonzero(turns))

@@ -64,6 +64,7 @@ DRY = LuGre(
 """Dry friction with bristles so stiff that only the coefficient counts."""
 
 CHANNELS = (("x", "m"), ("y", "m"), ("theta", "rad"))
+"""Names and units of the measured channels of a slide."""
 
 FIRST_NOISE = 1e-3
 """Noise of positions in the first fit [m], of angles over the contact radius."""
@@ -82,7 +83,7 @@ FEW = 10
 """Number of slides below which their spread gives only a rough error."""
 
 FADING = np.linspace(1.0, 0.0, 50)
-"""Speeds of a slide on its way to rest over its first one."""
+"""Speeds of a slide until it rests, over its first speed."""
 
 Build = Callable[..., Any]
 """Function that makes a friction model from a patch and a law."""
@@ -165,7 +166,7 @@ def identify_motion(
     noise = FIRST_NOISE / np.array([1.0, 1.0, patch.contact_radius()])
     with interruptible([problem]):
         fit = refine(multistart(problem, [problem.start_values()], noise))
-        return _identification(fit, problem, found)
+        return _identification(fit, found)
 
 
 @dataclass(eq=False)
@@ -189,15 +190,14 @@ class SlideProblem(LeastSquaresProblem):
 
     def __post_init__(self) -> None:
         self.starts = [start_of(slide) for slide in self.slides]
+        lengths = [len(slide.time) for slide in self.slides]
+        self.owner = np.repeat(np.arange(len(lengths)), lengths)
         # Of the first evaluation; later ones begin where the last one ended.
         self._turns = 3
 
     @property
     def numbers(self) -> int:
-        return sum(self.sizes())
-
-    def sizes(self) -> list[int]:
-        return [slide.pose.size for slide in self.slides]
+        return 3 * len(self.owner)
 
     def start_values(self) -> np.ndarray:
         """Return the values `[F]` of the names in the start."""
@@ -216,7 +216,7 @@ class SlideProblem(LeastSquaresProblem):
         patch = self.patch
         radius = self.by_name(values).get("contact_radius")
         if radius is not None:
-            patch = scaled_patch(patch, radius / float(patch.contact_radius()))
+            patch = scaled_patch(patch, radius / patch.contact_radius())
         return self.build(patch, self.fitted_law(values))
 
     def poses(self, values: np.ndarray) -> Arrays:
@@ -227,14 +227,10 @@ class SlideProblem(LeastSquaresProblem):
             slide_poses(model, self.body, slide.time, start) for slide, start in both
         ]
 
-    def even_sigma(self, noise: np.ndarray) -> Arrays:
-        rows = np.broadcast_to(noise, (len(self.slides), 3))
-        both = zip(rows, self.slides, strict=True)
-        return [np.broadcast_to(row, slide.pose.shape) for row, slide in both]
+    def even_sigma(self, noise: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(noise, (len(self.slides), 3))[self.owner]
 
-    def estimate_noise(
-        self, values: np.ndarray, noise: np.ndarray
-    ) -> tuple[np.ndarray, Arrays]:
+    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> Linear:
         """Estimate the noise `[S, 3]`, equal for x and y, from the residuals at `values`, and sigma of each sample."""
         both = zip(self.slides, self.poses(values), strict=True)
         residuals = [slide.pose - poses for slide, poses in both]
@@ -253,12 +249,12 @@ class SlideProblem(LeastSquaresProblem):
             noise = np.maximum(channels, LEAST_NOISE) / np.sqrt(weighed)[:, None]
         return noise, self.even_sigma(noise)
 
-    def linearised(self, values: np.ndarray, sigma: Arrays) -> Linear:
+    def linearised(self, values: np.ndarray, sigma: np.ndarray) -> Linear:
         """Compute the residuals over `sigma`, `[M]`, at the best starts, and derivatives `[M, F]` with the starts free.
 
         The start answers every change: `q' = -B^+ (r, J)` with B of the poses from which it is estimated.
         """
-        noise = np.min([each[0] for each in sigma], axis=0)
+        noise = sigma.min(axis=0)
         model = self.fitted_model(values)
         least = np.abs(self.start_values()) + 1e-2 * (values == 0.0)
         changes = CHANGE * np.maximum(np.abs(values), least)
@@ -270,7 +266,7 @@ class SlideProblem(LeastSquaresProblem):
                     f"slide {i + 1} of {len(self.slides)}, "
                     + ", ".join(f"{v:.4g}" for v in values)
                 )
-            if self._turns > 0:
+            if self._turns:
                 part = slide if self.samples is None else slide.first(self.samples)
                 self.starts[i] = improve_start(
                     model, self.body, part, self.starts[i], noise, self._turns
@@ -287,17 +283,15 @@ class SlideProblem(LeastSquaresProblem):
             known = None if self.samples is None else 3 * self.samples
             answer = np.linalg.lstsq(basis[:known], both[:known], rcond=None)[0]
             self.starts[i] = start - answer[:, 0]
-            weight = (noise / sigma[i]).reshape(-1, 1)
-            rows.append(weight * (both - basis @ answer))
+            rows.append(both - basis @ answer)
         self._turns = 0
-        whole = np.concatenate(rows)
+        whole = np.concatenate(rows) * (noise / sigma).reshape(-1, 1)
         return whole[:, 0], whole[:, 1:]
 
 
-def _identification(
-    fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]
-) -> Identification:
+def _identification(fit: Fit, left_out: Sequence[Verdict]) -> Identification:
     """Make the result of a fit of slides."""
+    problem = fit.problem
     names = problem.names
     slides = problem.slides
     noise = fit.noise.min(axis=0)
@@ -323,7 +317,7 @@ def _identification(
     if "contact_radius" in names and not evidence.spinning:
         at = names.index("contact_radius")
         found[at] = Verdict("contact_radius", False, "no spin")
-    if (count := int((weighed > 0.0).sum())) < FEW:
+    if (count := np.count_nonzero(weighed)) < FEW:
         found.append(Verdict("fit", False, f"the errors come from only {count} slides"))
     histories = [
         {

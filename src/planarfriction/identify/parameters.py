@@ -16,9 +16,9 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.logs import Linear, Log
+from planarfriction.identify.logs import Linear
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.patch import ContactPatch, SoftFinger
+from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 
 
@@ -64,6 +64,7 @@ SOFT_FINGER = {
 """Constants of a `SoftFinger`: its radius `c f_N^n`, the exponent `k` of its profile."""
 
 ALL = {**LAW, **SHAPE, **SOFT_FINGER}
+"""All parameters by name."""
 
 USUAL = (
     "mu_c",
@@ -129,38 +130,6 @@ def check_patch(patch: Any, by: str) -> None:
     refuse_anisotropy(patch, by)
 
 
-def check_loads(
-    logs: Sequence[Log],
-    loads: Sequence[float],
-    patch: ContactPatch,
-    names: Sequence[str],
-) -> None:
-    """Check that a fit can take the logs and their mean loads on a patch, and estimate `names` of a soft finger."""
-    if names and not isinstance(patch.pressure, SoftFinger):
-        raise InvalidValueError(
-            "patch",
-            f"have a SoftFinger pressure to estimate {', '.join(names)}",
-            patch.name,
-        )
-    for name in ("k", "k_per_newton"):
-        if name in names and getattr(patch.pressure, name) is None:
-            raise InvalidValueError(
-                "parameters", f"contain {name} only if the SoftFinger has it", name
-            )
-    for log, load in zip(logs, loads, strict=True):
-        if not log.wrench.any():
-            raise InvalidValueError(
-                f"wrench of {log.name}", "not be 0 throughout", "0 in every sample"
-            )
-        if (
-            patch.depends_on_load
-            and np.abs(log.normal_force / load - 1.0).max() > CONSTANT
-        ):
-            rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
-            found = f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
-            raise InvalidValueError(f"normal_force of {log.name}", rule, found)
-
-
 class Coordinates:
     """Map between values `[F + K]` of the contact and of the rig and the optimiser's coordinates `[F + K]`.
 
@@ -183,16 +152,16 @@ class Coordinates:
         self.start = np.append(start[:count], np.zeros(len(widths)))
         self._held_mu_c = held_mu_c
         self._limits = np.asarray(limits, dtype=float)
-        self._mu_s = self.names.index("mu_s") if "mu_s" in self.names else None
-        self._mu_c = self.names.index("mu_c") if "mu_c" in self.names else None
+        places = {name: i for i, name in enumerate(names)}
+        self._mu_s = places.get("mu_s")
+        self._mu_c = places.get("mu_c")
         self.logarithmic = np.zeros(len(self.start), dtype=bool)
-        self.logarithmic[:count] = [
-            ALL[name].logarithmic and name != "mu_s" for name in self.names
-        ]
+        self.logarithmic[:count] = [ALL[name].logarithmic for name in names]
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
-        if self._mu_s is not None:
-            self.scale[self._mu_s] = 1.0
         self.scale[self.rig] = widths
+        if self._mu_s is not None:
+            self.logarithmic[self._mu_s] = False
+            self.scale[self._mu_s] = 1.0
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the lower and the upper bounds of the coordinates, `[F + K]` each."""
@@ -223,9 +192,7 @@ class Coordinates:
         linear coordinates of the contact, whose scale is a guess, are left alone.
         """
         width = np.where(self.rig, 1.0, np.where(self.logarithmic, PRIOR, np.inf))
-        for name in ("gamma", "mu_s"):
-            if name in self.names:
-                width[self.names.index(name)] = SHAPE_PRIOR
+        width[: len(self.names)][np.isin(self.names, ("gamma", "mu_s"))] = SHAPE_PRIOR
         return (coordinates - self.of(self.start)) / width, np.diag(1.0 / width)
 
     def values(self, coordinates: np.ndarray) -> np.ndarray:
@@ -246,9 +213,8 @@ class Coordinates:
         if self._mu_s is not None:
             result[self._mu_s, self._mu_s] = self._mu(values)
             if self._mu_c is not None:
-                result[self._mu_s, self._mu_c] = (
-                    1.0 + coordinates[self._mu_s]
-                ) * values[self._mu_c]
+                # mu_c is logarithmic: by its coordinate, mu_s grows by itself
+                result[self._mu_s, self._mu_c] = values[self._mu_s]
         return result
 
     def _mu(self, values: np.ndarray) -> float:

@@ -14,9 +14,9 @@ from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
 from planarfriction._support.pictures import picture
 from planarfriction.formulas import PARAMETERS
-from planarfriction.identify.parameters import ALL, LAW, SHAPE
+from planarfriction.identify.parameters import ALL, LAW, PRIOR, SHAPE
 from planarfriction.identify.sensor_errors import Nuisance
-from planarfriction.identify.uncertainty import draws
+from planarfriction.identify.uncertainty import finite
 from planarfriction.identify.verdicts import ModelScore, Verdict, interval
 from planarfriction.laws import LuGre
 
@@ -106,9 +106,18 @@ class Identification(ByValue):
         generator = np.random.default_rng(validation.count("seed", seed, 0))
         count = validation.count("count", count, at_most=validation.MOST_DRAWS)
         normal = generator.standard_normal((count, len(self.names)))
-        errors = self.standard_errors
-        drawn = draws(self.names, self.values, errors, self.correlations, normal)
-        found = dict(zip(self.names, drawn.T.copy(), strict=True))
+        strengths, axes = np.linalg.eigh(self.correlations)
+        unit = normal @ (axes * np.sqrt(np.maximum(strengths, 0.0))) @ axes.T
+        found = {}
+        for i, (name, value) in enumerate(self.estimates.items()):
+            own = ALL[name]
+            error = self.standard_errors[i]
+            # an unknown error is that of the prior of a factor, and none of a difference
+            if own.logarithmic and value > 0.0:
+                drawn = value * np.exp(np.fmin(error / value, PRIOR) * unit[:, i])
+            else:
+                drawn = value + finite(error) * unit[:, i]
+            found[name] = np.clip(drawn, own.low, own.high)
         result = {name: values for name, values in found.items() if name in NUMBERS}
         if "mu_c" in found or "mu_s" in found:
             mu_s = found.get("mu_s", self.law.mu_s)
@@ -176,8 +185,11 @@ class Identification(ByValue):
             )
             reasons = [each.reason for each in self.verdicts if each.parameter == name]
             if reasons:
-                text = f"{name}: {'; '.join(reasons)}"
-                remarks.append(textwrap.fill(text, WIDTH, subsequent_indent="  "))
+                remarks.append(
+                    textwrap.fill(
+                        f"{name}: {'; '.join(reasons)}", WIDTH, subsequent_indent="  "
+                    )
+                )
         if self.scores:
             samples = f"{self.samples[0]:,} samples, {len(self.names)} parameters"
             chi2 = _digits(self.scores[0].reduced_chi2, 4)

@@ -1,4 +1,4 @@
-"""The search for the best values: starting points, bounded least squares, noise from what is left, finer steps.
+"""Search for the best values: starting points, bounded least squares, noise from the residuals, finer steps.
 
 On curved ridges of the cost linear standard errors are too small: there intervals follow from its profile.
 """
@@ -167,7 +167,7 @@ def _best(
     coordinates: Coordinates,
     points: Arrays,
     noise: np.ndarray,
-    sigma: Arrays,
+    sigma: np.ndarray,
     change: float,
 ) -> Fit:
     """Minimise the sum of squares from coordinates `[F + K]` until the cost changes by less than `change`.
@@ -229,14 +229,9 @@ def condensed(residual: np.ndarray, jacobian: np.ndarray) -> Linear:
 
 
 def guess_starts(
-    problem: LogProblem,
-    given: dict[str, float] | None,
-    *,
-    starts: int,
-    seed: int,
-    noise: np.ndarray,
+    problem: LogProblem, given: dict[str, float] | None, noise: np.ndarray
 ) -> Arrays:
-    """Return `starts` vectors of values `[F]`, the best first.
+    """Return as many vectors of values `[F]` as the options of the problem ask for, the best first.
 
     A whole law as start (`given` is None) leads, scattered copies follow. Otherwise the best points of a grid over
     Stribeck speed and stiffness are taken, with the values `given` by name.
@@ -245,22 +240,32 @@ def guess_starts(
     if given is not None:
         grid = _grid(problem, given)
         ranked = sorted(grid, key=lambda values: misfit(problem, values, noise))
-    random = np.random.default_rng(seed)
-    more = range(starts - len(ranked))
-    scattered = [_scattered(ranked[0], problem.names, random) for _ in more]
-    return ranked[:starts] + scattered
+    starts = problem.options.starts
+    random = np.random.default_rng(problem.options.seed)
+    more = max(starts - len(ranked), 0), len(problem.names)
+    positive = [
+        ALL[name].logarithmic or name.startswith("sigma") for name in problem.names
+    ]
+    factors = np.exp(SCATTER * random.standard_normal(more) * positive)
+    return [*ranked[:starts], *(ranked[0] * factors)]
 
 
 def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
     """Return the values at all points of the grid; a parameter that is not estimated or is given has one value."""
     base = problem.start_values()
     law = problem.law
-    speeds = [each[0] for each in problem.sliding(base)]
-    mu_c, mu_s = _friction(problem, speeds)
+    speeds = problem.sliding(base)[0]
+    # friction of fast sliding, and the largest
+    coefficient = problem.coefficients(base)
+    usable = np.isfinite(coefficient)
+    coefficient = coefficient[usable]
+    fast = speeds[usable] >= np.quantile(speeds[usable], 0.7)
+    mu_c = np.clip(np.median(coefficient[fast]), 0.01, 10.0)
+    mu_s = np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c)
     wanted = [name for name in problem.names if name not in given]
     interval = min(log.interval for log in problem.logs)
     grid = itertools.product(
-        _speeds(np.concatenate(speeds)) if "v_s" in wanted else [law.v_s],
+        _speeds(speeds) if "v_s" in wanted else [law.v_s],
         _stiffnesses(problem, speeds, mu_c) if "sigma_0" in wanted else [law.sigma_0],
     )
     results = []
@@ -272,22 +277,11 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> Arrays:
             "gamma": 1.5,
             "sigma_0": sigma_0,
             "sigma_1": 0.3 * sigma_0 * interval,
-            "sigma_2": 0.02 * mu_c / max(np.max(speeds[0]), 1e-9),
+            "sigma_2": 0.02 * mu_c / max(problem.split_logs(speeds)[0].max(), 1e-9),
         }
         picked = {name: guess[name] for name in wanted if name in guess}
         results.append(np.array([*(problem.by_name(base) | picked).values()]))
     return results
-
-
-def _friction(problem: LogProblem, speeds: Arrays) -> tuple[float, float]:
-    """Estimate the friction coefficients of fast sliding and of the largest friction."""
-    coefficient = np.concatenate(problem.coefficients(problem.start_values()))
-    usable = np.isfinite(coefficient)
-    coefficient = coefficient[usable]
-    speed = np.concatenate(speeds)[usable]
-    fast = coefficient[speed >= np.quantile(speed, 0.7)]
-    mu_c = np.clip(np.median(fast), 0.01, 10.0)
-    return mu_c, np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c)
 
 
 def _speeds(speeds: np.ndarray) -> np.ndarray:
@@ -299,11 +293,9 @@ def _speeds(speeds: np.ndarray) -> np.ndarray:
     return np.geomspace(max(low, 1e-3 * high), high, SPEEDS)
 
 
-def _stiffnesses(problem: LogProblem, speeds: Arrays, mu_c: float) -> np.ndarray:
+def _stiffnesses(problem: LogProblem, speeds: np.ndarray, mu_c: float) -> np.ndarray:
     """Return stiffnesses to try [1/m]: full deflection after a tenth of a usual step up to a tenth of all travel."""
-    steps = np.concatenate(
-        [s * log.durations for s, log in zip(speeds, problem.logs, strict=True)]
-    )
+    steps = speeds * np.concatenate([log.durations for log in problem.logs])
     moving = steps[steps > 0.0]
     if not len(moving):
         return np.array([LuGre.sigma_0])
@@ -317,29 +309,20 @@ def misfit(problem: LogProblem, values: np.ndarray, noise: np.ndarray) -> float:
     return (problem.residual(values, problem.even_sigma(noise)) ** 2).sum()
 
 
-def _scattered(
-    values: np.ndarray, names: Sequence[str], random: np.random.Generator
-) -> np.ndarray:
-    factor = np.exp(SCATTER * random.standard_normal(len(values)))
-    positive = [ALL[name].logarithmic or name.startswith("sigma") for name in names]
-    return np.where(positive, values * factor, values)
-
-
 REACH = 2.0
-"""Standard errors at which the cost is looked at."""
+"""Distance from an estimate, in standard errors, at which its profile of the cost is computed."""
 
 NEAR = 0.8
-"""Share of the rise that the cost should have there from which on no further value is
-tried."""
+"""Rise of the cost at `REACH` standard errors, over that of a parabola, from which on no further value is tried."""
 
 TRIES = 3
-"""Most values that are tried on a side."""
+"""Largest number of held values that are tried on one side of an estimate."""
 
 SURE = 0.02
 """Standard error, as a share of the estimate, below which a ridge looks straight."""
 
 STIFF = 1e4
-"""Weight of a value that is held, over its share off."""
+"""Weight of the relative deviation from the value at which a parameter is held."""
 
 SETTLED = 0.02
 """Change of the cost at which a search with a held value ends."""

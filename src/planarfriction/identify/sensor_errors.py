@@ -20,9 +20,10 @@ GROUPS = ("delay", "bias", "load", "twist")
 """Groups of disturbances: delay, zeros of the channels, scale and drift of the load cell, noise of the twist."""
 
 CHANNELS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
+"""Names and units of the channels of a wrench."""
 
 FACTOR = 3
-"""Place of the factor on all channels, behind them."""
+"""Place of the factor on all channels among the effects of a disturbance, after those on fx, fy and tau."""
 
 DELAY = 0.01
 """Standard deviation of the delay a priori [s]."""
@@ -49,7 +50,8 @@ DRIFT = (0.05, 0.02, 0.02)
 change over the log."""
 
 EDGE = 1.5
-"""Half the range of a load cell's drift over the standard deviation of its scale: it is unknown when it was right."""
+"""Half the range of a load cell's drift over the standard deviation of its scale, as the time at which the cell was
+right is unknown."""
 
 ORDER = 3
 """Order of the differences that give the noise: motions at a tenth of the sampling rate
@@ -72,6 +74,7 @@ CLIPPED = 5
 """Rounds of leaving differences out."""
 
 TINY = np.finfo(float).tiny
+"""Least size of a divisor that may vanish."""
 
 LEAST_NOISE = 1e-3
 """Least noise of a sensor, as a share of the largest force or torque."""
@@ -183,14 +186,13 @@ class Rig:
         ]
         scales = [each.name == "load_scale" for each in self.columns]
         wide = np.hypot(SCALE, 0.5 * max(ranges) / EDGE)
-        return np.where(np.array(scales, dtype=bool), wide, self.widths)
+        return np.where(scales, wide, self.widths)
 
     def strains(self, values: np.ndarray) -> list[tuple[float, str]]:
         """Return the size of each value `[K]` over its width and in words, the largest first."""
-        both = zip(self.columns, values, strict=True)
         words = [
             f"{column.name} {value:.2g} {column.unit}".removesuffix(" -")
-            for column, value in both
+            for column, value in zip(self.columns, values, strict=True)
         ]
         sizes = np.abs(values / self.with_drift(values))
         return sorted(zip(sizes.tolist(), words, strict=True), reverse=True)

@@ -37,8 +37,10 @@ MOST_STEPS = 2_000_000
 """Largest number of steps of one log: only very uneven sample times ask for more."""
 
 LAW_NAMES = PARAMETERS[:8]
+"""Names of the parameters of the law in the vector of a model, which begins with them."""
 
 CENTRE = [PARAMETERS.index("centre_x"), PARAMETERS.index("centre_y")]
+"""Places of the centre of pressure in the vector of a model."""
 
 
 class PublishedSimulator:

@@ -15,8 +15,8 @@ from numpy.polynomial import polynomial
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Checked, checked
 from planarfriction.derivatives.scene_inputs import STATES
-from planarfriction.identify.logs import Linear, increasing, unwrapped
-from planarfriction.identify.options import check_noise
+from planarfriction.identify.logs import Linear, increasing, runs, unwrapped
+from planarfriction.identify.problem import check_noise
 from planarfriction.identify.verdicts import Verdict, caution, few_of
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide
@@ -37,10 +37,10 @@ NOISE = 6.0
 """Growth of the speed over the sigma of its noise beyond which a body was pushed."""
 
 FREE = 0.2
-"""Deceleration of a body without friction, as a share of the usual one."""
+"""Deceleration below which a body counts as free of friction, as a share of the usual deceleration."""
 
 LONG = 0.25
-"""Duration of a motion without friction, as a share of the whole."""
+"""Duration of a motion without friction, as a share of the slide, beyond which a body lost contact or was pushed."""
 
 MODEST = 2.5
 """Error of a slide over that of the median slide from which it counts less."""
@@ -75,11 +75,10 @@ class Slide(ByValue):
         time = increasing(self.time, f"time of {self.name}", 5)
         pose = validation.array("pose", self.pose, (len(time), 3))
         pose[:, 2], turns = unwrapped(time, pose[:, 2], f"theta of {self.name}")
-        twist = (
-            parabola(time, pose)
-            if self.twist is None
-            else validation.vector("twist", self.twist, 3)
-        )
+        # the slope of a parabola through the first poses
+        twist = polynomial.polyfit(time[:WINDOW] - time[0], pose[:WINDOW], 2)[1]
+        if self.twist is not None:
+            twist = validation.vector("twist", self.twist, 3)
         self._set(time=time - time[0], pose=pose, twist=twist, turns=turns)
         for value in (self.time, self.pose, twist):
             value.setflags(write=False)
@@ -106,12 +105,6 @@ class MassProperties(Checked):
     """Moment of inertia about the vertical through the centre of mass [kg m^2]."""
     gravity: float = checked(validation.positive, default=9.81)
     """Acceleration of gravity [m/s^2]."""
-
-
-def parabola(time: np.ndarray, pose: np.ndarray, samples: int = 8) -> np.ndarray:
-    """Estimate the velocity `[3]` at the first sample: the slope of a parabola through the first poses."""
-    count = min(samples, len(time))
-    return polynomial.polyfit(time[:count] - time[0], pose[:count], 2)[1]
 
 
 def slide_poses(
@@ -265,14 +258,17 @@ def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, s
     found = {}
     for i, (time, speed, noise) in enumerate(seen):
         grown = speed - np.minimum.accumulate(speed)
-        last = int(grown.argmax())
+        last = grown.argmax()
         if grown[last] > max(GROWS * speed.max(), NOISE * noise):
             first = speed[: last + 1].min()
             found[i] = (
                 f"its speed grows from {first:.2g} to {speed[last]:.2g} m/s: it was pushed"
             )
             continue
-        free = _free(time, speed, FREE * usual)
+        moves = np.minimum(speed[:-1], speed[1:]) > 0.25 * speed.max()
+        slow = -np.diff(speed) < FREE * usual * np.diff(time)
+        # the longest time over which the moving body hardly decelerates
+        free = np.ptp(time[runs(moves & slow)], axis=1).max(initial=0.0)
         most = max(LONG * np.ptp(time), 1.5 * np.diff(time[:2]).sum())
         if len(slides) > 2 and free > most:
             found[i] = (
@@ -283,21 +279,8 @@ def contradictions(slides: Sequence[Slide], body: MassProperties) -> dict[int, s
 
 def _brake(time: np.ndarray, speed: np.ndarray) -> float:
     """Compute the mean deceleration until the speed is a tenth of the first [m/s^2]."""
-    slow = np.flatnonzero(speed < 0.1 * speed[0])
-    last = slow[0] if len(slow) else len(speed) - 1
+    last = np.append(np.flatnonzero(speed < 0.1 * speed[0]), len(speed) - 1)[0]
     return (speed[0] - speed[last]) / (time[last] - time[0]) if last > 0 else 0.0
-
-
-def _free(time: np.ndarray, speed: np.ndarray, least: float) -> float:
-    """Compute the longest time over which a moving body decelerates by less than `least` [m/s^2]."""
-    longest = since = 0.0
-    for k, step in enumerate(np.diff(time)):
-        before, after = speed[k : k + 2]
-        moves = min(before, after) > 0.25 * speed.max()
-        free = moves and before - after < least * step
-        since = since + step if free else 0.0
-        longest = max(longest, since)
-    return longest
 
 
 def weights(errors: np.ndarray) -> np.ndarray:

@@ -8,13 +8,11 @@ for each, one Gauss-Newton step of it together with all that was fitted, from wh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.identify.logs import Arrays
-from planarfriction.identify.parameters import ALL, LAW, PRIOR, Coordinates, fitted_law
+from planarfriction.identify.parameters import ALL, LAW, Coordinates, fitted_law
 from planarfriction.identify.sensor_errors import TINY
 
 EXCESS = 1.25
@@ -70,8 +68,8 @@ class Fit(NamedTuple):
     """Mask of the coordinates that lie on a bound, `[F + K]`."""
     noise: np.ndarray
     """Noise of each channel, `[3]`, or of the channels of each slide, `[S, 3]`."""
-    sigma: Arrays
-    """Standard deviation of each residual, `[T, 3]` of each log or slide."""
+    sigma: np.ndarray
+    """Standard deviation of each residual, `[T, 3]` of all logs or slides one after the other."""
     starts: tuple[int, int]
     """Number of starting points that led to this minimum, and number of all."""
     cost: float
@@ -130,13 +128,20 @@ def uncertainty(fit: Fit) -> Uncertainty:
     problem = fit.problem
     count = len(problem.names)
     residual, jacobian = problem.linearised(fit.values, fit.sigma)
-    pull = _pull(fit)
+    coordinates = fit.coordinates
+    # the pull of contact and rig to their starts
+    pull = np.linalg.solve(coordinates.slopes(fit.x).T, coordinates.prior(fit.x)[1]).T
+    pull[count:, count:] = np.diag(1.0 / problem.rig.with_drift(fit.values[count:]))
     # A value that rests on zero is as uncertain as its neighbours let it be; other bounds are no estimates.
-    low = fit.coordinates.bounds()[0] == 0.0
-    free = ~fit.at_bound | (low & (fit.values <= 1e-9 + fit.coordinates.scale * 1e-9))
-    reduced_chi2, neighbours = _left(fit, residual)
-    used = zip(problem.logs, problem.used, strict=True)
-    measured = sum(int(log.channels.sum()) * len(log.time[rows]) for log, rows in used)
+    low = coordinates.bounds()[0] == 0.0
+    free = ~fit.at_bound | (low & (fit.values <= 1e-9 + coordinates.scale * 1e-9))
+    measured = problem.channels[problem.used].sum()
+    reduced_chi2 = float(residual @ residual / max(measured, 1))
+    rows = list(problem.by_log(residual[:, None]))
+    now = np.concatenate([each[1:].ravel() for each in rows])
+    before = np.concatenate([each[:-1].ravel() for each in rows])
+    pairs = 0.5 * (now @ now + before @ before)
+    neighbours = float(now @ before / pairs) if pairs > 0.0 else 0.0
     inverse = covariance_of(fit, np.concatenate([jacobian, pull]), free)
     plain = inverse * max(reduced_chi2, 1.0)
     bread = finite(inverse)
@@ -144,7 +149,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
     # no variance over an infinite one: a factor of 1
     factor = np.sqrt(np.maximum(correlated / np.diag(plain), 1.0))
     moved = problem.twist_residuals(fit.values, fit.sigma, DRAWS)
-    shifts = np.zeros((1, len(bread))) if moved is None else moved @ jacobian @ bread
+    shifts = moved @ jacobian @ bread
     whole = plain * np.outer(factor, factor) + shifts.T @ shifts / len(shifts)
     return Uncertainty(
         whole * ALLOWANCE**2,
@@ -171,19 +176,9 @@ def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, ...]:
     if not np.isfinite(bread).all():
         return bread, np.zeros_like(votes), jacobian
     moved = votes @ bread
-    if sum(bool(np.isfinite(each).all()) for each in fit.sigma) < 2:
+    if np.isfinite(fit.noise).all(axis=-1).sum() < 2:
         return bread, moved, jacobian
     return moved.T @ moved * len(votes) / (len(votes) - 1), moved, jacobian
-
-
-def _pull(fit: Fit) -> np.ndarray:
-    """Compute the derivatives `[F + K, F + K]` of the pull of contact and rig to their starts."""
-    problem = fit.problem
-    count = len(problem.names)
-    coordinates = fit.coordinates
-    result = np.linalg.solve(coordinates.slopes(fit.x).T, coordinates.prior(fit.x)[1]).T
-    result[count:, count:] = np.diag(1.0 / problem.rig.with_drift(fit.values[count:]))
-    return result
 
 
 def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
@@ -193,20 +188,6 @@ def covariance_of(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
     result = slopes @ inner @ slopes.T
     unknown = np.diag(np.diag(result) >= 1e-50 * HUGE)
     return np.where(unknown, np.inf, result)
-
-
-def _left(fit: Fit, residual: np.ndarray) -> tuple[float, float]:
-    """Compute the mean square of the scaled residuals, and their correlation one sample apart."""
-    both = zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True)
-    rows = [each[:, log.channels, 0] for each, log in both]
-    every = np.concatenate([each.ravel() for each in rows])
-    now = np.concatenate([each[1:].ravel() for each in rows])
-    before = np.concatenate([each[:-1].ravel() for each in rows])
-    pairs = 0.5 * (now @ now + before @ before)
-    return (
-        float(every @ every / max(len(every), 1)),
-        float(now @ before / pairs) if pairs > 0.0 else 0.0,
-    )
 
 
 def _over_time(
@@ -238,15 +219,11 @@ def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarra
     Noise leaves residuals `r` of covariance `I - H` in a fold of M, and `e = (I - H)^-1 r` if it is held out, so that
     `r' e/M` is 1 in the mean: also if little but this fold shows a parameter, and `e` is large.
     """
-    folds = []
-    channels = []
-    both = zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True)
-    for rows, log in both:
-        place = np.arange(len(rows)) * BLOCKS // len(rows) % FOLDS
-        folds.append(np.repeat(place, 3))
-        channels.append(np.tile(log.channels, len(rows)))
-    fold = np.concatenate(folds)
-    seen = np.concatenate(channels)
+    problem = fit.problem
+    counts = [len(each) for each in problem.by_log(residual[:, None])]
+    places = [np.arange(count) * BLOCKS // count % FOLDS for count in counts]
+    fold = np.repeat(np.concatenate(places), 3)
+    seen = problem.channels[problem.used].ravel()
     rows, size = _of_unit_columns(np.concatenate([jacobian, pull]))
     slopes = rows[: len(jacobian)]
     whole = rows.T @ rows + RIDGE * np.eye(len(size))
@@ -293,32 +270,6 @@ def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
         strengths = np.maximum(strengths, 1e-12 * strengths[0])
         inner = (axes.T / strengths**2) @ axes
         result[np.ix_(seen, seen)] = inner / np.outer(size[seen], size[seen])
-    return result
-
-
-def draws(
-    names: Sequence[str],
-    values: np.ndarray,
-    errors: np.ndarray,
-    correlations: np.ndarray,
-    normal: np.ndarray,
-) -> np.ndarray:
-    """Return values `[n, F]` of parameters with these errors and correlations, from `normal` numbers `[n, F]`.
-
-    As in intervals, errors of values > 0 are factors: at most that of the prior (`parameters.PRIOR`). Others stay
-    within the bounds of a fit, and where no error is known at the estimate.
-    """
-    strengths, axes = np.linalg.eigh(correlations)
-    unit = normal @ (axes * np.sqrt(np.maximum(strengths, 0.0))) @ axes.T
-    result = np.empty_like(unit)
-    for i, (name, value, error) in enumerate(zip(names, values, errors, strict=True)):
-        own = ALL[name]
-        if own.logarithmic and value > 0.0:
-            # fmin: an error that is not known is the prior's
-            drawn = value * np.exp(np.fmin(error / value, PRIOR) * unit[:, i])
-        else:
-            drawn = value + finite(error) * unit[:, i]
-        result[:, i] = np.clip(drawn, own.low, own.high)
     return result
 
 
@@ -374,7 +325,7 @@ def pulls_of_held(fit: Fit, u: Uncertainty) -> list[Pull]:
     if not held:
         return []
     law = fitted_law(problem.law, problem.by_name(fit.values))
-    values = [float(getattr(law, name)) for name in held]
+    values = [getattr(law, name) for name in held]
     residual, slopes = problem.slopes_of(held, np.array(values), fit.values, fit.sigma)
     # values of the rig that lie on a bound count all the same
     free = ~fit.at_bound | (np.arange(len(fit.values)) >= count)

@@ -14,7 +14,7 @@ import numpy as np
 
 from planarfriction._support.described import described
 from planarfriction.identify.decimation import samples_of
-from planarfriction.identify.logs import TWO_LOADS, Arrays, Log
+from planarfriction.identify.logs import TWO_LOADS, Log
 from planarfriction.identify.parameters import ALL, SOFT_FINGER, bristles_of
 from planarfriction.identify.problem import SPOILED
 from planarfriction.identify.sensor_errors import CHANNELS
@@ -171,8 +171,8 @@ class Candidate(NamedTuple):
             problem.by_name(self.fit.values),
         )
 
-    def cost(self, sigma: Arrays) -> float:
-        """Compute half the sum of the squared residuals over `sigma` `[T, 3]` of each log, and of the pulls."""
+    def cost(self, sigma: np.ndarray) -> float:
+        """Compute half the sum of the squared residuals over `sigma` `[T, 3]`, and of the pulls."""
         fit = self.fit
         pull = fit.coordinates.prior(fit.x)[0]
         return 0.5 * (
@@ -277,32 +277,27 @@ def judge(
     for i, name in enumerate(evidence.names):
         verdict = judge_parameter(evidence, i)
         if verdict is None or verdict.identifiable:
-            reason = _depends(evidence, i, held, others)
+            error = evidence.errors[i]
+            low, high = interval(name, evidence.values[i], error)
+            reasons = [
+                f"it changes by {each.moves[i]:+.2g} if {each.name} is not held"
+                for each in held
+                if not each.agrees and abs(each.moves[i]) > MOVED * error
+            ]
+            reasons += [
+                f"depends on the model: {each}, which also fits, gives {each.estimates[name]:.3g}"
+                for each in others
+                if not low <= each.estimates[name] <= high
+            ]
             if u.rejected:
-                reason = f"{chosen.model} does not explain the data, so this value has no meaning"
-            if reason:
-                verdict = Verdict(name, False, reason)
+                reasons = [
+                    f"{chosen.model} does not explain the data, so this value has no meaning"
+                ]
+            if reasons:
+                verdict = Verdict(name, False, reasons[0])
         if verdict is not None:
             verdicts.append(verdict)
     return tuple(verdicts)
-
-
-def _depends(
-    evidence: Evidence, i: int, held: Sequence[Pull], others: Sequence[ModelScore]
-) -> str:
-    """Return the value that was held, or the other model that fits, on which an estimate depends, or nothing."""
-    error = evidence.errors[i]
-    for each in held:
-        if not each.agrees and abs(each.moves[i]) > MOVED * error:
-            return f"it changes by {each.moves[i]:+.2g} if {each.name} is not held"
-    name = evidence.names[i]
-    low, high = interval(name, evidence.values[i], error)
-    for other in others:
-        if not low <= (estimate := other.estimates[name]) <= high:
-            return (
-                f"depends on the model: {other}, which also fits, gives {estimate:.3g}"
-            )
-    return ""
 
 
 def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
@@ -379,7 +374,12 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
             )
     rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
     if evidence.at_bound[i] and not rests_on_zero:
-        return doubt(_on_bound(evidence, i))
+        mu_c = evidence.value("mu_c", evidence.held_mu_c)
+        if name == "mu_s" and value <= SAME * mu_c:
+            return doubt(
+                f"{evidence.gap or 'no friction above mu_c was seen'}: equal to mu_c"
+            )
+        return doubt(f"the fit ran into the bound {value:.3g} {kind.unit}")
     if name in ("v_s", "gamma") and (reason := _no_stribeck(evidence)):
         return doubt(reason)
     size = abs(value)
@@ -391,8 +391,11 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
             "cannot be distinguished from 0, so the corner frequency of the bristles may be above all samples"
         )
     if kind.low == 0.0 and value < half:
-        text = f"cannot be distinguished from 0, at most {value + half:.3g} {kind.unit}"
-        return Verdict(name, True, text)
+        return Verdict(
+            name,
+            True,
+            f"cannot be distinguished from 0, at most {value + half:.3g} {kind.unit}",
+        )
     other, correlation = _partner(evidence, i)
     if not other:
         return None
@@ -444,20 +447,11 @@ def _no_stribeck(evidence: Evidence) -> str:
     return ""
 
 
-def _on_bound(evidence: Evidence, i: int) -> str:
-    name = evidence.names[i]
-    value = evidence.values[i]
-    mu_c = evidence.value("mu_c", evidence.held_mu_c)
-    if name == "mu_s" and value <= SAME * mu_c:
-        return f"{evidence.gap or 'no friction above mu_c was seen'}: equal to mu_c"
-    return f"the fit ran into the bound {value:.3g} {ALL[name].unit}"
-
-
 def _partner(evidence: Evidence, i: int) -> tuple[str, float]:
     """Return the parameter from which another one cannot be separated, and their correlation; or nothing, and zero."""
     row = evidence.correlations[i].copy()
     row[i] = 0.0
-    j = int(np.argmax(np.abs(row)))
+    j = np.argmax(np.abs(row))
     return (evidence.names[j], row[j]) if abs(row[j]) > TOGETHER else ("", 0.0)
 
 
@@ -469,10 +463,8 @@ def speed_gap(speeds: np.ndarray, around: float) -> str:
     slow, fast = np.quantile(moving, [0.02, 0.98])
     if fast < NARROW * slow:
         return f"no sample below {1e3 * slow:.2g} and above {1e3 * fast:.2g} mm/s"
-    below = moving[moving <= around]
-    above = moving[moving > around]
-    low = below.max() if len(below) else 0.0
-    high = above.min() if len(above) else np.inf
+    low = moving[moving <= around].max(initial=0.0)
+    high = moving[moving > around].min(initial=np.inf)
     if high < GAP * low:
         return ""
     if not np.isfinite(high):

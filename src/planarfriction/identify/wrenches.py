@@ -11,18 +11,16 @@ import numpy as np
 
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.checks import check_logs, size_of, with_findings
-from planarfriction.identify.columns import TWIST
+from planarfriction.identify.checks import check_logs, load_of, size_at, with_findings
 from planarfriction.identify.decimation import decimated, samples_of
 from planarfriction.identify.logs import (
+    TWIST,
     TWO_LOADS,
     Log,
     as_tuple,
     load_ratio,
     mean_load,
-    one_coordinate,
 )
-from planarfriction.identify.options import FitOptions
 from planarfriction.identify.parameters import (
     LAW,
     RADIUS,
@@ -34,7 +32,7 @@ from planarfriction.identify.parameters import (
     fitted_law,
     scaled_patch,
 )
-from planarfriction.identify.problem import SPOILED, LogProblem
+from planarfriction.identify.problem import SPOILED, FitOptions, LogProblem
 from planarfriction.identify.result import Identification
 from planarfriction.identify.search import (
     guess_starts,
@@ -74,12 +72,11 @@ LEAD = next(iter(SIMULATORS))
 """Name of the quickest model, which finds where the others begin."""
 
 WORSE = 2.0
-"""Ratio of the costs of two kinds of bristles above which other models do without the
-worse one."""
+"""Ratio of the costs of two kinds of bristles above which the worse kind is not fitted with other models."""
 
 EXPLAINED = 1.2
-"""Mean square of the residuals over the noise above which they do so only if that kind
-is near the data: the quickest model may be wrong."""
+"""Reduced chi-square of the better kind of bristles above which the worse kind is left out only if its fit is near the
+data: the quickest model may be wrong."""
 
 USUAL_BRISTLES = ElastoPlastic(0.9)
 """Bristles that "auto" compares with plain ones."""
@@ -135,7 +132,11 @@ def identify_lugre(
     """
     logs = as_tuple("log", log, Log)
     names = check_names(parameters)
-    if names == USUAL and one_coordinate(logs):
+    measured, moving = np.any(
+        [(log.channels, log.twist.any(axis=0)) for log in logs], axis=0
+    )
+    # of one coordinate: one wrench channel only, and motion along it only
+    if names == USUAL and measured.sum() == 1 and not (moving & ~measured).any():
         names = tuple(name for name in names if name != "contact_radius")
     check_patch(patch, "identify_lugre")
     models = _models_to_fit(
@@ -146,7 +147,7 @@ def identify_lugre(
     kinds: list[tuple[LuGre, AtLoad | None]] = [(law, None) for law in laws]
     findings = check_logs(logs, patch)
     whole = logs
-    size = size_of(logs[0], patch)
+    size = size_at(load_of(logs[0]), patch)
     logs = decimated(logs, size, options.samples)
     noise = wrench_noise(logs) if options.noise is None else np.array(options.noise)
     if (
@@ -155,7 +156,7 @@ def identify_lugre(
         and models != (LEAD,)
         and load_ratio(logs) >= TWO_LOADS
     ):
-        usual = float(np.median([mean_load(log) for log in logs]))
+        usual = np.median([mean_load(log) for log in logs])
         kinds += [(law, AtLoad(usual)) for law in laws]
     problems: list[LogProblem] = []
     guesses = []
@@ -185,13 +186,7 @@ def identify_lugre(
                 problems.append(problem)
                 if not leads:
                     problem.report("looking for starts")
-                    guesses = guess_starts(
-                        problem,
-                        given,
-                        starts=options.starts,
-                        seed=options.seed,
-                        noise=noise,
-                    )
+                    guesses = guess_starts(problem, given, noise)
                     fit = multistart(problem, guesses, noise)
                     values = problem.by_name(fit.values).items()
                     first = ", ".join(f"{key} {value:.3g}" for key, value in values)
@@ -223,8 +218,9 @@ def _models_to_fit(
     if patch.depends_on_load or any(name in SOFT_FINGER for name in names):
         able = (LEAD,)
     if model not in ("auto", *able):
-        rule = f"be {LEAD!r} if the patch changes with the load"
-        raise InvalidValueError("model", rule, model)
+        raise InvalidValueError(
+            "model", f"be {LEAD!r} if the patch changes with the load", model
+        )
     return able if model == "auto" else (model,)
 
 
@@ -243,8 +239,9 @@ def _start_laws(
     if type(start) is LuGre:
         return [start], None
     if not isinstance(start, Mapping | None):
-        rule = "be a LuGre law or a table of its parameters"
-        raise InvalidValueError("start", rule, start)
+        raise InvalidValueError(
+            "start", "be a LuGre law or a table of its parameters", start
+        )
     given = dict(start or {})
     for name, value in given.items():
         validation.choice("start", name, LAW)
@@ -281,7 +278,35 @@ def _identification(
     if not u.rejected:
         errors[:count] *= stretches(fit, u)
     histories = _histories(best)
-    evidence = _evidence(best, errors[:count], histories)
+    still = fit.values.copy()
+    still[:count][np.isin(problem.names, ("mu_c", "mu_s"))] *= NO_SLIP
+    slips, sticks = (
+        0.5 * (problem.residual(each, fit.sigma) ** 2).sum()
+        for each in (fit.values, still)
+    )
+    speeds, spins = problem.sliding(fit.values)
+    spoiled = (np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()
+    spoiled += np.isinf(fit.sigma[problem.channels]).sum()
+    evidence = Evidence(
+        names=problem.names,
+        values=values,
+        errors=errors[:count],
+        correlations=correlations(u.covariance)[:count, :count],
+        at_bound=fit.at_bound[:count],
+        jacobian=u.jacobian[:, :count],
+        speeds=speeds,
+        spins=spins,
+        held_mu_c=problem.law.numbers.mu_c,
+        loads=np.array([mean_load(log) for log in logs]),
+        load_ratio=load_ratio(logs),
+        measured=problem.channels.any(axis=0),
+        spoiled=spoiled,
+        robust=problem.options.loss != "linear",
+        without_slip=sticks - slips,
+        largest_coefficient=max(
+            np.nanquantile(each["coefficient"], 0.99) for each in histories
+        ),
+    )
     law = fitted_law(problem.law, problem.by_name(values))
     return Identification(
         names=problem.names,
@@ -306,80 +331,27 @@ def _identification(
     )
 
 
-def _evidence(
-    best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[str, Any]]
-) -> Evidence:
-    """Collect the evidence for verdicts on estimates with `errors` `[F]`."""
-    fit = best.fit
-    u = best.uncertainty
-    problem = fit.problem
-    count = len(problem.names)
-    values, _ = problem.split(fit.values)
-    still = fit.values.copy()
-    still[:count][np.isin(problem.names, ("mu_c", "mu_s"))] *= NO_SLIP
-    slips, sticks = (
-        0.5 * (problem.residual(each, fit.sigma) ** 2).sum()
-        for each in (fit.values, still)
-    )
-    speeds, spins = np.concatenate(problem.sliding(values), axis=1)
-    spoiled = (np.abs(problem.distances(fit.values, fit.sigma)) > SPOILED).sum()
-    for sigma, log in zip(fit.sigma, problem.logs, strict=True):
-        spoiled += np.isinf(sigma[:, log.channels]).sum()
-    return Evidence(
-        names=problem.names,
-        values=values,
-        errors=errors,
-        correlations=correlations(u.covariance)[:count, :count],
-        at_bound=fit.at_bound[:count],
-        jacobian=u.jacobian[:, :count],
-        speeds=speeds,
-        spins=spins,
-        held_mu_c=problem.law.numbers.mu_c,
-        loads=np.array([mean_load(log) for log in problem.logs]),
-        load_ratio=load_ratio(problem.logs),
-        measured=np.any([log.channels for log in problem.logs], axis=0),
-        spoiled=int(spoiled),
-        robust=problem.options.loss != "linear",
-        without_slip=sticks - slips,
-        largest_coefficient=max(
-            np.nanquantile(each["coefficient"], 0.99) for each in histories
-        ),
-    )
-
-
 def _histories(best: Candidate) -> list[dict[str, Any]]:
     """Return measured and predicted wrenches of each log, held-out predictions, and sliding speeds."""
     fit = best.fit
     problem = fit.problem
-    values, _ = problem.split(fit.values)
-    each = zip(
-        problem.logs,
-        problem.used,
-        fit.sigma,
-        problem.by_log(best.uncertainty.unseen[:, None]),
-        problem.shown(fit.values),
-        problem.sliding(values),
-        problem.coefficients(values),
-        strict=True,
-    )
-    histories = []
-    for log, used, sigma, rows, shown, (speed, _), coefficient in each:
-        held_out = np.full_like(log.wrench, np.nan)
-        known_noise = np.where(log.channels & np.isfinite(sigma), sigma, np.nan)
-        held_out[used] = log.wrench[used] + rows[:, :, 0] * known_noise[used]
-        histories.append(
-            {
-                "name": log.name,
-                "time": log.time,
-                "measured": np.where(log.channels, log.wrench, np.nan),
-                "predicted": shown,
-                "twist": log.twist,
-                "speed": speed,
-                "held_out": held_out,
-                "coefficient": coefficient,
-            }
-        )
-    return histories
+    known = problem.channels & np.isfinite(fit.sigma)
+    held_out = np.full_like(problem.measured, np.nan)
+    held_out[problem.used] = best.uncertainty.unseen.reshape(-1, 3)
+    held_out = problem.measured + held_out * np.where(known, fit.sigma, np.nan)
+    columns = {
+        "measured": np.where(problem.channels, problem.measured, np.nan),
+        "predicted": problem.shown(fit.values),
+        "speed": problem.sliding(fit.values)[0],
+        "held_out": held_out,
+        "coefficient": problem.coefficients(fit.values),
+    }
+    rows = zip(*map(problem.split_logs, columns.values()), strict=True)
+    return [
+        {"name": log.name, "time": log.time, "twist": log.twist}
+        | dict(zip(columns, row, strict=True))
+        for log, row in zip(problem.logs, rows, strict=True)
+    ]
 
 
 def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:
@@ -387,13 +359,10 @@ def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:
     result = []
     for log, twist in zip(problem.logs, problem.twists, strict=True):
         name = log.name if len(problem.logs) > 1 else ""
-        errors = twist.noise / np.sqrt(0.3 * len(log.time))
-        units = ("m/s", "m/s", "rad/s")
-        for row in zip(TWIST, units, twist.noise, errors, strict=True):
-            channel, unit, noise, error = row
-            result.append(
-                Nuisance(f"noise_{channel}", unit, float(noise), float(error), name)
-            )
+        for k, unit in enumerate(("m/s", "m/s", "rad/s")):
+            noise = float(twist.noise[k])
+            error = noise / np.sqrt(0.3 * len(log.time))
+            result.append(Nuisance(f"noise_{TWIST[k]}", unit, noise, error, name))
     return result if "twist" in problem.rig.groups else []
 
 
@@ -406,12 +375,11 @@ def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
         finger = {name: given[name] for name in problem.fingers}
         pressure = dataclasses.replace(problem.patch.pressure, **finger)
         patch = dataclasses.replace(problem.patch, pressure=pressure)
-        load = problem.reference_load
-        surface = functools.partial(surface, normal_force=load)
+        surface = functools.partial(surface, normal_force=problem.reference_load)
     elif any(name in SHAPE for name in given):
         x, y = patch.centre_of_pressure()
         radius = problem.maps[0].base[RADIUS]
         centre = np.array([given.get("centre_x", x), given.get("centre_y", y)])
         scale = given.get("contact_radius", radius) / radius
-        patch = scaled_patch(patch, float(scale), centre)
+        patch = scaled_patch(patch, scale, centre)
     return problem.kind.model(patch, law, surface, problem.pad)

@@ -12,7 +12,7 @@ from planarfriction.joints.friction import (
     to_mjcf,
 )
 from planarfriction.joints.log import Drive, JointLog, Plant
-from planarfriction.joints.result import JointFit
+from planarfriction.joints.problem import JointFit
 
 __all__ = [
     "Drive",

@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-
-import numpy as np
+from collections.abc import Callable, Sequence
 
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.joints import (
-    balance,
-    goal_fit,
-    problem,
-    torque_fit,
-    torque_verdicts,
-)
-from planarfriction.joints.balance import Refined
+from planarfriction.joints import balance, goal_fit, problem, torque_fit
 from planarfriction.joints.log import JointLog, Plant, as_joint_logs
-from planarfriction.joints.numbers import PARAMETERS
-from planarfriction.joints.result import JointFit, Series, not_shown
-from planarfriction.joints.torque_fit import Data
+from planarfriction.joints.problem import JointFit
 
 Progress = Callable[[str], None]
 """Function that is told each step of a fit in words."""
@@ -64,7 +52,7 @@ def identify_joint(
     auto = isinstance(terms, str) and terms == "auto"
     chosen = () if auto else _chosen(terms, by_torque)
     if by_torque:
-        return _fit_torques(logs, plant, chosen, auto, progress)
+        return torque_fit.fit_torques(logs, plant, chosen, auto, progress)
     if gain is None and not plant.mass and not plant.inertia:
         raise InvalidValueError(
             "plant", "have a mass or an inertia, or torque_gain be given", plant
@@ -89,106 +77,3 @@ def _chosen(terms: Sequence[str] | str, by_torque: bool) -> tuple[str, ...]:
         if term in chosen and other not in chosen:
             raise InvalidValueError("terms", f"have {other} with {term}", chosen)
     return tuple(each for each in known if each in chosen)
-
-
-def _fit_torques(
-    logs: tuple[JointLog, ...],
-    plant: Plant,
-    chosen: tuple[str, ...],
-    auto: bool,
-    progress: Progress,
-) -> JointFit:
-    data = torque_fit.prepare(logs)
-    ranked, baseline = torque_fit.choose(data, chosen, auto, progress)
-    fit = torque_fit.finish(data, ranked, chosen, auto, progress)
-    values, spread = numbers_of(fit)
-    rest = torque_verdicts.rest_of(data, fit)
-    scores = {each.terms: each.score for each in ranked}
-    without = {
-        term: tuple(each for each in fit.terms if each != term) for term in fit.terms
-    }
-    gains = {
-        term: scores[terms] / fit.score
-        for term, terms in without.items()
-        if terms in scores
-    }
-    unclear = (
-        {}
-        if auto
-        else {
-            term: why
-            for term in fit.terms
-            if (why := torque_fit.doubt(data, fit, term))
-        }
-    )
-    series = _series(data, fit, baseline)
-    errors = [np.abs(each.fitted - each.measured).mean() for each in series]
-    less = [np.abs(each.baseline - each.measured).mean() for each in series]
-    names = tuple(each.name for each in series)
-    found = JointFit(
-        logs, _settled(plant, values), None, fit.terms, values, spread, fit.freedom,
-        names, np.array(errors), np.array(less), series, unclear, (),
-    )  # fmt: skip
-    torque_verdicts.refuse(data, fit, rest, found.intervals)
-    return replace(
-        found,
-        verdicts=(
-            *torque_verdicts.judge(data, found, rest, plant, gains),
-            *not_shown(unclear),
-        ),
-    )
-
-
-def numbers_of(fit: Refined) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the numbers of a fit to torques and their standard errors, by name.
-
-    Gravity is given by its size and the angle at which it vanishes.
-    """
-    values = dict(fit.values)
-    factors = {
-        name: values[name] if PARAMETERS[name].logarithmic else 1.0 for name in values
-    }
-    spread = {name: error * factors[name] for name, error in fit.spread.items()}
-    if "gravity" in fit.terms:
-        sine, cosine = (values.pop(name) for name in balance.TERMS["gravity"])
-        values["gravity"] = float(np.hypot(sine, cosine))
-        values["offset"] = float(np.arctan2(-cosine, sine))
-        spread["gravity"] = float(
-            np.hypot(*(spread.pop(name) for name in balance.TERMS["gravity"]))
-        )
-        spread["offset"] = spread["gravity"] / max(values["gravity"], 1e-300)
-    return values, spread
-
-
-def _settled(plant: Plant, values: Mapping[str, float]) -> Plant:
-    """Return the plant with what a fit to torques estimated: its inertia, less that of a known pendulum, and offset."""
-    inertia = (
-        max(values["inertia"] - plant.pendulum_inertia, 0.0)
-        if plant.inertia is None
-        else plant.inertia
-    )
-    # without a mass, the offset is 0 already
-    offset = values.get("offset", 0.0) if plant.offset is None else plant.offset
-    return replace(
-        plant, inertia=inertia, arm_mass=plant.arm_mass or 0.0, offset=offset
-    )
-
-
-def _series(data: Data, fit: Refined, baseline: Refined) -> tuple[Series, ...]:
-    """Return the smoothed torque of each log as measured and modelled."""
-    delay = fit.values.get("delay", 0.0)
-    columns = zip(
-        data.rows,
-        *(balance.predict(data.rows, each.values) for each in (fit, baseline)),
-        strict=True,
-    )
-    return tuple(
-        Series(
-            each.even.log.name,
-            each.time[each.fitted],
-            each.measured(delay),
-            one[each.fitted],
-            other[each.fitted],
-        )
-        for each, one, other in columns
-    )

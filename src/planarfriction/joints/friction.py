@@ -66,8 +66,11 @@ class JointFriction(Checked):
                 self.asymmetry,
             )
         if abs(self.viscous_asymmetry) > self.sigma_2:
-            rule = f"be within sigma_2 = {self.sigma_2:g}, or friction drives"
-            raise InvalidValueError("viscous_asymmetry", rule, self.viscous_asymmetry)
+            raise InvalidValueError(
+                "viscous_asymmetry",
+                f"be within sigma_2 = {self.sigma_2:g}, or friction drives",
+                self.viscous_asymmetry,
+            )
 
     @property
     def law(self) -> LuGre:
@@ -147,8 +150,11 @@ def _representable(friction: JointFriction) -> JointFriction:
         raise InvalidValueError("mu_s", rule, friction.mu_s)
     if friction.asymmetry or friction.viscous_asymmetry:
         found = friction.asymmetry or friction.viscous_asymmetry
-        rule = "be 0: friction in MuJoCo is the same in both directions; apply the difference as a torque of your own"
-        raise InvalidValueError("asymmetry", rule, found)
+        raise InvalidValueError(
+            "asymmetry",
+            "be 0: friction in MuJoCo is the same in both directions; apply the difference as a torque of your own",
+            found,
+        )
     return friction
 
 

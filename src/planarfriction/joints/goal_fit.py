@@ -1,4 +1,4 @@
-"""Friction of a joint from goals or voltages, by simulated runs; terms are chosen by logs that were left out."""
+"""Friction of a joint from goals or voltages, by simulated runs: the choice of terms, and verdicts on the fit."""
 
 from __future__ import annotations
 
@@ -10,10 +10,155 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.verdicts import Verdict
-from planarfriction.joints.goal_verdicts import judge
-from planarfriction.joints.numbers import Values, interval, least, quantile
-from planarfriction.joints.problem import NEEDS, SHORT, TERMS, JointFitProblem
-from planarfriction.joints.result import JointFit, Series, not_shown
+from planarfriction.joints.log import JointLog, runs
+from planarfriction.joints.problem import (
+    NEEDS,
+    SHORT,
+    TERMS,
+    JointFit,
+    JointFitProblem,
+    Series,
+    Values,
+    friction_of,
+    interval,
+    least,
+    not_shown,
+    quantile,
+)
+
+LAGS = np.arange(-20, 61) * 1e-3
+"""Delays of a reported speed that are tried [s]."""
+
+LATE = 3e-3
+"""Delay of a reported speed above which it is named [s]."""
+
+FULL = 0.999
+"""Duty that counts as full."""
+
+STANDING = 0.02
+"""Share of the largest speed below which a joint stands."""
+
+LONG = 0.1
+"""Time [s] for which a joint stands."""
+
+WORDS = {
+    "load": (
+        "the level grows with the torque through the gears",
+        "not load-dependent as far as these logs tell",
+    ),
+    "stribeck": (
+        "friction falls with speed from rest on",
+        "no fall of friction with speed was seen",
+    ),
+    "bristles": (
+        "the joint bends before it slips",
+        "give rigid friction, or measure slow reversals",
+    ),
+    "directional": (
+        "torque of the motor and of the load raise the level by different shares",
+        "no difference between motor and load driving was seen",
+    ),
+}
+"""Meaning of a term that was kept, and of one that was not."""
+
+
+def judge(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Verdict]:
+    """Yield the verdicts on a trial that was kept, and on the `pairs` of trials with and without a term."""
+    for term, (trial, without) in pairs.items():
+        gain, scatter, halves = trial.gains(without)
+        ratio, low, high, *both = np.exp(
+            [-gain, -gain - scatter, -gain + scatter, *np.negative(halves)]
+        )
+        numbers = f"errors of left-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
+        numbers += f", {both[0]:.2f} and {both[1]:.2f} if half of the logs are fitted"
+        good = term in kept.terms
+        if term == "load":
+            numbers += f", b = {trial.values['load']:.2g}"
+        yield Verdict(term, good, f"{WORDS[term][0 if good else 1]} ({numbers})")
+    problem = kept.problem
+    values = kept.values
+    gain = values.get("torque_gain", problem.torque_gain or 0.0)
+    if "back_emf" in values:
+        emf = values["back_emf"]
+        kt = emf / gain
+        resistance = emf / gain**2
+        text = f"kt/R = {gain:.3g} N m/V; with the drive off: kt = {kt:.3g} N m/A, R = {resistance:.3g} Ohm"
+        yield Verdict("torque_gain", True, text)
+    else:
+        yield Verdict(
+            "torque_gain",
+            True,
+            f"only kt/R = {gain:.3g} N m/V is known, neither kt nor R",
+        )
+        text = "no log with the drive off: viscous friction and back-EMF cannot be told apart"
+        yield Verdict(
+            "sigma_2", False, f"{text}, {values['sigma_2']:.3g} N m s/rad is both"
+        )
+    if (
+        problem.plant.mass
+        and problem.plant.arm_mass is None
+        and problem.torque_gain is None
+    ):
+        share = 0.5 / problem.plant.mass  # half the mass of an arm counts, in %
+        text = f"an arm without mass is assumed: all torques grow by {share:.2g} % for each 10 g of an arm"
+        yield Verdict("arm_mass", False, text)
+    yield from lags(problem.logs)
+    for i, log in enumerate(problem.logs):
+        mask = standing(log)
+        if not mask.any():
+            continue
+        # a log that stands at full duty must lie within the level of friction that the others show
+        values = kept.folds[i * problem.parts]
+        plant = problem.plant_numbers(values, log)
+        joint = friction_of(values)
+        driven = plant.torque_gain * log.volts[mask]
+        outside = (log.outside - plant.moment * np.sin(log.q - plant.offset))[mask]
+        load = joint.load_motor * driven - joint.load_external * outside
+        over = np.median(np.abs(driven + outside) - joint.mu_s - np.abs(load))
+        if over > 0.0:
+            seconds = mask.sum() * np.median(np.diff(log.time))
+            text = f"{log.name}: saturated and standing for {seconds:.2g} s at {np.median(log.q[mask]):.2f} rad"
+            text += f": this log contradicts the others, by which {over:.2g} N m are left over to move it"
+            text += "; look for a current limit, heat or a stop"
+            yield Verdict("fit", False, text)
+
+
+def speed_lag(log: JointLog) -> float:
+    """Estimate by how much the reported speed lags the slope of q [s]."""
+    inner = (
+        slice(len(LAGS), -len(LAGS)) if len(log.time) > 4 * len(LAGS) else slice(None)
+    )
+    misses = [
+        float(
+            np.abs(np.interp(log.time - lag, log.time, log.speed) - log.dq)[
+                inner
+            ].mean()
+        )
+        for lag in LAGS
+    ]
+    return LAGS[np.argmin(misses)]
+
+
+def standing(log: JointLog) -> np.ndarray:
+    """Return the mask of samples that stand at full duty for `LONG`, `[T]`."""
+    if log.goal is None or log.drive is None:
+        return np.zeros(len(log.time), dtype=bool)
+    speed = np.abs(log.speed)
+    full = (np.abs(log.drive.duty(log.goal - log.q)) >= FULL) & (log.on > 0.0)
+    mask = full & (speed < STANDING * speed.max())
+    for first, last in runs(mask):
+        if log.time[last - 1] - log.time[first] < LONG:
+            mask[first:last] = False
+    return mask
+
+
+def lags(logs: Sequence[JointLog]) -> Iterator[Verdict]:
+    """Yield a verdict on a reported speed that lags."""
+    late = [speed_lag(log) for log in logs if log.dq is not None]
+    if late and abs(lag := np.median(late)) > LATE:
+        text = f"the reported speed lags by {1e3 * lag:.0f} ms ({1e3 * min(late):.0f} to {1e3 * max(late):.0f})"
+        yield Verdict("dq", False, f"{text}: the slope of q was used")
+
 
 SPANS = (SHORT, 0.6, np.inf)
 """Times [s] after which a simulated run begins again at the measured motion: short runs have one minimum, the last is
@@ -32,9 +177,6 @@ MOST = 40
 UNRELATED = 0.7
 """Mean error over the mean deviation of the angle from its mean from which on a run has nothing to do with the log:
 beside one log that contradicts them, the runs of the others miss by up to 0.5."""
-
-BEST = 2
-"""Number of starts of a term that are followed to the end."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +219,7 @@ class Trial:
         scatter = (
             quantile(len(falls) - 1, 0.95) * falls.std(ddof=1) / np.sqrt(len(falls))
         )
-        return (
-            float(falls.mean()),
-            float(scatter),
-            [float(each.mean()) for each in halves],
-        )
+        return falls.mean(), scatter, [each.mean() for each in halves]
 
     @property
     def jackknife(self) -> dict[str, float]:
@@ -89,7 +227,7 @@ class Trial:
         # Folds are alike: they differ that much less than samples drawn anew.
         more = np.sqrt(len(self.folds) - 1)
         return {
-            name: float(more * np.std([each[name] for each in self.folds]))
+            name: more * np.std([each[name] for each in self.folds])
             for name in self.values
         }
 
@@ -140,16 +278,9 @@ def with_term(
     """Return a problem with one term more than that of `values`, and its best values from the best of its starts."""
     problem = problem.with_terms([*problem.terms, term])
     starts = [{**values, **guess} for guess in problem.guesses(term, values)]
-    ranked = [
-        starts[0],
-        *sorted(starts[1:], key=lambda each: problem.costs(each, SHORT).mean())[
-            : BEST - 1
-        ],
-    ]
-    return problem, min(
-        (minimise(problem, each) for each in ranked),
-        key=lambda each: problem.costs(each).mean(),
-    )
+    best = min(starts[1:], key=lambda each: problem.costs(each, SHORT).mean())
+    ends = [minimise(problem, each) for each in (starts[0], best)]
+    return problem, min(ends, key=lambda each: problem.costs(each).mean())
 
 
 def attempt(
@@ -191,31 +322,6 @@ VAGUE = 0.5
 """Standard error over the value from which on the number of a term is not known."""
 
 
-def _check_related(
-    problem: JointFitProblem, runs: Sequence[np.ndarray]
-) -> Iterator[Verdict]:
-    """Yield a verdict on a log that the run from its goal does not resemble, though others do.
-
-    Raises InvalidValueError for several such logs, or one alone.
-    """
-    missed = {}
-    for run, log in zip(runs, problem.logs, strict=True):
-        error = np.abs(run[:, 0] - log.q).mean()
-        swing = np.abs(log.q - log.q.mean()).mean()
-        if error > UNRELATED * swing:
-            missed[log.name] = (
-                f"{error:.2g} rad left of a mean swing of {swing:.2g} rad about its mean"
-            )
-    if len(missed) > 1 or len(missed) == len(problem.logs):
-        rule = "follow from goal or voltage: check units, signs, gains, and that all belong to one joint"
-        raise InvalidValueError(
-            f"q of {', '.join(missed)}", rule, next(iter(missed.values()))
-        )
-    for name, found in missed.items():
-        text = f"{name}: {found}: this log contradicts the others; check its gains and units, or leave it out"
-        yield Verdict("fit", False, text)
-
-
 def fit_goals(
     base: JointFitProblem,
     chosen: Sequence[str],
@@ -228,44 +334,32 @@ def fit_goals(
     """
     kept = first = attempt(base, minimise(base, base.start()), progress)
     pairs: dict[str, tuple[Trial, Trial]] = {}
+    problem = base
+    values = first.values
+    for term in chosen:
+        problem, values = with_term(problem, values, term)
     if chosen:
-        problem = base
-        values = first.values
-        for term in chosen:
-            problem, values = with_term(problem, values, term)
         kept = attempt(problem, values, progress)
     # Again, since bristles may hide a fall of friction.
     for term in (*TERMS, "stribeck") if auto else ():
-        has = kept.problem.terms
-        if (
-            term in has
-            or NEEDS.get(term, term) not in (*has, term)
-            or (term in pairs and "bristles" not in has)
-        ):
+        has = kept.terms
+        lacks = NEEDS.get(term, term) not in (*has, term)
+        if term in has or lacks or (term in pairs and "bristles" not in has):
             continue
         more = attempt(*with_term(kept.problem, kept.values, term), progress)
         pairs[term] = more, kept
         # Motor and load may have different shares.
         if term == "load" and not improves(more, kept):
-            both = attempt(
-                *with_term(more.problem, more.values, "directional"), progress
-            )
+            wider = with_term(more.problem, more.values, "directional")
+            both = attempt(*wider, progress)
             pairs[term] = (both, kept) if improves(both, kept) else pairs[term]
         kept = more if improves(*pairs[term]) else kept
     # What came later may explain what came before.
-    for term in kept.problem.terms[:-1] if auto else ():
-        rest = base.with_terms(
-            [
-                each
-                for each in kept.problem.terms
-                if each != term and NEEDS.get(each) != term
-            ]
-        )
-        less = attempt(
-            rest,
-            minimise(rest, {name: kept.values[name] for name in rest.names}),
-            progress,
-        )
+    for term in kept.terms[:-1] if auto else ():
+        others = [each for each in kept.terms if term not in (each, NEEDS.get(each))]
+        rest = base.with_terms(others)
+        start = {name: kept.values[name] for name in rest.names}
+        less = attempt(rest, minimise(rest, start), progress)
         pairs[term] = kept, less
         kept = kept if improves(kept, less) else less
     return result_of(kept, first, pairs)
@@ -276,21 +370,47 @@ def result_of(
 ) -> JointFit:
     """Return the result of the trial that was kept: its intervals, and verdicts.
 
-    Estimates also move if runs begin again at the measured motion: intervals count that shift.
+    Estimates also move if runs begin again at the measured motion: intervals count that shift. A verdict names a log
+    that the run from its goal does not resemble, though others do.
+
+    Raises InvalidValueError for several such logs, or one alone.
     """
     problem = kept.problem
     values = kept.values
     runs = [
         trial.problem.simulated(trial.values, problem.logs) for trial in (kept, first)
     ]
-    doubts = [*_check_related(problem, runs[0])]
-    shifts = {name: abs(kept.again[name] - value) for name, value in values.items()}
+    missed = {}
+    for run, log in zip(runs[0], problem.logs, strict=True):
+        error = np.abs(run[:, 0] - log.q).mean()
+        swing = np.abs(log.q - log.q.mean()).mean()
+        if error > UNRELATED * swing:
+            missed[log.name] = (
+                f"{error:.2g} rad left of a mean swing of {swing:.2g} rad about its mean"
+            )
+    if len(missed) > 1 or len(missed) == len(problem.logs):
+        raise InvalidValueError(
+            f"q of {', '.join(missed)}",
+            "follow from goal or voltage: check units, signs, gains, and that all belong to one joint",
+            next(iter(missed.values())),
+        )
+    doubts = [
+        Verdict(
+            "fit",
+            False,
+            f"{name}: {found}: this log contradicts the others; check its gains and units, or leave it out",
+        )
+        for name, found in missed.items()
+    ]
     jackknife = kept.jackknife
     series = tuple(
         Series(log.name, log.time, log.q, fitted[:, 0], rest[:, 0])
         for log, fitted, rest in zip(problem.logs, *runs, strict=True)
     )
-    spread = {name: float(np.hypot(jackknife[name], shifts[name])) for name in values}
+    spread = {
+        name: float(np.hypot(jackknife[name], kept.again[name] - value))
+        for name, value in values.items()
+    }
     freedom = len(kept.folds) - 1
     unclear = {}
     for term in kept.terms:

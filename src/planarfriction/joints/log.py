@@ -20,6 +20,7 @@ from planarfriction.identify.logs import (
     LEAST_SAMPLES,
     as_tuple,
     increasing,
+    runs,
     slopes,
     unwrapped,
 )
@@ -28,30 +29,31 @@ GRAVITY = 9.81
 """Standard acceleration of gravity of the fits [m/s^2]."""
 
 ALIASES = {
-    **{
-        "time": "t",
-        "position": "q",
-        "angle": "q",
-        "theta": "q",
-        "tau": "torque",
-        "speed": "dq",
-        "velocity": "dq",
-    },
-    **{"omega": "dq", "tau_external": "external", "effort": "torque"},
-    **{"__time": "t", "time_s": "t", "t_s": "t", "timestamp": "t"},
+    "time": "t",
+    "position": "q",
+    "angle": "q",
+    "theta": "q",
+    "tau": "torque",
+    "speed": "dq",
+    "velocity": "dq",
+    "omega": "dq",
+    "tau_external": "external",
+    "effort": "torque",
+    "__time": "t",
+    "time_s": "t",
+    "t_s": "t",
+    "timestamp": "t",
 }
 """Other names of columns, in small letters."""
 
 COLUMNS = {
-    **{
-        "torque": "Nm",
-        "dq": "rad/s",
-        "enabled": "",
-        "goal": "rad",
-        "duty": "",
-        "voltage": "V",
-        "supply": "V",
-    },
+    "torque": "Nm",
+    "dq": "rad/s",
+    "enabled": "",
+    "goal": "rad",
+    "duty": "",
+    "voltage": "V",
+    "supply": "V",
     "external": "Nm",
 }
 """Columns beside t and q, with their units."""
@@ -195,17 +197,13 @@ class JointLog(ByValue):
         validation.instance("name", self.name, str, "a text")
         validation.count("turns", self.turns, at_least=0)
         time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
-        given = {each: getattr(self, each, None) for each in ("q", *COLUMNS)}
-        columns = {each: value for each, value in given.items() if value is not None}
+        self._set(time=time)
         if np.asarray(self.enabled).dtype == bool:
-            columns["enabled"] = np.asarray(self.enabled, dtype=float)
-        self._set(
-            time=time,
-            **{
-                each: validation.array(each, columns[each], (len(time),))
-                for each in columns
-            },
-        )
+            self._set(enabled=np.asarray(self.enabled, dtype=float))
+        for each in ("q", *COLUMNS):
+            value = getattr(self, each, None)
+            if value is not None:
+                self._set(**{each: validation.array(each, value, (len(time),))})
         q, turns = unwrapped(time, self.q, f"q of {self.name}")
         if turns and self.goal is not None:
             rule = (
@@ -241,11 +239,9 @@ class JointLog(ByValue):
     @cached_property
     def on(self) -> np.ndarray:
         """Share of the drive that is on, 1 or 0, `[T]`."""
-        return (
-            np.ones(len(self.time))
-            if self.enabled is None
-            else (self.enabled > 0.5).astype(float)
-        )
+        if self.enabled is None:
+            return np.ones(len(self.time))
+        return (self.enabled > 0.5).astype(float)
 
     @cached_property
     def outside(self) -> np.ndarray:
@@ -309,6 +305,7 @@ class JointLog(ByValue):
         flags = [headings["enabled"]] if "enabled" in headings else []
         columns = table.numbers([headings[each] for each in names], flags=flags).T
         read: dict[str, Any] = dict(zip(names, columns, strict=True))
+        read["time"] = read.pop("t")
         duty = read.pop("duty", None)
         supply = read.pop("supply", None)
         if duty is not None and supply is not None and "voltage" not in read:
@@ -316,9 +313,7 @@ class JointLog(ByValue):
         if drive is not None and "goal" in read:
             read.pop("voltage", None)
         try:
-            return cls(
-                read.pop("t"), read.pop("q"), **read, drive=drive, name=path.stem
-            )
+            return cls(**read, drive=drive, name=path.stem)
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
 
@@ -331,11 +326,11 @@ def as_joint_logs(
     if len({each.torque is None for each in result}) > 1:
         raise InvalidValueError("logs", "all hold a torque, or none", "some do")
     for log in result:
-        if (step := float(np.median(np.diff(log.time)))) > SLOW:
+        if (step := np.median(np.diff(log.time))) > SLOW:
             raise InvalidValueError(
                 f"time of {log.name}", "be in s", f"steps of {step:.3g}: is it in ms?"
             )
-        if plant.mass and (swing := float(np.ptp(log.q))) > TURNS * 2.0 * np.pi:
+        if plant.mass and (swing := np.ptp(log.q)) > TURNS * 2.0 * np.pi:
             raise InvalidValueError(
                 f"q of {log.name}",
                 "be in rad",
@@ -358,28 +353,21 @@ def _check_sensors(log: JointLog) -> None:
     first, last = _longest_run(log.torque)
     seconds = log.time[last] - log.time[first]
     if seconds > FROZEN and np.ptp(log.q[first : last + 1]) > MOVED * np.ptp(log.q):
-        found = f"{log.torque[first]:.3g} N m for {seconds:.2g} s from t = {log.time[first]:g} s on"
         raise InvalidValueError(
             f"torque of {log.name}",
             "change while the joint moves (a dead sensor?)",
-            found,
+            f"{log.torque[first]:.3g} N m for {seconds:.2g} s from t = {log.time[first]:g} s on",
         )
     first, last = _longest_run(log.q)
     seconds = log.time[last] - log.time[first]
     speed = np.abs(log.speed)
     before = speed[max(first - 5, 0)]
     if first > 5 and seconds > FROZEN and before > SUDDEN * speed.max():
-        found = f"still for {seconds:.2g} s from t = {log.time[first]:g} s on, right after {before:.2g} rad/s"
         raise InvalidValueError(
             f"q of {log.name}",
             "come to rest gradually (a dead sensor, or a stop: cut it out)",
-            found,
+            f"still for {seconds:.2g} s from t = {log.time[first]:g} s on, right after {before:.2g} rad/s",
         )
-
-
-def runs(mask: np.ndarray) -> np.ndarray:
-    """Return the first index of each run of True, and the first behind it, `[N, 2]`."""
-    return np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
 
 
 def _longest_run(values: np.ndarray) -> Sequence[int]:
@@ -401,11 +389,15 @@ def _check_goal(log: JointLog) -> None:
     if not (wide > 0.0 and narrow > 0.0):
         return
     if max(wide / narrow, narrow / wide) > DEGREES:
-        found = f"{wide:.3g} beside {narrow:.3g} of q: is one of them in degrees?"
-        raise InvalidValueError(f"goal of {log.name}", "swing as q does, in rad", found)
-    correlation = float(np.corrcoef(goal, q)[0, 1])
-    if correlation < OPPOSED:
-        found = f"a correlation of {correlation:.2f}: flip the sign of one of them"
         raise InvalidValueError(
-            f"goal of {log.name}", "lead q in its own direction", found
+            f"goal of {log.name}",
+            "swing as q does, in rad",
+            f"{wide:.3g} beside {narrow:.3g} of q: is one of them in degrees?",
+        )
+    correlation = np.corrcoef(goal, q)[0, 1]
+    if correlation < OPPOSED:
+        raise InvalidValueError(
+            f"goal of {log.name}",
+            "lead q in its own direction",
+            f"a correlation of {correlation:.2f}: flip the sign of one of them",
         )

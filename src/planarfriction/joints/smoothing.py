@@ -80,7 +80,7 @@ class EvenLog(NamedTuple):
 def evenly(log: JointLog) -> EvenLog:
     """Interpolate a log to its median sampling time, and measure the noise of its angle."""
     assert log.torque is not None
-    dt = float(np.median(np.diff(log.time)))
+    dt = np.median(np.diff(log.time))
     time = np.arange(log.time[0], log.time[-1] + 0.5 * dt, dt)
     angle, torque, external = (
         np.interp(time, log.time, each) for each in (log.q, log.torque, log.outside)
@@ -102,13 +102,13 @@ def encoder_step(angle: np.ndarray) -> float:
     ratios = changes / changes[single].mean()
     small = ratios[ratios < 30.0]
     off = np.median(np.abs(small - np.round(small)))
-    return float(changes[single].mean()) if len(small) > 5 and off < 0.05 else 0.0
+    return changes[single].mean() if len(small) > 5 and off < 0.05 else 0.0
 
 
 def white_noise(signal: np.ndarray) -> float:
     """Estimate the standard deviation of the white noise of a signal from its third differences."""
     third = np.diff(signal, 3)
-    return float(np.median(np.abs(third)) * NORMAL / np.sqrt(20.0))
+    return np.median(np.abs(third)) * NORMAL / np.sqrt(20.0)
 
 
 def derivatives(
@@ -158,7 +158,7 @@ def kernel_width(logs: Sequence[EvenLog]) -> float:
         if quiet and smoothed_noise(power, width, 2) < ATTENUATED * bent:
             break
         width *= 1.2
-    return float(width)
+    return width
 
 
 def smoothed_noise(power: float, width: float, order: int) -> float:

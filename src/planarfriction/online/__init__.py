@@ -1,8 +1,12 @@
 """Friction while a gripper holds: an observer of its sensors, and controllers of its force."""
 
 from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy
-from planarfriction.online.observer import Estimate, FrictionObserver
-from planarfriction.online.sensors import Measurement, Sensors
+from planarfriction.online.observer import (
+    Estimate,
+    FrictionObserver,
+    Measurement,
+    Sensors,
+)
 
 __all__ = [
     "Estimate",

@@ -10,8 +10,13 @@ import numpy as np
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.online.loops import grips
-from planarfriction.online.observer import Estimate, FrictionObserver, estimate_of
-from planarfriction.online.sensors import GRAVITY, Measurement
+from planarfriction.online.observer import (
+    GRAVITY,
+    Estimate,
+    FrictionObserver,
+    Measurement,
+    estimate_of,
+)
 
 _LEAST_MU = 3.0902
 """Standard deviations by which mu_c is assumed to be smaller where it cannot be found: one part in a thousand slips."""
@@ -45,9 +50,7 @@ class GripController:
         self.observer = validation.instance(
             "observer", observer, FrictionObserver, "a FrictionObserver"
         )
-        self.state = np.full(
-            observer.state.shape[:-1], np.array(grips.FRESH, grips.STATE)
-        )
+        self.state = np.full(observer.state.shape, grips.FRESH)
         if grip is not grips.hold and not observer.sensors.slip_rate:
             raise InvalidValueError(
                 "observer", "have a slip sensor to let parts slip", observer.sensors
@@ -124,15 +127,12 @@ class Hold(GripController):
         if not 0.0 < validation.number("probability", probability) < 0.5:
             raise InvalidValueError("probability", "be between 0 and 0.5", probability)
         explore = validation.non_negative("explore", explore)
-        numbers = (
-            validation.positive("reserve", reserve),
-            validation.non_negative("gain", gain),
-        )
         super().__init__(
             observer,
             grips.hold,
             -float(ndtri(probability)),
-            *numbers,
+            validation.positive("reserve", reserve),
+            validation.non_negative("gain", gain),
             explore,
             start=start,
             most=most,
@@ -155,6 +155,10 @@ class Slip(GripController):
     """Component of the slip."""
     tolerance: float
     """Distance from the goal that is good enough [m or rad]."""
+    acceleration: float
+    """Usual acceleration of the part without friction [m/s^2 or rad/s^2]."""
+    adapt: float
+    """Usual gain k_i of the grip that balances the load [1/m or 1/rad]."""
 
     def __init__(
         self,
@@ -162,23 +166,24 @@ class Slip(GripController):
         goal: Any,
         *,
         duration: float = 2.0,
-        acceleration: float,
-        adapt: float,
+        acceleration: float | None = None,
+        adapt: float | None = None,
         delay: float = 0.02,
         start: float = START,
         most: float = 60.0,
     ) -> None:
         positive = validation.positive
         least = validation.non_negative
-        times = positive("duration", duration), positive("acceleration", acceleration)
-        gains = least("adapt", adapt), least("delay", delay)
+        acceleration = self.acceleration if acceleration is None else acceleration
         super().__init__(
             observer,
             grips.slip,
             self.axis,
             self.tolerance,
-            *times,
-            *gains,
+            positive("duration", duration),
+            positive("acceleration", acceleration),
+            least("adapt", self.adapt if adapt is None else adapt),
+            least("delay", delay),
             start=start,
             most=most,
         )
@@ -192,38 +197,20 @@ class SlideBy(Slip):
 
     axis = 1
     tolerance = 0.9e-3
-
-    def __init__(
-        self,
-        observer: FrictionObserver,
-        goal: Any,
-        *,
-        duration: float = 2.0,
-        **options: Any,
-    ) -> None:
-        options = {"acceleration": GRAVITY, "adapt": 20.0} | options
-        super().__init__(observer, goal, duration=duration, **options)
+    acceleration = GRAVITY
+    adapt = 20.0
 
 
 class TurnBy(Slip):
     """Let a part turn by `goal` [rad] under its weight within `duration` [s], and hold it (see `Slip`).
 
-    `acceleration` [rad/s^2] is that of the part without friction.
+    `acceleration` [rad/s^2] is that of the part without friction, 100 by default.
     """
 
     axis = 2
     tolerance = math.radians(1.6)
-
-    def __init__(
-        self,
-        observer: FrictionObserver,
-        goal: Any,
-        *,
-        duration: float = 2.0,
-        **options: Any,
-    ) -> None:
-        options = {"acceleration": 100.0, "adapt": 1.0} | options
-        super().__init__(observer, goal, duration=duration, **options)
+    acceleration = 100.0
+    adapt = 1.0
 
 
 class Hinge(GripController):
@@ -245,8 +232,11 @@ class Hinge(GripController):
         start: float = START,
         most: float = 60.0,
     ) -> None:
-        numbers = (
+        super().__init__(
+            observer,
+            grips.hinge,
             validation.positive("reserve", reserve),
             validation.non_negative("gain", gain),
+            start=start,
+            most=most,
         )
-        super().__init__(observer, grips.hinge, *numbers, start=start, most=most)

@@ -1,20 +1,58 @@
-"""Estimate the friction of a grip while it holds and slips."""
+"""Estimate the friction of a grip while it holds and slips, from the sensors of a gripper."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction._support import validation
-from planarfriction._support.equality import by_parts
+from planarfriction._support.equality import ByValue, by_parts, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import FrictionModel
-from planarfriction.online.loops import filter_state
 from planarfriction.online.loops import friction_filter as kernels
-from planarfriction.online.sensors import Measurement, Sensors
+from planarfriction.online.loops.filter_state import BIAS, MU, STATE
+
+GRAVITY = 9.81
+"""Gravity [m/s^2]."""
+
+
+@by_parts
+class Measurement(NamedTuple):
+    """Sensors at one instant; leading axes are parts."""
+
+    time: Any
+    """Time of the samples [s], `[...]`."""
+    wrench: Any
+    """Friction wrench of one finger on the part, about the grip's centre, axes of the hand `[..., 3]` [N, N, N m]."""
+    normal_force: Any
+    """Grip force [N], `[...]`."""
+    slip_velocity: Any = None
+    """Mean velocity of the part over its finger since the last such sample, `[..., 3]` [m/s, m/s, rad/s]; NaN or None
+    between samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensors(ByValue):
+    """Noise and rates of the sensors of a gripper.
+
+    Raises InvalidValueError for a value out of range.
+    """
+
+    force_noise: float = checked(validation.non_negative, default=0.02)
+    """Standard deviation of the forces, also of the grip force [N]."""
+    torque_noise: float = checked(validation.non_negative, default=2e-4)
+    """Standard deviation of the torque [N m]."""
+    slip_rate: float = checked(validation.non_negative, default=120.0)
+    """Rate of the slip velocity [Hz]; 0 for no such sensor."""
+    quantum: float = checked(validation.positive, default=0.95e-3)
+    """Smallest slip velocity [m/s]: the sensor counts places, so that what a sample leaves out is in the next."""
+    base: float = checked(validation.positive, default=0.01)
+    """Distance of the two counters whose difference is the spin [m]."""
+
 
 PARAMETERS = ("mu_c", "mu_s", "radius")
 """Names of what is estimated beside the twist, in the order of `Estimate.determined` and `covariance`."""
@@ -78,7 +116,7 @@ class Estimate(NamedTuple):
             raise InvalidValueError("probability", "be between 0 and 1", probability)
         mean = np.stack([self.mu_c, self.mu_s, self.radius], axis=-1)
         sd = np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
-        reach = np.exp(float(ndtri(0.5 + 0.5 * probability)) * sd)
+        reach = np.exp(ndtri(0.5 + 0.5 * probability) * sd)
         return np.stack([mean / reach, mean * reach], axis=-1)
 
 
@@ -97,8 +135,9 @@ class FrictionObserver:
     from what was assumed, and a bias that no empty hand has shown, unless `bias` (standard deviations) is at most the
     noise of the sensors. Nothing is determined then.
 
-    `information()` is that of the motion so far. `state` `[..., 190]` is all that changes: a copy of it is a
-    checkpoint. With `batch`, the observer watches so many parts at once; measurements have that leading shape.
+    `information()` is that of the motion so far. `state` `[...]`, records of dtype
+    `planarfriction.online.loops.filter_state.STATE`, is all that changes: a copy of it is a checkpoint. With `batch`,
+    the observer watches so many parts at once; measurements have that leading shape.
 
     Raises InvalidValueError for what is neither a model nor a limit surface, asymmetric friction, and values out of
     range.
@@ -140,28 +179,47 @@ class FrictionObserver:
             raise InvalidValueError(
                 "model", "have symmetric friction", "a patch with an asymmetry"
             )
-        self.sensors: Any = (
-            Sensors()
-            if sensors is None
-            else validation.instance("sensors", sensors, Sensors, "Sensors")
-        )
+        sensors = Sensors() if sensors is None else sensors
+        self.sensors = validation.instance("sensors", sensors, Sensors, "Sensors")
         self.tolerance = validation.positive("tolerance", tolerance)
-        spreads = {
-            "mu_spread": mu_spread,
-            "ratio_spread": ratio_spread,
-            "radius_spread": radius_spread,
-        }
         prior = np.array(
-            [validation.positive(name, value) for name, value in spreads.items()]
+            [
+                validation.positive("mu_spread", mu_spread),
+                validation.positive("ratio_spread", ratio_spread),
+                validation.positive("radius_spread", radius_spread),
+            ]
         )
-        n = kernels.N
         numbers = model.law.numbers
         middle = np.log([numbers.mu_c, numbers.mu_s / numbers.mu_c, 1.0])
-        self._filter = _settings(
-            model,
-            surface,
+        frame = surface._frame()
+        back = np.linalg.inv(frame)
+        growth = 0.0  # d log r/d log f_N of the contact radius
+        if model.depends_on_load:
+            small, large = (model.patch.contact_radius(c * load) for c in (0.5, 2.0))
+            growth = math.log(large / small) / math.log(4.0)
+        quantum = sensors.quantum
+        place = quantum / max(sensors.slip_rate, 1.0)
+        noise = np.abs(back.T) @ (
+            sensors.force_noise,
+            sensors.force_noise,
+            sensors.torque_noise,
+        )
+        self._filter = kernels.Filter(
+            *surface.numbers,
+            _planes(surface),
+            frame,
+            back,
+            -back.T.copy(),
+            surface.contact_radius,
             load,
-            self.sensors,
+            growth,
+            numbers.v_s,
+            numbers.gamma,
+            numbers.sigma_2,
+            np.maximum(noise, _LEAST_NOISE) ** 2,
+            quantum,
+            place,
+            np.abs(frame) @ (place, place, place / sensors.base) / math.sqrt(12.0),
             validation.positive("model_error", model_error),
             validation.non_negative("drift", drift),
             validation.positive("saturation", saturation),
@@ -179,14 +237,14 @@ class FrictionObserver:
                 [self._filter.remainder, fresh, prior, np.maximum(unsure, 1e-9)]
             )
         )
-        self.state = state = np.zeros(validation.batched(batch, (filter_state.STATE,)))
-        state[..., filter_state.MU : filter_state.BIAS] = middle
-        state[..., filter_state.TARED] = (unsure <= np.sqrt(self._filter.noise)).all()
-        state[..., kernels.ROOT : kernels.ROOT + n * n] = root.ravel()
-        state[..., filter_state.SLIP] = 1e-3
-        state[..., filter_state.TIME] = -math.inf
-        state[..., [filter_state.BOUND, filter_state.PEAK]] = -10.0
-        state[..., filter_state.GAUGE] = kernels.NONE
+        self.state = state = np.zeros(validation.batched(batch, ()), STATE)
+        state["x"][..., MU:BIAS] = middle
+        state["root"] = root
+        state["tared"] = (unsure <= np.sqrt(self._filter.noise)).all()
+        state["slip"] = 1e-3
+        state["time"] = -math.inf
+        state["bound"] = state["peak"] = -10.0
+        state["gauge"] = kernels.NONE
 
     def update(self, measurement: Measurement) -> Estimate:
         """Take a sample of every part, with NaN or None for what is missing; return what is known now.
@@ -201,8 +259,7 @@ class FrictionObserver:
         Raises InvalidValueError as `update` does.
         """
         validation.instance("measurement", measurement, Measurement, "a Measurement")
-        batch = self.state.shape[:-1]
-        state = self.state.reshape(-1, filter_state.STATE)
+        batch = self.state.shape
         velocity = measurement.slip_velocity
         samples = np.empty((*batch, 8))
         try:
@@ -213,23 +270,25 @@ class FrictionObserver:
                 "measurement", f"hold numbers of the batch {list(batch)}", measurement
             ) from None
         found = np.empty(batch, kernels.ESTIMATE)
-        kernels.update(self._filter, state, samples.reshape(-1, 8), found.reshape(-1))
+        kernels.update(
+            self._filter,
+            self.state.reshape(-1),
+            samples.reshape(-1, 8),
+            found.reshape(-1),
+        )
         return found
 
     @property
     def bias(self) -> np.ndarray:
         """Estimated bias of the measured wrench, `[..., 3]` [N, N, N m]."""
-        return -self.state[..., filter_state.BIAS : kernels.N] @ self._filter.frame
+        return -self.state["x"][..., BIAS:] @ self._filter.frame
 
     def information(self) -> np.ndarray:
         """Return the information of the samples so far on the logs of mu_c, mu_s/mu_c and the radius, `[..., 3, 3]`.
 
         The inverse covariance less that of the prior; a direction without information is not determined by the motion.
         """
-        n = kernels.N
-        root = self.state[..., kernels.ROOT : kernels.ROOT + n * n].reshape(
-            *self.state.shape[:-1], n, n
-        )[..., filter_state.MU : filter_state.BIAS, :]
+        root = self.state["root"][..., MU:BIAS, :]
         return np.linalg.inv(root @ np.swapaxes(root, -1, -2)) - np.diag(
             1.0 / self._filter.prior_spread**2
         )
@@ -242,46 +301,6 @@ def estimate_of(found: np.ndarray) -> Estimate:
     )
 
 
-def _settings(
-    model: FrictionModel,
-    surface: LimitSurface,
-    load: float,
-    sensors: Sensors,
-    *rest: Any,
-) -> Any:
-    """Return what the filter reads and never changes; `rest` are its last fields."""
-    kind, size, data = surface.numbers
-    frame = surface._frame()
-    numbers = model.law.numbers
-    back = np.linalg.inv(frame)
-    place = sensors.quantum / max(sensors.slip_rate, 1.0)
-    noise = np.abs(back.T) @ (
-        sensors.force_noise,
-        sensors.force_noise,
-        sensors.torque_noise,
-    )
-    return kernels.Filter(
-        kind,
-        size,
-        data,
-        _planes(surface),
-        frame,
-        back,
-        -back.T.copy(),
-        surface.contact_radius,
-        load,
-        _growth(model.patch, load),
-        numbers.v_s,
-        numbers.gamma,
-        numbers.sigma_2,
-        np.maximum(noise, _LEAST_NOISE) ** 2,
-        sensors.quantum,
-        place,
-        np.abs(frame) @ (place, place, place / sensors.base) / math.sqrt(12.0),
-        *rest,
-    )
-
-
 def _planes(surface: LimitSurface) -> np.ndarray:
     """Return directions of half a sphere over their dissipation `[M, 3]`, scaled: planes around the surface."""
     angle = 0.5 * np.pi / _SEGMENTS * np.arange(4 * _SEGMENTS)
@@ -291,11 +310,3 @@ def _planes(surface: LimitSurface) -> np.ndarray:
         [across * np.cos(azimuth), across * np.sin(azimuth), np.cos(polar)], axis=-1
     ).reshape(-1, 3)
     return units / np.einsum("mi,mi->m", surface.direction(units), units)[:, None]
-
-
-def _growth(patch: Any, load: float) -> float:
-    """Return `d log r/d log f_N` of the contact radius at a load [N]."""
-    if not patch.depends_on_load:
-        return 0.0
-    small, large = (float(patch.contact_radius(share * load)) for share in (0.5, 2.0))
-    return math.log(large / small) / math.log(4.0)

@@ -1,12 +1,9 @@
 """Planning of grip forces and pushes that bring an object to a goal."""
 
-from planarfriction.planning.contact_modes import motion_cone
-from planarfriction.planning.grip import GripPlan, plan_grip
+from planarfriction.planning.grip import GripPlan, GripReport, plan_grip
 from planarfriction.planning.holding import dynamic_holding_load, holding_load
-from planarfriction.planning.motions import GripReport
 from planarfriction.planning.push_plans import PushPlan, PushReport, plan_push
-from planarfriction.planning.pushing import Push, push
-from planarfriction.planning.slider import Pusher, Slider
+from planarfriction.planning.pushing import Push, Pusher, Slider, motion_cone, push
 
 __all__ = [
     "GripPlan",

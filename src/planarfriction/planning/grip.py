@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,19 +15,276 @@ from planarfriction._engine.compiler import threads
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
 from planarfriction._support.pictures import picture
+from planarfriction.derivatives import scene_sensitivities
+from planarfriction.derivatives.scene_inputs import STATES
 from planarfriction.errors import InvalidValueError
+from planarfriction.geometry import rotate
 from planarfriction.planning.holding import dynamic_holding_load, holding_load
-from planarfriction.planning.motions import (
-    LOOSE,
-    ROUGH,
-    Aim,
-    GripReport,
-    Grips,
-    grip_position,
-    load_on,
-    report_of,
-)
-from planarfriction.scenes import Scene, Signal
+from planarfriction.scenes import Scene, Signal, SolverOptions, simulate
+from planarfriction.scenes.body import pull_on
+from planarfriction.scenes.contact import with_friction
+from planarfriction.scenes.start import contact_map
+
+TIGHT = 1e-5
+"""Relative tolerance of the motions that are planned with [-]."""
+
+LOOSE = 1e-4
+"""Relative tolerance of derivatives and of motions to start from [-]."""
+
+ANGLE = 3e-4
+"""Unit of the residual of a goal that is an angle: 0.03 % of it, and 0.1 % of a
+slide."""
+
+SHIFT = 3e-3
+"""Unit of the residual of a slide where the goal is an angle, in contact radii."""
+
+SPEED = 1e-3
+"""Unit of the residual of the speed at the end [m/s]."""
+
+TURN = 1e-3
+"""Unit of the residual of a turn where the goal is a slide [rad]."""
+
+ROUGH = 0.08
+"""Weight of the second differences of a profile over the holding load [-]: they decide between equal profiles."""
+
+
+class Aim(NamedTuple):
+    """A goal, and how far ends of motions miss it.
+
+    An end is `[6]`: velocity `(vx, vy, omega)`, slide of the place under the grip (2), angle of the turn, [SI].
+    """
+
+    angle: float | None
+    """Angle to turn by [rad], without slide; None where the goal is a slide."""
+    slide: np.ndarray
+    """Slide to make `[2]` [m], without turning; zeros where the goal is an angle."""
+    radius: float
+    """Contact radius [m]."""
+
+    @property
+    def end(self) -> np.ndarray:
+        """Wanted end `[6]`."""
+        return np.array([0.0, 0.0, 0.0, *self.slide, self.angle or 0.0])
+
+    def progress(self, end: np.ndarray) -> float:
+        """Return the share of the goal that is reached [-]."""
+        return float(end @ self.end / (self.end @ self.end))
+
+    def scales(self) -> np.ndarray:
+        """Units of the speeds (3), the slide (2) and the angle, as `[6]`."""
+        if self.angle is not None:
+            slide = SHIFT * self.radius
+            angle = ANGLE * abs(self.angle)
+        else:
+            slide = 1e-3 * np.hypot(*self.slide)
+            angle = TURN
+        return np.array([SPEED, SPEED, SPEED / self.radius, slide, slide, angle])
+
+    def misses(self, end: np.ndarray) -> np.ndarray:
+        """Return the misses `[6]`, each over what counts as one."""
+        return (end - self.end) / self.scales()
+
+
+class Grips:
+    """The scene under different profiles of one contact's normal force, with the frictions of an ensemble.
+
+    Members differ by a factor on mu_c and mu_s of all contacts. What they share is built once, and they run in threads.
+    """
+
+    def __init__(self, scene: Scene, contact: int, factors: Sequence[float]) -> None:
+        self.scene = scene
+        self.index = contact
+        self.name = f"{scene.contacts[contact].name}.normal_force"
+        for each in scene.contacts:
+            law = each.model.law
+            if not (hasattr(law, "mu_c") or hasattr(law, "mu_s")):
+                raise InvalidValueError(
+                    "law",
+                    "have mu_c and mu_s to plan with uncertain friction",
+                    type(law).__name__,
+                )
+        self._members = {
+            factor: [with_friction(each, factor) for each in scene.contacts]
+            for factor in factors
+        }
+        held = scene.start == "equilibrium"
+        self.first = scene.contacts[contact].normal_force(0.0) if held else None
+        """Normal force that holds the body at first [N]; None where it may be any."""
+        self._simulated: list[int] = []  # of several threads
+        self.jacobians = 0
+
+    @property
+    def simulations(self) -> int:
+        """Number of simulations so far."""
+        return sum(self._simulated)
+
+    def scene_of(self, profile: Signal, factor: float = 1.0) -> Scene:
+        """Return the scene with the profile in place."""
+        contacts = list(self._members[factor])
+        own = contacts[self.index]
+        contacts[self.index] = dataclasses.replace(own, normal_force=profile)
+        return dataclasses.replace(self.scene, contacts=contacts)
+
+    def ends(
+        self, profile: Signal, factors: Sequence[float], rtol: float | None = TIGHT
+    ) -> list[np.ndarray]:
+        """Return the end `[6]` of the motion under each friction."""
+        self._simulated.append(len(factors))
+
+        def one(factor: float) -> np.ndarray:
+            scene = self.scene_of(profile, factor)
+            histories = simulate(scene, rtol=rtol, save_every=scene.t_end).histories
+            last = np.array([histories[name].values[-1] for name in STATES])
+            slide = slide_of(scene, self.index, last[3:])
+            return np.array([*last[:3], *slide, last[5] - scene.body.angle])
+
+        return threads.each(one, factors)
+
+    def slopes(self, profile: Signal, factors: Sequence[float]) -> list[np.ndarray]:
+        """Return the derivatives of the end by the knots `[6, K]` under each friction."""
+        self.jacobians += len(factors)
+
+        def one(factor: float) -> np.ndarray:
+            scene = self.scene_of(profile, factor)
+            knots = {self.name: profile.times}
+            options = SolverOptions(rtol=LOOSE, save_every=scene.t_end)
+            found = scene_sensitivities(scene, (), signals=knots, options=options)
+            slopes = found.d_motion[-1].copy()
+            pose = found.motion[-1, 3:]
+            place = grip_position(scene, self.index) - pose[:2]
+            x, y = slide_of(scene, self.index, pose) + place
+            slopes[3:5] += np.outer([-y, x], slopes[5])
+            return slopes
+
+        return threads.each(one, factors)
+
+
+def grip_position(scene: Scene, contact: int) -> np.ndarray:
+    """Return the initial position of the contact frame's origin in the world `[2]` [m]."""
+    body = scene.body
+    chosen = scene.contacts[contact]
+    if chosen.mounted_on == "world":
+        return np.array(chosen.position)
+    return body.position + rotate(chosen.position, body.angle)
+
+
+def slide_of(scene: Scene, contact: int, pose: np.ndarray) -> np.ndarray:
+    """Return the displacement `[..., 2]` [m] of the place that was under a contact, at poses `[..., 3]`."""
+    grip = grip_position(scene, contact)
+    arm = rotate(grip - scene.body.position, pose[..., 2] - scene.body.angle)
+    return pose[..., :2] + arm - grip
+
+
+def load_on(
+    scene: Scene, contact: int, angle: float, slide: Any, time: float
+) -> np.ndarray:
+    """Return the load of gravity, applied force and springs on one contact `[3]` [N, N, N m] once the body has moved.
+
+    By `angle` [rad] about the grip and by `slide` `[2]` [m]; about the origin of the contact frame, in its axes, of one
+    of the identical contacts.
+    """
+    body = scene.body
+    chosen = scene.contacts[contact]
+    grip = grip_position(scene, contact)
+    at = grip + slide + rotate(body.position - grip, angle)
+    moved = dataclasses.replace(
+        body, position=at, angle=body.angle + angle, velocity=(0.0, 0.0, 0.0)
+    )
+    there = dataclasses.replace(scene, body=moved, start="rest")
+    pull = pull_on(scene, moved, time)
+    return np.linalg.solve(contact_map(there, chosen).T, pull) / chosen.count
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GripReport(ByValue):
+    """Result of a plan with the scene's friction and with F other values, and the time that planning took."""
+
+    goal: dict[str, Any]
+    """The goal as given."""
+    angle: float
+    """Angle by which the body turns [rad]."""
+    slide: np.ndarray
+    """Displacement `[2]` of the point of the body under the grip, world axes [m]."""
+    speed: float
+    """Speed of that point at the end [m/s]."""
+    grip: float
+    """Normal force at the end [N]."""
+    holding: float
+    """Smallest normal force that would hold the body there [N]."""
+    frictions: np.ndarray
+    """Factors on mu_c and mu_s, ascending `[F]`."""
+    angles: np.ndarray
+    """Angle by which the body turns with each friction `[F]` [rad]."""
+    slides: np.ndarray
+    """Slide with each friction `[F, 2]` [m]."""
+    per_percent: float
+    """Change of the goal's quantity per percent of friction: angle [rad] or slide [m]."""
+    simulations: int
+    """Number of simulations."""
+    jacobians: int
+    """Number of Jacobians with respect to all knots."""
+    wall_time: float
+    """Computing time [s]."""
+
+    @property
+    def spread(self) -> float:
+        """Largest error of the goal over all frictions: angle [rad] or slide [m]."""
+        if "angle" in self.goal:
+            return float(np.abs(self.angles - self.goal["angle"]).max())
+        return float(np.hypot(*(self.slides - self.goal["slide"]).T).max())
+
+    def __str__(self) -> str:
+        if "angle" in self.goal:
+            wanted = f"turn by {np.rad2deg(self.goal['angle']):.4g} degrees"
+            per = f"{np.rad2deg(self.per_percent):.2g} degrees"
+        else:
+            x, y = 1e3 * np.array(self.goal["slide"])
+            wanted = f"slide by ({x:.4g}, {y:.4g}) mm"
+            per = f"{1e3 * self.per_percent:.2g} mm"
+        lines = [
+            f"Grip plan: {wanted}.",
+            "",
+            f"{'friction':>9}{'turn [deg]':>13}{'slide x [mm]':>15}{'slide y [mm]':>15}",
+        ]
+        both = zip(self.frictions, self.angles, self.slides, strict=True)
+        for factor, angle, (x, y) in both:
+            change = f"{100.0 * (factor - 1.0):+.3g} %" if factor != 1.0 else "nominal"
+            lines.append(
+                f"{change:>9}{np.rad2deg(angle):>13.3f}{1e3 * x:>15.3f}{1e3 * y:>15.3f}"
+            )
+        lines += [
+            "",
+            f"An error of one percent in friction changes the result by {per}.",
+            f"The final grip is {self.grip:.3g} N, {self.grip / self.holding:.2f} times the holding force.",
+            f"{self.simulations} simulations, {self.jacobians} Jacobians, {self.wall_time:.2g} s.",
+        ]
+        return "\n".join(lines)
+
+    __repr__ = __str__
+
+
+def report_of(
+    aim: Any,
+    frictions: Sequence[float],
+    ends: Sequence[np.ndarray],
+    grip: float,
+    holding: float,
+    cost: Any,
+) -> GripReport:
+    """Return the report on the ends `[6]` of a plan, one for each friction (see `motions.Aim`)."""
+    less, end, more = (ends[frictions.index(each)] for each in (0.99, 1.0, 1.01))
+    goal = {"angle": aim.angle}
+    if aim.angle is None:
+        goal = {"slide": tuple(aim.slide.tolist())}
+    change = 0.5 * abs(aim.progress(more) - aim.progress(less))
+    speed = float(np.linalg.norm(end[:3] * [1.0, 1.0, aim.radius]))
+    per_percent = change * float(np.linalg.norm(aim.end))
+    every = np.array(ends)
+    of_nominal = goal, float(end[5]), end[3:5], speed, grip, holding
+    return GripReport(
+        *of_nominal, np.array(frictions), every[:, 5], every[:, 3:5], per_percent, *cost
+    )
+
 
 LEVELS = (0.93, 0.85, 0.7, 0.5, 0.25, 0.02)
 """Grips to start from, as shares of the load that holds a sliding body: above it nothing follows from a change."""
@@ -50,6 +308,7 @@ GAIN = 1e-3
 """Share of the cost that a further step must save."""
 
 MOST_KNOTS = 200
+"""Largest number of knots of a profile."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -131,20 +390,32 @@ def plan_grip(
         raise InvalidValueError("friction", "be below 1", friction)
     validation.choice("aim", aim, ("nominal", "worst"))
     chosen = scene.contacts[index]
-    patch = chosen.model.patch
-    law = chosen.model.law.numbers
+    model = chosen.model
+    patch = model.patch
+    law = model.law.numbers
     first = load_on(scene, index, 0.0, np.zeros(2), 0.0)
     at_start = holding_load(first, patch, law.mu_c)
     if at_start == 0.0:
-        rule = "have a load that moves the body"
-        raise InvalidValueError("scene", rule, "no gravity and no force")
+        raise InvalidValueError(
+            "scene", "have a load that moves the body", "no gravity and no force"
+        )
     last = load_on(scene, index, angle or 0.0, slide, scene.t_end)
-    at_end = _holding_at(scene, index, last)
+    at_end = holding_load(last, patch, law.mu_c)
+    # laws that creep, and models whose bristles cannot start in equilibrium, have the load of mu_c alone
+    if model.law.holds_at_rest and hasattr(model, "state_of"):
+        apart = np.subtract(scene.body.position, grip_position(scene, index))
+        mass = scene.body.mass
+        inertia = scene.body.inertia + mass * float(apart @ apart)
+        own = {"mass": mass / chosen.count, "inertia": inertia / chosen.count}
+        at_end = max(at_end, dynamic_holding_load(last, model, **own))
     low, high = _bounds(bounds, at_start)
     least = (1.0 + validation.non_negative("margin", margin)) * at_end
     if least > high:
-        rule = f"reach the {least:.3g} N that hold the body at the end"
-        raise InvalidValueError("bounds", rule, [low, high])
+        raise InvalidValueError(
+            "bounds",
+            f"reach the {least:.3g} N that hold the body at the end",
+            [low, high],
+        )
     shares = (1.0, 1.0 - friction, 1.0 + friction) if friction else (1.0,)
     seen = sorted({*shares, 0.99, 1.01})
     grips = Grips(scene, index, seen)
@@ -164,35 +435,31 @@ def plan_grip(
     return GripPlan(found[0], profile, report, chosen.name, found)
 
 
+@dataclass(eq=False)
 class _ProfileSearch:
-    """The search for the values at some knots, between `low`, `least` for those that hold, and `high` [N]."""
+    """Search for the values at some knots, between `low`, `least` for those that hold, and `high` [N]."""
 
-    def __init__(
-        self,
-        grips: Grips,
-        aim: Aim,
-        factors: Sequence[float],
-        times: np.ndarray,
-        between: tuple,
-        holding: float,
-    ) -> None:
-        low, least, high = between
-        held = times >= SPANS[0] * grips.scene.t_end
+    _grips: Grips
+    _aim: Aim
+    _factors: Sequence[float]
+    _times: np.ndarray
+    _between: tuple[float, float, float]
+    _holding: float
+
+    def __post_init__(self) -> None:
+        low, least, high = self._between
+        count = len(self._times)
+        held = self._times >= SPANS[0] * self._grips.scene.t_end
         held[-1] = True
-        self._grips = grips
-        self._aim = aim
-        self._factors = factors
-        self._times = times
         self._low = np.where(held, least, low)
-        self._highest = np.full(len(times), high * (1.0 + 1e-6))
-        self._first = grips.first
-        # Whoever holds the body at first goes on from there.
+        self._highest = np.full(count, high * (1.0 + 1e-6))
+        self._first = self._grips.first
+        # A grip that holds the body at first goes on from there.
         if self._first is not None:
             self._low[0] = self._first * (1.0 - 1e-6)
             self._highest[0] = self._first * (1.0 + 1e-6)
-        self._holding = holding
-        self._bend = ROUGH / holding * np.diff(np.eye(len(times)), 2, axis=0)
-        self._weights = np.full(len(factors), 1.0 / len(factors))
+        self._bend = ROUGH / self._holding * np.diff(np.eye(count), 2, axis=0)
+        self._weights = np.full(len(self._factors), 1.0 / len(self._factors))
         self._values = np.zeros(0)
         self._reached = 0.0
 
@@ -206,9 +473,9 @@ class _ProfileSearch:
         profiles = [values for _, values in found if values is not None]
         if not profiles:
             return -np.inf
-        cost = lambda values: float((self._residuals(values) ** 2).sum())
+        cost = lambda values: (self._residuals(values) ** 2).sum()
         costs = threads.each(cost, profiles)
-        best = int(np.argmin(costs))
+        best = np.argmin(costs)
         self._values = profiles[best]
         return -0.5 * costs[best]
 
@@ -304,8 +571,9 @@ def _contact_of(scene: Any, name: str | None) -> int:
     """Return the index of the contact whose grip is planned."""
     validation.instance("scene", scene, Scene, "a Scene")
     if scene.start == "sliding":
-        rule = "be 'rest' or 'equilibrium' for a grip plan"
-        raise InvalidValueError("start", rule, scene.start)
+        raise InvalidValueError(
+            "start", "be 'rest' or 'equilibrium' for a grip plan", scene.start
+        )
     names = [each.name for each in scene.contacts]
     unset = {
         "velocity": (scene.velocity, "a body that a grip moves"),
@@ -318,33 +586,20 @@ def _contact_of(scene: Any, name: str | None) -> int:
         if given is not None:
             raise InvalidValueError(what, f"be None for {purpose}", given)
     if name is None and len(names) > 1:
-        rule = f"be given if there are several ({', '.join(names)})"
-        raise InvalidValueError("contact", rule, name)
+        raise InvalidValueError(
+            "contact", f"be given if there are several ({', '.join(names)})", name
+        )
     return 0 if name is None else names.index(validation.choice("contact", name, names))
-
-
-def _holding_at(scene: Scene, contact: int, load: np.ndarray) -> float:
-    """Return the normal force [N] that stops and holds a load `[3]` on a contact, however quickly the grip falls to it.
-
-    Laws that creep, and models whose bristles cannot start in equilibrium, have that of mu_c alone.
-    """
-    body = scene.body
-    chosen = scene.contacts[contact]
-    model = chosen.model
-    apart = np.subtract(body.position, grip_position(scene, contact))
-    stops = holding_load(load, model.patch, model.law.numbers.mu_c)
-    if not (model.law.holds_at_rest and hasattr(model, "state_of")):
-        return stops
-    mass = body.mass / chosen.count
-    inertia = (body.inertia + body.mass * float(apart @ apart)) / chosen.count
-    return max(stops, dynamic_holding_load(load, model, mass=mass, inertia=inertia))
 
 
 def _goal(goal: Any) -> tuple[float | None, np.ndarray]:
     """Return the angle of the goal, None for a slide, and the slide, zeros for an angle."""
     if not isinstance(goal, Mapping) or len(goal) != 1:
-        rule = 'be {"angle": radians} or {"slide": (dx, dy)}'
-        raise InvalidValueError("goal", rule, validation.quoted(goal))
+        raise InvalidValueError(
+            "goal",
+            'be {"angle": radians} or {"slide": (dx, dy)}',
+            validation.quoted(goal),
+        )
     validation.keys("goal", goal, [], ["angle", "slide"])
     angle = None
     slide = np.zeros(2)
@@ -365,11 +620,13 @@ def _knots(scene: Scene, knots: Any) -> list[np.ndarray]:
     times = validation.array("knots", knots, (None,))
     increasing = times[:1] == 0.0 and (np.diff(times) > 0.0).all()
     if not (4 <= len(times) <= MOST_KNOTS and increasing):
-        rule = f"be 4 to {MOST_KNOTS} increasing times >= 0"
-        raise InvalidValueError("knots", rule, times.tolist())
+        raise InvalidValueError(
+            "knots", f"be 4 to {MOST_KNOTS} increasing times >= 0", times.tolist()
+        )
     if times[-1] >= scene.t_end:
-        rule = f"end before the scene does, at {scene.t_end:g} s"
-        raise InvalidValueError("knots", rule, times.tolist())
+        raise InvalidValueError(
+            "knots", f"end before the scene does, at {scene.t_end:g} s", times.tolist()
+        )
     return [times]
 
 
@@ -378,6 +635,7 @@ def _bounds(bounds: Any, holding: float) -> tuple[float, float]:
         return 0.02 * holding, 4.0 * holding
     low, high = validation.non_negative_array("bounds", bounds, (2,)).tolist()
     if not low < high:
-        rule = "be the least and the largest normal force"
-        raise InvalidValueError("bounds", rule, [low, high])
+        raise InvalidValueError(
+            "bounds", "be the least and the largest normal force", [low, high]
+        )
     return low, high

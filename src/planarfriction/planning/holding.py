@@ -86,15 +86,18 @@ def holding_load(
     # Bounds friction over mu.
     strongest = metric * (1.0 + np.hypot(*patch.asymmetries().T).max())
     force = max(np.hypot(*load[:2]), abs(load[2]) / reach)
-    low = float(force / (mu * strongest))
+    low = force / (mu * strongest)
     tried = low * (1.0 - 1e-9)
     for _ in range(_STEPS):
         if _needed(load, patch, mu, tried) <= tried:
             break
         tried, low = _STEP * tried, tried
     else:
-        rule = "be a load that this patch holds at some normal force"
-        raise InvalidValueError("wrench", rule, load.tolist())
+        raise InvalidValueError(
+            "wrench",
+            "be a load that this patch holds at some normal force",
+            load.tolist(),
+        )
     if tried > low:
         from scipy.optimize import brentq
 
@@ -152,8 +155,9 @@ def dynamic_holding_load(
     margin = validation.non_negative("margin", margin)
     law = model.law
     if not law.holds_at_rest:
-        rule = "have a law that holds at rest"
-        raise InvalidValueError("model", rule, type(law).__name__)
+        raise InvalidValueError(
+            "model", "have a law that holds at rest", type(law).__name__
+        )
     fall = validation.number("fall", fall)
     if fall < 1.0 + CLOSE:
         raise InvalidValueError("fall", f"be at least {1.0 + CLOSE:g}", fall)
@@ -171,8 +175,25 @@ def dynamic_holding_load(
     body = Body(mass, inertia, gravity=(0.0, 0.0))
 
     def slips(share: float) -> bool:
-        grip = _falling(max(fall, share) * slow, share * slow, ramp)
-        return _slips(model, body, load, grip)
+        """Return True if the body slips as the grip falls to a share of the slow load."""
+        high = max(fall, share) * slow
+        low = share * slow
+        grip = Signal.sampled([0.0, BEFORE], [high, low])
+        if BEFORE + ramp > BEFORE:  # else it is nothing, or less than times tell apart
+            times = [0.0, BEFORE, BEFORE + ramp]
+            grip = Signal.sampled(times, [high, high, low], "linear")
+        end = grip.times[-1] + AFTER
+        contact = Contact(model, grip)
+        scene = Scene(
+            body, contact, end, force=load, save_every=end, start="equilibrium"
+        )
+        data = simulate(scene).data
+        moved = np.array([data[name][-1] for name in ("x", "y", "theta")])
+        dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(low))
+        way = np.hypot(dx, dy) + model.patch.contact_radius(low) * abs(theta)
+        stiffer = softening(model, low).min()
+        bends = law.numbers.mu_s / (law.numbers.sigma_0 * stiffer)
+        return way > bends + SLIP
 
     return (1.0 + margin) * slow * _least_share(slips)
 
@@ -186,35 +207,15 @@ def _least_share(slips: Any) -> float:
         share = share * factor
         factor = factor**2
         if share > WIDEST:
-            rule = f"be held within {WIDEST:g} times the holding_load"
-            raise InvalidValueError("wrench", rule, "a slip")
+            raise InvalidValueError(
+                "wrench", f"be held within {WIDEST:g} times the holding_load", "a slip"
+            )
         if share < 1.0 / WIDEST:
-            rule = f"let go below 1/{WIDEST:g} of the holding_load"
-            raise InvalidValueError("model", rule, "no slip")
+            raise InvalidValueError(
+                "model", f"let go below 1/{WIDEST:g} of the holding_load", "no slip"
+            )
     low, high = sorted((share, share * factor))
     while high - low > CLOSE:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if slips(middle) else (low, middle)
     return high
-
-
-def _falling(high: float, low: float, ramp: float) -> Signal:
-    """Return a normal force that falls from one value to another [N]."""
-    if BEFORE + ramp == BEFORE:  # nothing, or less than numbers of times tell apart
-        return Signal.sampled([0.0, BEFORE], [high, low])
-    return Signal.sampled([0.0, BEFORE, BEFORE + ramp], [high, high, low], "linear")
-
-
-def _slips(model: Any, body: Body, load: np.ndarray, grip: Signal) -> bool:
-    """Return True if a body under a constant load `[3]` slips as the grip changes."""
-    end = grip.times[-1] + AFTER
-    contact = Contact(model, grip)
-    scene = Scene(body, contact, end, force=load, save_every=end, start="equilibrium")
-    data = simulate(scene).data
-    force = grip.values[-1]
-    moved = np.array([data[name][-1] for name in ("x", "y", "theta")])
-    dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(force))
-    way = np.hypot(dx, dy) + model.patch.contact_radius(force) * abs(theta)
-    numbers = model.law.numbers
-    bends = numbers.mu_s / (numbers.sigma_0 * softening(model, force).min())
-    return bool(way > bends + SLIP)

@@ -19,9 +19,15 @@ from planarfriction._support.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.geometry import rotate
 from planarfriction.limit_surface import LimitSurfaceEllipsoid
-from planarfriction.planning.contact_modes import STICK, TouchPoint, pushed_by
-from planarfriction.planning.pushing import Push, push
-from planarfriction.planning.slider import Pusher, Slider
+from planarfriction.planning.pushing import (
+    STICK,
+    Push,
+    Pusher,
+    Slider,
+    TouchPoint,
+    push,
+    pushed_by,
+)
 from planarfriction.scenes import Signal
 
 PARTS = 3
@@ -134,8 +140,9 @@ def plan_push(
     validation.instance("slider", slider, Slider, "a Slider")
     validation.instance("pusher", pusher, Pusher, "a Pusher")
     if pusher.width > 0.0 or pusher.mu == 0.0:
-        rule = "be a point with friction, for a plan"
-        raise InvalidValueError("pusher", rule, pusher)
+        raise InvalidValueError(
+            "pusher", "be a point with friction, for a plan", pusher
+        )
     start = validation.vector("start", start, 3)
     goal = validation.vector("goal", goal, 3)
     margin = validation.number("margin", margin)
@@ -149,7 +156,7 @@ def plan_push(
     largest = (1.0 - margin) * cone
     if not np.any(goal - start):
         raise InvalidValueError("goal", "differ from the start", goal.tolist())
-    aim = _relative(start, goal)
+    aim = rotate(goal - start, -start[2])
     found = []
     for shares in PLACES:
         for edge, share in itertools.product(chosen, shares):
@@ -169,7 +176,8 @@ def plan_push(
     path = _path(slider, place, x, start)
     done = push(slider, pusher, path, start=start)
     for _ in range(ROUNDS):
-        aim = aim + _relative(start, goal) - _relative(start, done.end)
+        reached = rotate(done.end - start, -start[2])
+        aim = aim + rotate(goal - start, -start[2]) - reached
         length, x = _shortest(slider, place, largest, aim, x)
         if length == math.inf:
             break
@@ -202,11 +210,6 @@ def plan_push(
         time.perf_counter() - begin,
     )
     return PushPlan(path, done, report)
-
-
-def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """Return the goal in the axes of the start."""
-    return rotate(goal - start, -start[2])
 
 
 def _moved(pose: np.ndarray, twist: np.ndarray, distance: float) -> np.ndarray:

@@ -9,7 +9,7 @@ from matplotlib.colors import Normalize
 
 import planarfriction as pf
 from planarfriction._support.shown import unit_for
-from planarfriction.planning.motions import slide_of
+from planarfriction.planning.grip import slide_of
 from planarfriction.plots import style
 from planarfriction.plots.motion import placed
 from planarfriction.plots.track import body_poses

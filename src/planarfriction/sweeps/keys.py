@@ -51,8 +51,11 @@ def name_of(measure: Any, kept: bool) -> str:
         and not measure.__closure__
     )
     if kept and measure is not None and not named:
-        rule = "be a function with a name, and without values from around it, if out is given: runs are found by it"
-        raise InvalidValueError("measure", rule, measure)
+        raise InvalidValueError(
+            "measure",
+            "be a function with a name, and without values from around it, if out is given: runs are found by it",
+            measure,
+        )
     try:
         source = inspect.getsource(measure)  # pyright: ignore[reportArgumentType]
     except (OSError, TypeError):  # typed into a prompt, or no function

@@ -25,12 +25,14 @@ from planarfriction._support import validation
 from planarfriction._support.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene, Solution
-from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index
 from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.records import (
     FAILED,
+    OWN,
     TURN,
     Batch,
+    Bookkeeper,
+    Index,
     Record,
     reason_of,
     run_all,
@@ -55,6 +57,7 @@ _BATCH = 64
 """Largest number of runs that are handed out together."""
 
 _ENDED = "the executor ended ({}): finished runs are kept, sweep again to continue"
+"""Message about an executor that ended, with its reason."""
 
 
 @described
@@ -149,15 +152,19 @@ def sweep(
         Ctrl-C; carries the dataset so far. Finished runs stay in `out`.
     """
     if executor is not None:
-        words = "a concurrent.futures.Executor, or None"
-        validation.instance("executor", executor, Executor, words)
+        validation.instance(
+            "executor", executor, Executor, "a concurrent.futures.Executor, or None"
+        )
     sweeping = Sweeping(make_scene, values, out, measure, progress)
     if isinstance(executor, ProcessPoolExecutor):
         try:
             pickle.dumps(measure)
         except Exception as error:
-            rule = "be a function that other processes can import, such as one defined in a module"
-            raise InvalidValueError("measure", rule, reason_of(error)) from None
+            raise InvalidValueError(
+                "measure",
+                "be a function that other processes can import, such as one defined in a module",
+                reason_of(error),
+            ) from None
     book = sweeping.book
     try:
         sweeping.go(executor)
@@ -229,8 +236,11 @@ class Sweeping:
                 "out", "be a path of printable characters", ascii(str(out))
             )
         if out is not None and Path(out).suffix == ".zarr":
-            rule = "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))"
-            raise InvalidValueError("out", rule, str(out))
+            raise InvalidValueError(
+                "out",
+                "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))",
+                str(out),
+            )
         self.book = Bookkeeper(grid, measure is None, out)
         self._ended = ""
         self._size = 1

@@ -120,8 +120,11 @@ def check_takes(make_scene: Any, names: Sequence[str]) -> Callable[..., Any]:
     try:
         inspect.signature(make_scene).bind(**dict.fromkeys(names))
     except TypeError as error:
-        rule = f"take the swept quantities by name ({', '.join(names)})"
-        raise InvalidValueError("make_scene", rule, f"one for which {error}") from None
+        raise InvalidValueError(
+            "make_scene",
+            f"take the swept quantities by name ({', '.join(names)})",
+            f"one for which {error}",
+        ) from None
     except ValueError:  # of functions that are not written in Python
         pass
     return make_scene
@@ -206,8 +209,9 @@ class Settable:
         if path in ("body", *names):
             keys = BODY_KEYS if path == "body" else CONTACT_KEYS
             there = ", ".join(f"{path}.{key}" for key in keys)
-            rule = f"be one value, not a table of them: {there}"
-            raise InvalidValueError(path, rule, "the table")
+            raise InvalidValueError(
+                path, f"be one value, not a table of them: {there}", "the table"
+            )
         keys = [key for key in SCENE_KEYS if key != "contact"]
         keys += [*names, *self._others]
         return _set(table, path.split("."), value, path, "the scene", keys)
@@ -239,9 +243,10 @@ def _set(
         )
     valid = list(table) if valid is None else list(dict.fromkeys(valid))
     if key not in valid:
-        given = f"{key!r}{validation.hint(key, valid)}"
         raise InvalidValueError(
-            path, f"name a value of the scene: {where} has {', '.join(valid)}", given
+            path,
+            f"name a value of the scene: {where} has {', '.join(valid)}",
+            f"{key!r}{validation.hint(key, valid)}",
         )
     name = key if where == "the scene" else f"{where}.{key}"
     if not rest:
@@ -305,8 +310,9 @@ def parse(text: str) -> tuple[str, dict[Any, Any]]:
     ]
     for label in labels:
         if (times := labels.count(label)) > 1:
-            given = f"{label} {times} times"
-            raise InvalidValueError(f"--set {path}", "have each value once", given)
+            raise InvalidValueError(
+                f"--set {path}", "have each value once", f"{label} {times} times"
+            )
     return path, dict(zip(labels, values, strict=True))
 
 

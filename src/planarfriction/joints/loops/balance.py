@@ -35,7 +35,7 @@ class Balance(NamedTuple):
 
 @jit
 def follow_path(columns, travelled):
-    """Return what follows each column `[R, C]` by a lag of first order over a path, `dz/du = x - z`, from 0.
+    """Return a lag of first order of each column `[R, C]` over a path, `dz/du = x - z`, which begins at 0.
 
     `travelled` `[R]` is the path from the row before, in lengths of the lag.
     """

@@ -1,10 +1,7 @@
 """Time steps of samples from a clock that may stop, jump or run at a wrong rate."""
 
-from __future__ import annotations
-
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
-from planarfriction.online.loops import filter_state as at
 
 RESTART = 10.0
 """Samples in a row with an odd time after which the clock is set anew, and samples count as the period apart."""
@@ -21,28 +18,28 @@ PERIODS = 10.0
 
 @kernel
 def time_step(s, now):
-    """Return the time step [s] of a sample, 0 for one that is left out; BACK tells if its time is odd.
+    """Return the time step [s] of a sample, 0 for one that is left out; `back` tells if its time is odd.
 
     Time is odd if it is missing, does not go on, or jumps. A jump is a pause if it stays alone; if odd times go on, the
     clock is wrong, and samples are the last good period apart.
     """
-    dt = now - s[at.TIME]
-    period = s[at.PERIOD]
-    known = s[at.STEADY] >= STEADIES
+    dt = now - s.time
+    period = s.period
+    known = s.steady >= STEADIES
     there = xp.in_range(now)
     far = there and known and dt > ODD * period
     if there and dt > 0.0 and not far and (not known or ODD * dt >= period):
-        s[at.BACK] = 0.0
+        s.back = 0.0
         if dt <= 1.0:  # not the first sample, nor a long pause
-            s[at.STEADY] = min(s[at.STEADY] + 1.0, STEADIES)
+            s.steady = min(s.steady + 1.0, STEADIES)
             step = min(max(dt, 0.5 * period), 2.0 * period) if period > 0.0 else dt
-            s[at.PERIOD] += (step - period) / min(s[at.STEADY], PERIODS)
+            s.period += (step - period) / min(s.steady, PERIODS)
     else:
-        s[at.BACK] += 1.0
-        pause = far and s[at.BACK] == 1.0
-        dt = dt if pause else (period if s[at.BACK] > RESTART else 0.0)
+        s.back += 1.0
+        pause = far and s.back == 1.0
+        dt = dt if pause else (period if s.back > RESTART else 0.0)
     if not there:
-        s[at.TIME] += dt
-    elif s[at.BACK] == 0.0 or s[at.BACK] >= RESTART or far:
-        s[at.TIME] = now
+        s.time += dt
+    elif s.back == 0.0 or s.back >= RESTART or far:
+        s.time = now
     return dt if dt <= 1.0 else (period if period > 0.0 else 1e-3)

@@ -1,49 +1,72 @@
-"""Layout of the state of the friction filter: unknowns, root of their covariance, and what it remembers of samples."""
+"""State of the friction filter: unknowns, the root of their covariance, and what it remembers of samples."""
 
-from __future__ import annotations
+import numpy as np
 
-from planarfriction.online.loops.square_root import ROOT, N
+from planarfriction.online.loops.square_root import N
 
 TWIST = 3
-"""Place of the twist, after the remainder of the count [m], which is the error of a
-place."""
+"""Place of the twist among the unknowns, after what the slip sensor's count left out [m]."""
 
 MU = 6
 """Place of the logarithm of friction."""
 
 RATIO = 7
-"""Place of the ratio of static to sliding friction."""
+"""Place of the logarithm of the ratio of static to sliding friction."""
 
 SCALE = 8
-"""Place of the scale of the patch."""
+"""Place of the logarithm of the scale of the patch."""
 
 BIAS = 9
 """Place of the bias of the wrench."""
 
-# Places of what the filter remembers:
-SLIP = ROOT + N * N  # the probability of slip, the first after the root
-TIME = SLIP + 1  # the time [s]
-BOUND = TIME + 1  # the log of the largest gauge of the wrench while it stuck
-PEAK = BOUND + 1  # the log of a recent largest gauge
-GAUGE = PEAK + 1  # the log of the gauge now
-SEEN = GAUGE + 1  # the filtered wrench over load (3)
-PLACE = SEEN + 3  # the recent displacement (3)
-REST = PLACE + 3  # the time since the last velocity [s]
-SUM = REST + 1  # the sum of the wrench over load since the last velocity (3)
-LOADS = SUM + 3  # the sum of the load since the last velocity
-COUNT = LOADS + 1  # the number of samples since the last velocity
-# Sum (3), loads and count of the samples before the last velocity, with that velocity (3) and its time.
-OLD = COUNT + 1
-CHAIN = OLD + 9  # the number of velocities in a row that were those of sliding
-BACK = CHAIN + 1  # the number of samples in a row whose time was odd
-LEVER = BACK + 1  # the share of the torque in the gauge of the wrench
-# The recent mean of the dissipated power over that of the force times the speed [-].
-DISSIPATED = LEVER + 1
-# 1 once the bias is known: an empty hand showed it, or it is as small as the noise.
-TARED = DISSIPATED + 1
-PERIOD = TARED + 1  # the mean time between samples [s]
-# The number of samples of which it is the mean, as far as they count.
-STEADY = PERIOD + 1
-# The recent mean of the squares of the innovations over their variances.
-MISFIT = STEADY + 1
-STATE = MISFIT + 1  # length of the state
+STATE = np.dtype(
+    [
+        ("x", float, N),
+        ("root", float, (N, N)),
+        *((name, float, 3) for name in ("seen", "place", "sum", "old_sum", "velocity")),
+        *(
+            (name, float)
+            for name in (
+                "slip",
+                "time",
+                "bound",
+                "peak",
+                "gauge",
+                "rest",
+                "loads",
+                "count",
+                "old_loads",
+                "old_count",
+                "span",
+                "chain",
+                "back",
+                "lever",
+                "dissipated",
+                "tared",
+                "period",
+                "steady",
+                "misfit",
+            )
+        ),
+    ]
+)
+"""State of the filter of one part.
+
+- `x`, `root`: unknowns, and the root of their covariance
+- `seen`: filtered wrench over load
+- `place`: recent displacement
+- `sum`, `loads`, `count`: sums of the wrench over load, and of the load, and number of samples since the last velocity
+- `old_sum`, `old_loads`, `old_count`: those before the last velocity, with that `velocity` and its time, `span` [s]
+- `slip`: probability of slip
+- `time`: time of the last sample [s]
+- `bound`: log of the largest gauge of the wrench while the part stuck
+- `peak`, `gauge`: logs of a recent largest gauge, and of the gauge now
+- `rest`: time since the last velocity [s]
+- `chain`: number of velocities in a row that were those of sliding
+- `back`: number of samples in a row whose time was odd
+- `lever`: share of the torque in the gauge of the wrench
+- `dissipated`: recent mean of the dissipated power over that of the force times the speed [-]
+- `tared`: 1 once the bias is known, as an empty hand showed it, or it is as small as the noise
+- `period`: mean time between samples [s], of the number `steady` of them, as far as they count
+- `misfit`: recent mean of the squares of the innovations over their variances
+"""

@@ -18,10 +18,9 @@ from planarfriction._engine.codegen.vectors import clear
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel
 from planarfriction._engine.published.surfaces import sliding, sliding_jacobian
-from planarfriction.online.loops import filter_state as at
 from planarfriction.online.loops.clock import time_step
+from planarfriction.online.loops.filter_state import BIAS, MU, RATIO, SCALE, TWIST
 from planarfriction.online.loops.square_root import (
-    ROOT,
     N,
     measure,
     reset,
@@ -172,17 +171,31 @@ def _normal(x):
 
 
 @kernel
+def _row(matrix, i, vector):
+    """Return number i of the product of a matrix `[3, 3]` and a vector `[3]`."""
+    return (
+        matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2]
+    )
+
+
+@kernel
+def known(vector):
+    """Return True if no number of a vector `[3]` is missing or out of range."""
+    return xp.in_range(vector[0]) and xp.in_range(vector[1]) and xp.in_range(vector[2])
+
+
+@kernel
 def _scale(settings, s, load):
     """Return the radius at a load over that of the surface."""
-    return math.exp(s[at.SCALE] + settings.growth * math.log(load / settings.reference))
+    return math.exp(s.x[SCALE] + settings.growth * math.log(load / settings.reference))
 
 
 @kernel
 def _gauge(settings, s, scale, best):
     """Return the gauge of the filtered wrench, the largest `w . dual`; the dual, a twist, goes to `best`."""
-    x = s[at.SEEN]
-    y = s[at.SEEN + 1]
-    z = s[at.SEEN + 2] / scale
+    x = s.seen[0]
+    y = s.seen[1]
+    z = s.seen[2] / scale
     most = 0.0
     for m in range(settings.duals.shape[0]):
         each = (
@@ -195,30 +208,30 @@ def _gauge(settings, s, scale, best):
             sign = 1.0 if each > 0.0 else -1.0
             for i in range(3):
                 best[i] = sign * settings.duals[m, i]
-    s[at.LEVER] = z * best[2] / max(most, 1e-9)
+    s.lever = z * best[2] / max(most, 1e-9)
     return most
 
 
 @kernel
 def _move(settings, s, column):
     """Set the twist to the counted velocity plus what the count left out before, less what it left out at its end."""
-    span = max(s[at.OLD + 8], 1e-9)
+    span = max(s.span, 1e-9)
     for i in range(3):
-        if s[at.CHAIN] <= 2.0:
+        if s.chain <= 2.0:
             reset(s, i, 0.0, settings.remainder[i], column)
-        reset(s, at.TWIST + i, s[at.OLD + 5 + i] + s[i] / span, 0.0, column)
+        reset(s, TWIST + i, s.velocity[i] + s.x[i] / span, 0.0, column)
         for j in range(i + 1):
-            s[ROOT + N * (at.TWIST + i) + j] = s[ROOT + N * i + j] / span
+            s.root[TWIST + i, j] = s.root[i, j] / span
         reset(s, i, 0.0, settings.remainder[i], column)
-        s[ROOT + N * (at.TWIST + i) + i] -= settings.remainder[i] / span
+        s.root[TWIST + i, i] -= settings.remainder[i] / span
 
 
 @kernel
 def _measure(s, h, miss, variance, column):
     """Update the unknowns with a measurement, their logs within bounds; return the scaled innovation."""
     scaled = measure(s, h, miss, variance, column)
-    for i in range(at.MU, at.BIAS):
-        s[i] = min(max(s[i], -LARGEST_LOG), LARGEST_LOG)
+    for i in range(MU, BIAS):
+        s.x[i] = min(max(s.x[i], -LARGEST_LOG), LARGEST_LOG)
     return scaled
 
 
@@ -226,32 +239,32 @@ def _measure(s, h, miss, variance, column):
 def _learn(settings, s, h, column, jacobian):
     """Update with the mean wrench and the velocity of the samples before the last velocity, which were sliding."""
     _move(settings, s, column)
-    count = s[at.OLD + 4]
+    count = s.old_count
     if count == 0.0:
         return
-    load = s[at.OLD + 3] / count
-    before = s[at.SCALE]
+    load = s.old_loads / count
+    before = s.x[SCALE]
     power = 0.0
     force2 = 0.0
     speed2 = 0.0
     misfit = 0.0
     for i in range(3):
-        w = load * s[at.OLD + i] / count - s[at.BIAS + i]
-        power = power + w * s[at.TWIST + i]
-        force2 = force2 + w * w
-        speed2 = speed2 + s[at.TWIST + i] * s[at.TWIST + i]
-    s[at.DISSIPATED] += (
-        power / math.sqrt(max(force2 * speed2, 1e-300)) - s[at.DISSIPATED]
+        w = load * s.old_sum[i] / count - s.x[BIAS + i]
+        power += w * s.x[TWIST + i]
+        force2 += w * w
+        speed2 += s.x[TWIST + i] * s.x[TWIST + i]
+    s.dissipated += (
+        power / math.sqrt(max(force2 * speed2, 1e-300)) - s.dissipated
     ) / POWERS
-    if s[at.DISSIPATED] < 0.0:
+    if s.dissipated < 0.0:
         return  # friction that drives teaches nothing
     for row in range(3):
-        mu = math.exp(s[at.MU])
-        ratio = math.exp(s[at.RATIO])
+        mu = math.exp(s.x[MU])
+        ratio = math.exp(s.x[RATIO])
         scale = _scale(settings, s, load)
-        x = s[at.TWIST]
-        y = s[at.TWIST + 1]
-        z = scale * s[at.TWIST + 2]
+        x = s.x[TWIST]
+        y = s.x[TWIST + 1]
+        z = scale * s.x[TWIST + 2]
         speed = math.sqrt(x * x + y * y + z * z)
         u = sliding(settings.kind, settings.data, 0, settings.size, x, y, z, speed)
         sliding_jacobian(
@@ -274,52 +287,52 @@ def _learn(settings, s, h, column, jacobian):
                 g * (jacobian[3 * row + j] - along * unit) / speed
                 + by_speed * along * unit
             )
-            h[at.TWIST + j] = factor * slope * (scale if j == 2 else 1.0)
-        h[at.MU] = factor * steady * along
-        h[at.RATIO] = factor * along * mu * ratio * fade
-        h[at.SCALE] = h[at.TWIST + 2] * s[at.TWIST + 2] + (
+            h[TWIST + j] = factor * slope * (scale if j == 2 else 1.0)
+        h[MU] = factor * steady * along
+        h[RATIO] = factor * along * mu * ratio * fade
+        h[SCALE] = h[TWIST + 2] * s.x[TWIST + 2] + (
             factor * g * along if row == 2 else 0.0
         )
-        h[at.BIAS + row] = 1.0
+        h[BIAS + row] = 1.0
         error = settings.model_error * factor * g
         variance = settings.noise[row] / count + error * error
-        miss = load * s[at.OLD + row] / count - factor * g * along - s[at.BIAS + row]
+        miss = load * s.old_sum[row] / count - factor * g * along - s.x[BIAS + row]
         scaled = _measure(s, h, miss, variance, column)
         misfit += scaled * scaled / 3.0
-    s[at.MISFIT] += (min(misfit, WORST) - s[at.MISFIT]) / POWERS
-    s[at.BOUND] -= s[at.LEVER] * (s[at.SCALE] - before)
+    s.misfit += (min(misfit, WORST) - s.misfit) / POWERS
+    s.bound -= s.lever * (s.x[SCALE] - before)
 
 
 @kernel
 def _see(settings, s, v, h, column, jacobian):
     """Take a slip velocity, the mean since the last; return the log of the odds that it is a slip."""
-    span = min(s[at.REST], PLACE_TIME)
+    span = min(s.rest, PLACE_TIME)
     odds = 0.0
     rest = 0.7 * settings.quantum
     sd2 = FRESH * FRESH
     speed2 = 0.0
     far2 = 0.0
     for i in range(3):
-        s[at.PLACE + i] = s[at.PLACE + i] * math.exp(-span / PLACE_TIME) + v[i] * span
-        far2 += s[at.PLACE + i] * s[at.PLACE + i]
+        s.place[i] = s.place[i] * math.exp(-span / PLACE_TIME) + v[i] * span
+        far2 += s.place[i] * s.place[i]
         speed2 += v[i] * v[i]
-        miss = v[i] - (s[at.TWIST + i] if s[at.SLIP] > 0.5 else 0.0)
+        miss = v[i] - (s.x[TWIST + i] if s.slip > 0.5 else 0.0)
         odds += 0.5 * (
             v[i] * v[i] / (rest * rest) - miss * miss / sd2
         ) - 0.5 * math.log(sd2 / (rest * rest))
     moves = speed2 > SLOW * SLOW * settings.quantum * settings.quantum
-    if moves and s[at.CHAIN] >= 2.0:
+    if moves and s.chain >= 2.0:
         _learn(settings, s, h, column, jacobian)
-    s[at.CHAIN] = s[at.CHAIN] + 1.0 if moves else 0.0
+    s.chain = s.chain + 1.0 if moves else 0.0
     for i in range(3):
-        s[at.OLD + i] = s[at.SUM + i]
-        s[at.OLD + 5 + i] = v[i]
-        s[at.SUM + i] = 0.0
-        reset(s, at.TWIST + i, v[i], settings.quantum, column)
-    s[at.OLD + 3], s[at.OLD + 4], s[at.OLD + 8] = s[at.LOADS], s[at.COUNT], s[at.REST]
-    s[at.LOADS] = 0.0
-    s[at.COUNT] = 0.0
-    s[at.REST] = 0.0
+        s.old_sum[i] = s.sum[i]
+        s.velocity[i] = v[i]
+        s.sum[i] = 0.0
+        reset(s, TWIST + i, v[i], settings.quantum, column)
+    s.old_loads, s.old_count, s.span = s.loads, s.count, s.rest
+    s.loads = 0.0
+    s.count = 0.0
+    s.rest = 0.0
     return min(max(odds, -8.0), 8.0) + (
         8.0 if far2 > 16.0 * settings.place * settings.place else 0.0
     )
@@ -330,78 +343,68 @@ def _tare(settings, s, wrench, load, h, column):
     """Learn the bias from a wrench of an empty hand, if it may be one."""
     taken = 0.0
     for i in range(3):
-        w = -s[at.BIAS + i]
-        for j in range(3):
-            w += settings.conjugate[i, j] * wrench[j]
-        friction = math.exp(s[at.MU]) * load
+        w = _row(settings.conjugate, i, wrench) - s.x[BIAS + i]
+        friction = math.exp(s.x[MU]) * load
         variance = settings.noise[i] + friction * friction
-        if w * w < EMPTY * EMPTY * (
-            variance + variance_of(s, at.BIAS + i, at.BIAS + i)
-        ):
+        if w * w < EMPTY * EMPTY * (variance + variance_of(s, BIAS + i, BIAS + i)):
             for k in range(N):
-                h[k] = 1.0 if k == at.BIAS + i else 0.0
+                h[k] = 1.0 if k == BIAS + i else 0.0
             _measure(s, h, w, variance, column)
             taken += 1.0
     if taken == 3.0:
-        s[at.TARED] = 1.0
+        s.tared = 1.0
 
 
 @kernel
 def _judge(settings, s, load, dt, best):
     """Update the probability of slip with the filtered wrench over load."""
-    sd_s = math.sqrt(variance_of(s, at.MU, at.RATIO) + SEEN_ERROR * SEEN_ERROR)
-    sd_c = math.sqrt(variance_of(s, at.MU, at.MU) + SEEN_ERROR * SEEN_ERROR)
+    sd_s = math.sqrt(variance_of(s, MU, RATIO) + SEEN_ERROR * SEEN_ERROR)
+    sd_c = math.sqrt(variance_of(s, MU, MU) + SEEN_ERROR * SEEN_ERROR)
     level = math.log(max(_gauge(settings, s, _scale(settings, s, load), best), 1e-9))
-    inside = max(0.0, (s[at.MU] - level) / sd_c - 2.0)
-    begins = CREEPS + BREAKS * _normal((level - s[at.MU] - s[at.RATIO]) / sd_s - 1.0)
-    p = s[at.SLIP]
+    inside = max(0.0, (s.x[MU] - level) / sd_c - 2.0)
+    begins = CREEPS + BREAKS * _normal((level - s.x[MU] - s.x[RATIO]) / sd_s - 1.0)
+    p = s.slip
     p = p + (1.0 - p) * min(begins * dt, 0.5) - p * min(LEAVES * dt, 0.5)
     against = math.exp(-0.5 * min(inside * inside, 50.0) * dt / MEMORY)
-    s[at.SLIP] = p * against / (p * against + 1.0 - p)
-    s[at.GAUGE] = level
+    s.slip = p * against / (p * against + 1.0 - p)
+    s.gauge = level
 
 
 @kernel
 def _doubt(settings, s):
     """Return the sum of the flags of numbers that contradict what was assumed."""
-    flags = (0 if s[at.TARED] > 0.0 else NO_BIAS) + (
-        NO_SIGN if s[at.DISSIPATED] < 0.0 else 0
-    )
+    flags = (0 if s.tared > 0.0 else NO_BIAS) + (NO_SIGN if s.dissipated < 0.0 else 0)
     reach = FAR * math.hypot(settings.prior_spread[0], settings.prior_spread[1])
-    far = s[at.GAUGE] > settings.prior[0] + settings.prior[1] + reach
+    far = s.gauge > settings.prior[0] + settings.prior[1] + reach
     for i in range(3):
         far = (
-            far
-            or abs(s[at.MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
+            far or abs(s.x[MU + i] - settings.prior[i]) > FAR * settings.prior_spread[i]
         )
-    return flags + (NO_RANGE if far else (NO_FIT if s[at.MISFIT] > UNLIKELY else 0))
+    return flags + (NO_RANGE if far else (NO_FIT if s.misfit > UNLIKELY else 0))
+
+
+@kernel
+def _root_of_log(s, i, j):
+    """Return number j of row i of the root of the covariance of the logs of mu_c, mu_s and the radius."""
+    return s.root[MU if i < 2 else SCALE, j] + (s.root[RATIO, j] if i == 1 else 0.0)
 
 
 @kernel
 def _estimate(settings, s, e):
     """Write an estimate after a sample."""
     for i in range(3):
-        e.twist[i] = 0.0
+        e.twist[i] = _row(settings.back, i, s.x[TWIST:MU]) if s.slip > 0.5 else 0.0
         for j in range(3):
-            e.twist[i] += (
-                settings.back[i, j] * s[at.TWIST + j] if s[at.SLIP] > 0.5 else 0.0
-            )
-            e.wrench[i] += settings.frame[j, i] * s[at.BIAS + j]
-    log_s = max(s[at.MU] + max(s[at.RATIO], 0.0), s[at.BOUND])
-    e.mu_c = math.exp(s[at.MU])
+            e.wrench[i] += settings.frame[j, i] * s.x[BIAS + j]
+    log_s = max(s.x[MU] + max(s.x[RATIO], 0.0), s.bound)
+    e.mu_c = math.exp(s.x[MU])
     e.mu_s = math.exp(log_s)
-    e.radius = settings.radius * math.exp(s[at.SCALE])
+    e.radius = settings.radius * math.exp(s.x[SCALE])
     for i in range(3):
         for k in range(3):
             total = 0.0
             for j in range(N):
-                a = s[ROOT + N * (at.MU if i < 2 else at.SCALE) + j] + (
-                    s[ROOT + N * at.RATIO + j] if i == 1 else 0.0
-                )
-                b = s[ROOT + N * (at.MU if k < 2 else at.SCALE) + j] + (
-                    s[ROOT + N * at.RATIO + j] if k == 1 else 0.0
-                )
-                total += a * b
+                total += _root_of_log(s, i, j) * _root_of_log(s, k, j)
             floor = (
                 settings.model_error
                 * settings.model_error
@@ -413,15 +416,15 @@ def _estimate(settings, s, e):
             1 if e.covariance[i, i] <= settings.variance and e.flags < NO_BIAS else 0
         )
     sd = math.sqrt(e.covariance[1, 1] + SEEN_ERROR * SEEN_ERROR)
-    e.slip = s[at.SLIP]
-    e.about_to_slip = (1.0 - s[at.SLIP]) * _normal((s[at.GAUGE] + NEAR - log_s) / sd)
-    e.margin = 1.0 - math.exp(min(s[at.GAUGE] - log_s, 50.0))
-    e.gauge = math.exp(s[at.GAUGE])
+    e.slip = s.slip
+    e.about_to_slip = (1.0 - s.slip) * _normal((s.gauge + NEAR - log_s) / sd)
+    e.margin = 1.0 - math.exp(min(s.gauge - log_s, 50.0))
+    e.gauge = math.exp(s.gauge)
 
 
 @jit
 def update(settings, states, samples, found):
-    """Update states `[P, STATE]` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
+    """Update states `[P]` of dtype `STATE` with a sample each; `found [P]` of dtype `ESTIMATE` gets what is known.
 
     Samples `[P, 8]` are time, wrench, load and slip velocity; NaN is none. `flags` is the sum of what was odd: 1 no or
     bad wrench or load, 2 time that does not go on or jumps, 4 saturated sensor, 8 unknown bias, 16 friction that
@@ -441,58 +444,50 @@ def update(settings, states, samples, found):
         load = samples[p, 4]
         velocity = samples[p, 5:]
         dt = time_step(s, now)
-        flags = 2 if s[at.BACK] > 0.0 else 0
+        flags = 2 if s.back > 0.0 else 0
         force = math.hypot(wrench[0], wrench[1])
         good = xp.in_range(load) and xp.in_range(force) and xp.in_range(wrench[2])
         # After a grip no load is not an empty hand.
-        lost = good and load <= settings.least_load and s[at.GAUGE] > NONE
+        lost = good and load <= settings.least_load and s.gauge > NONE
         flags += 0 if good and not lost else 1
         if good and force >= settings.saturation:
-            flags = flags + 4
+            flags += 4
             good = False
         if dt > 0.0:
             if settings.drift > 0.0:
-                spread(s, at.MU, settings.drift * settings.drift * dt, column)
-            s[at.PEAK] -= dt / PEAK_TIME
-            s[at.BOUND] -= settings.drift * math.sqrt(dt)
-            s[at.REST] += dt
-        before = s[at.SLIP]
+                spread(s, MU, settings.drift * settings.drift * dt, column)
+            s.peak -= dt / PEAK_TIME
+            s.bound -= settings.drift * math.sqrt(dt)
+            s.rest += dt
+        before = s.slip
         if good and load <= settings.least_load and dt > 0.0:
             _tare(settings, s, wrench, load, h, column)
         elif good and dt > 0.0:
             share = 1.0 - math.exp(-dt / SEEN_TIME)
             for i in range(3):
-                w = 0.0
-                for j in range(3):
-                    w += settings.conjugate[i, j] * wrench[j]
-                s[at.SEEN + i] += share * ((w - s[at.BIAS + i]) / load - s[at.SEEN + i])
-                s[at.SUM + i] += w / load
-            s[at.LOADS], s[at.COUNT] = s[at.LOADS] + load, s[at.COUNT] + 1.0
+                w = _row(settings.conjugate, i, wrench)
+                s.seen[i] += share * ((w - s.x[BIAS + i]) / load - s.seen[i])
+                s.sum[i] += w / load
+            s.loads += load
+            s.count += 1.0
             _judge(settings, s, load, dt, best)
-            s[at.PEAK] = max(s[at.PEAK], s[at.GAUGE])
-            if s[at.SLIP] < 0.1:
-                s[at.BOUND] = max(s[at.BOUND], s[at.GAUGE])
-        if (
-            xp.in_range(velocity[0])
-            and xp.in_range(velocity[1])
-            and xp.in_range(velocity[2])
-            and dt > 0.0
-        ):
+            s.peak = max(s.peak, s.gauge)
+            if s.slip < 0.1:
+                s.bound = max(s.bound, s.gauge)
+        if known(velocity) and dt > 0.0:
             for i in range(3):
-                v[i] = 0.0
-                for j in range(3):
-                    v[i] += settings.frame[i, j] * velocity[j]
+                v[i] = _row(settings.frame, i, velocity)
             odds = math.exp(_see(settings, s, v, h, column, jacobian))
-            s[at.SLIP] = s[at.SLIP] * odds / (s[at.SLIP] * odds + 1.0 - s[at.SLIP])
-        s[at.SLIP] = min(max(s[at.SLIP], 1e-9), 1.0 - 1e-9)
-        if before <= 0.5 < s[at.SLIP] and s[at.PEAK] > -9.0:
+            s.slip = s.slip * odds / (s.slip * odds + 1.0 - s.slip)
+        s.slip = min(max(s.slip, 1e-9), 1.0 - 1e-9)
+        if before <= 0.5 < s.slip and s.peak > -9.0:
             for i in range(N):
-                h[i] = 1.0 if i in (at.MU, at.RATIO) else 0.0
-            h[at.SCALE] = s[at.LEVER]
+                h[i] = 1.0 if i in (MU, RATIO) else 0.0
+            h[SCALE] = s.lever
             _measure(
                 s,
                 h,
-                s[at.PEAK] - s[at.MU] - s[at.RATIO],
+                s.peak - s.x[MU] - s.x[RATIO],
                 PEAK_ERROR * PEAK_ERROR,
                 column,
             )

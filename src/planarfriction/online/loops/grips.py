@@ -1,7 +1,5 @@
 """Grip forces of the controllers of `planarfriction.online`, for one sample of every part (docs/online.md)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -9,18 +7,22 @@ import numpy as np
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel
 from planarfriction.formulas import LARGEST
-from planarfriction.online.loops.friction_filter import NO_SIGN, SEEN_TIME
+from planarfriction.online.loops.friction_filter import NO_SIGN, SEEN_TIME, known
 
 EARLY = 32
 """Number of samples whose medians are the first grip and the load: the last ones before the filters have settled."""
 
 STATE = np.dtype(
     [
-        *((name, float) for name in ("age", "span", "since", "start", "load", "grip")),
-        *((name, float, 3) for name in ("slid", "velocity")),
         *(
             (name, float)
             for name in (
+                "age",
+                "span",
+                "since",
+                "start",
+                "load",
+                "grip",
                 "found",
                 "goal",
                 "began",
@@ -29,16 +31,17 @@ STATE = np.dtype(
                 "eased",
                 "force",
                 "torque",
-            )
-        ),
-        *((name, float) for name in ("blind", "weight", "lately", "pressed", "count")),
-        *(
-            (name, float)
-            for name in ("broke", "dipped", "before", "borne", "stood", "quiet")
-        ),
-        *(
-            (name, float)
-            for name in (
+                "blind",
+                "weight",
+                "lately",
+                "pressed",
+                "count",
+                "broke",
+                "dipped",
+                "before",
+                "borne",
+                "stood",
+                "quiet",
                 "mute",
                 "weighed",
                 "pulls",
@@ -49,41 +52,41 @@ STATE = np.dtype(
                 "usual",
             )
         ),
-        ("same", float, 3),
+        *((name, float, 3) for name in ("slid", "velocity", "same")),
         *((name, float, EARLY) for name in ("forces", "loads")),
     ]
 )
-"""State of a part in any controller: times since the first sample, since a slip velocity and since it slipped [s], grip
-from which it falls, largest holding load of late at mu = 1 and grip [N], displacement and velocity; then of some
-controllers: 1 once friction is found, goal, time since the slip began [s], the grip that balances the load [N], 1 once
-caught, share of the grip that is left, and filtered force and torque; of all: time for which the part falls while the
-slip sensor does not say so [s], largest holding load before that, filtered holding load and grip force, and number,
-grips and holding loads of the first samples; of slips on purpose: holding load over grip at which the part breaks
-loose, time since a dip of the grip began [s], and displacement then; of all: filtered size of the wrench, and the
-largest since the part stuck [N], time since a slip velocity along the wrench [s], time since wrench and load were
-plausible [s], first force and filtered force of the part [N], the last grip force that was measured, the grip that was
-asked for when it came [N], and the time for which it has been the same [s], 1 while no slip velocity comes and OVERDUE
-while one is due, mean holding load of late [N], and number of slip velocities in a row that were equal, each component.
+"""State of a part in any controller, from the samples so far.
+
+- `age`, `span`, `since`: times since the first sample, since a slip velocity, and since the part slipped [s]
+- `start`, `grip`, `load`: grip from which it falls, grip, and largest holding load of late at mu = 1 [N]
+- `slid`, `velocity`: displacement, and last slip velocity
+- `same`: number of slip velocities in a row that were equal, of each component
+- `lately`, `pressed`, `usual`: filtered holding load and grip force, and mean holding load of late [N]
+- `forces`, `loads`, `count`: grips and holding loads of the first samples, and their number
+- `borne`, `stood`: filtered size of the wrench, and the largest one since the part stuck [N]
+- `weighed`, `pulls`: first force, and filtered force of the part [N]
+- `felt`, `sent`, `still`: last grip force that was measured, the grip that was asked for when it came [N], and the time
+  for which it has been the same [s]
+- `blind`: time for which the part falls while the slip sensor does not say so [s]
+- `weight`: largest holding load before that [N]
+- `mute`, `quiet`: times since wrench and load were plausible, and since a slip velocity along the wrench [s]
+- `silent`: 1 while no slip velocity comes, and `OVERDUE` while one is due
+- `found`: 1 once friction is found
+- `goal`, `began`: goal of a slip on purpose, and time since it began [s]
+- `balance`, `caught`: grip that balances the load [N], and 1 once the part is caught
+- `broke`: holding load over grip at which the part breaks loose
+- `dipped`, `before`: time since a dip of the grip began [s], and displacement then
+- `eased`, `force`, `torque`: share of the grip of a hinge that is left, and filtered force and torque
 """
 
-_FAR = math.inf
-FRESH = (
-    -_FAR,
-    -_FAR,
-    0.0,
-    _FAR,
-    *[0.0] * 6,
-    -_FAR,
-    0.0,
-    0.0,
-    1.0,
-    *[0.0] * 8,
-    _FAR,
-    *[0.0] * 13,
-    _FAR,
-    _FAR,
-)
+FRESH = np.zeros((), STATE)
 """State before the first sample; what has not begun is infinitely far."""
+FRESH["eased"] = 1.0
+for _name in ("age", "span", "began"):
+    FRESH[_name] = -math.inf
+for _name in ("start", "dipped", "forces", "loads"):
+    FRESH[_name] = math.inf
 
 LOAD_TIME = 0.3
 """Time in which the largest load of late fades from the grip [s]."""
@@ -245,9 +248,15 @@ def _median(row, count):
 
 
 @kernel
+def _repeats(c):
+    """Return the number of times in a row for which a component of the slip velocity has been the same."""
+    return max(c.same[0], max(c.same[1], c.same[2]))
+
+
+@kernel
 def _speed(c, e):
     """Return the size of the last slip velocity at the rim of the contact, 0 of one that repeats itself."""
-    if max(c.same[0], max(c.same[1], c.same[2])) >= REPEATS:
+    if _repeats(c) >= REPEATS:
         return 0.0
     return math.hypot(
         math.hypot(c.velocity[0], c.velocity[1]), e.radius * c.velocity[2]
@@ -289,10 +298,9 @@ def _follow(c, e, least_load, quantum, turns, keeps):
         c.pressed = grown if c.pressed > 0.0 else e.normal_force
     needed = e.gauge * c.pressed
     lacks = needed < keeps * c.usual and _speed(c, e) < FAST * quantum
-    repeats = max(c.same[0], max(c.same[1], c.same[2])) >= FROZEN
     bears = (
         e.seen > 0
-        and not (frozen or lacks or repeats)
+        and not (frozen or lacks or _repeats(c) >= FROZEN)
         and (c.age < SETTLED or c.pulls >= HALF * c.weighed)
     )
     c.mute = 0.0 if bears else c.mute + dt
@@ -301,18 +309,16 @@ def _follow(c, e, least_load, quantum, turns, keeps):
     c.age = max(c.age, 0.0) + dt
     c.span += dt
     v = e.velocity
-    c.quiet = c.quiet + dt
-    if dt > 0.0 and xp.in_range(v[0]) and xp.in_range(v[1]) and xp.in_range(v[2]):
-        same = 0.0
+    c.quiet += dt
+    if dt > 0.0 and known(v):
         for i in range(3):
             c.slid[i] += v[i] * c.span if c.span >= 0.0 else 0.0
             c.same[i] = (
                 c.same[i] + 1.0 if v[i] == c.velocity[i] and v[i] != 0.0 else 0.0
             )
-            same = max(same, c.same[i])
             c.velocity[i] = v[i]
         along = -(e.wrench[0] * v[0] + e.wrench[1] * v[1] + turn * e.radius * v[2])
-        if along >= COUNTED * quantum * size and size > 0.0 and same < REPEATS:
+        if along >= COUNTED * quantum * size and size > 0.0 and _repeats(c) < REPEATS:
             c.quiet = 0.0
         c.span = 0.0
     if c.age < SETTLED and bears:  # one wrong sample is not the grip, nor the load
@@ -361,7 +367,7 @@ def _unsure(c, e, dt, silence, seeks, lost):
 
 @kernel
 def _begin(c, value, most):
-    """Return the grip from which it first falls: the last `value` before the filters have settled."""
+    """Return the grip [N] from which a controller first lowers it: the last `value` before the filters have settled."""
     if c.start > LARGEST or c.age < SETTLED:
         c.start = value
     return min(c.start, most)
@@ -371,7 +377,7 @@ def _begin(c, value, most):
 def _set(c, asked, most):
     """Set the grip that is asked for; before the filters have settled and a slip velocity may have come, leave it.
 
-    It does not fall while wrench or load are missing, or a slip velocity is overdue.
+    The grip does not fall while wrench or load are missing, or a slip velocity is overdue.
     """
     asked = max(asked, c.grip) if c.mute > 0.0 or c.silent == OVERDUE else asked
     ready = c.age >= SETTLED and (c.span >= 0.0 or c.age >= PAUSE)

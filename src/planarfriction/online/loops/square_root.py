@@ -1,6 +1,7 @@
-"""Steps of a square-root Kalman filter: unknowns x and the lower triangular root S of their covariance `S S'`."""
+"""Steps of a square-root Kalman filter: unknowns `x` and the lower triangular `root` S of their covariance `S S'`.
 
-from __future__ import annotations
+Both are fields of a record s, as those of `planarfriction.online.loops.filter_state.STATE`.
+"""
 
 import math
 
@@ -9,9 +10,6 @@ from planarfriction._engine.compiler import kernel
 
 N = 12
 """Number of unknowns."""
-
-ROOT = N
-"""Place of the root in a state, row by row, after x."""
 
 
 @kernel
@@ -25,18 +23,18 @@ def measure(s, h, innovation, variance, column):
     for j in range(N - 1, -1, -1):
         v = 0.0
         for i in range(j, N):
-            v += s[ROOT + N * i + j] * h[i]
+            v += s.root[i, j] * h[i]
         size = math.sqrt(corner * corner + v * v)
         cosine = corner / size
         sine = v / size
         corner = size
         for i in range(j, N):
             a = column[i]
-            b = s[ROOT + N * i + j]
+            b = s.root[i, j]
             column[i] = cosine * a + sine * b
-            s[ROOT + N * i + j] = cosine * b - sine * a
+            s.root[i, j] = cosine * b - sine * a
     for i in range(N):
-        s[i] += column[i] * innovation / corner
+        s.x[i] += column[i] * innovation / corner
     return innovation / corner
 
 
@@ -44,16 +42,16 @@ def measure(s, h, innovation, variance, column):
 def _take_in(s, first, column):
     """Rotate a column, zero above its row `first`, into the root: the covariance grows by its outer product."""
     for j in range(first, N):
-        a = s[ROOT + N * j + j]
+        a = s.root[j, j]
         b = column[j]
         size = math.sqrt(a * a + b * b)
         if size > 0.0:
             cosine = a / size
             sine = b / size
             for k in range(j, N):
-                a = s[ROOT + N * k + j]
+                a = s.root[k, j]
                 b = column[k]
-                s[ROOT + N * k + j] = cosine * a + sine * b
+                s.root[k, j] = cosine * a + sine * b
                 column[k] = cosine * b - sine * a
 
 
@@ -69,13 +67,13 @@ def spread(s, i, variance, column):
 def reset(s, i, value, deviation, column):
     """Forget unknown i: a value with a standard deviation, independent of all others."""
     for k in range(N):
-        column[k] = s[ROOT + N * k + i] if k > i else 0.0
+        column[k] = s.root[k, i] if k > i else 0.0
     for j in range(i + 1):
-        s[ROOT + N * i + j] = 0.0
+        s.root[i, j] = 0.0
     for k in range(i + 1, N):
-        s[ROOT + N * k + i] = 0.0
-    s[i] = value
-    s[ROOT + N * i + i] = deviation
+        s.root[k, i] = 0.0
+    s.x[i] = value
+    s.root[i, i] = deviation
     _take_in(s, i + 1, column)  # what the others had in that column goes on
 
 
@@ -84,6 +82,6 @@ def variance_of(s, i, k):
     """Return the variance of the sum of unknowns i and k, or of i alone if they are one."""
     total = 0.0
     for j in range(N):
-        each = s[ROOT + N * i + j] + (s[ROOT + N * k + j] if k != i else 0.0)
+        each = s.root[i, j] + (s.root[k, j] if k != i else 0.0)
         total += each * each
     return total

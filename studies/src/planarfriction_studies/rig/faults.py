@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy
-from planarfriction.online.observer import FrictionObserver
-from planarfriction.online.sensors import Measurement
+from planarfriction.online.observer import FrictionObserver, Measurement
 from planarfriction_studies.rig.gripper import DT, Gripper
 from planarfriction_studies.rig.trials import KINDS, known_model, random_parts
 

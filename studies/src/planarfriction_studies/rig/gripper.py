@@ -15,7 +15,7 @@ from planarfriction.coupling import CoupledPatches, HostStep
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel
-from planarfriction.online.sensors import GRAVITY, Measurement, Sensors
+from planarfriction.online.observer import GRAVITY, Measurement, Sensors
 from planarfriction.patch import ContactPatch, SoftFinger
 
 DT = 1e-3

@@ -13,8 +13,7 @@ from planarfriction.laws import LuGre
 from planarfriction.models import ReducedModel
 from planarfriction.online.controllers import Hinge, Hold, SlideBy, TurnBy
 from planarfriction.online.loops import grips
-from planarfriction.online.observer import FrictionObserver
-from planarfriction.online.sensors import GRAVITY, Measurement
+from planarfriction.online.observer import GRAVITY, FrictionObserver, Measurement
 from planarfriction.patch import ContactPatch, SoftFinger
 from planarfriction_studies.rig.baselines import (
     LINEAR_RULE,
