@@ -123,6 +123,9 @@ SMALL = 1e-4
 """Change of a velocity for central differences: their error is a millionth of it, rounding is a millionth too."""
 
 
+STEPS = 380
+
+
 class Discs(NamedTuple):
     m: object
     patches: list
@@ -134,24 +137,20 @@ class Discs(NamedTuple):
 
 @pytest.fixture(scope="module")
 def discs():
-    """From the three starts to rest, and from a little more and less speed and spin than those of the first."""
+    """From the three starts to rest, which the last of them reaches after 340 steps."""
     m, settled, patches = made(disc(*STARTS[0]))
     for _ in range(300):
         mujoco.mj_step(m, settled)
-    v, w = STARTS[0]
-    data = []
-    for speed, spin in (
-        *STARTS,
-        (v + SMALL, w),
-        (v - SMALL, w),
-        (v, w + SMALL),
-        (v, w - SMALL),
-    ):
-        each = copy.copy(settled)
-        each.qvel[:] = speed, 0.0, 0.0, spin
-        data.append(each)
+    data = [started(settled, *start) for start in STARTS]
     friction = Friction(m, patches)
-    return Discs(m, patches, data, friction, *rolled(friction, m, data, 600))
+    return Discs(m, patches, data, friction, *rolled(friction, m, data, STEPS))
+
+
+def started(data, speed, spin):
+    """Return a copy of data with a speed and a spin."""
+    copied = copy.copy(data)
+    copied.qvel[:] = speed, 0.0, 0.0, spin
+    return copied
 
 
 @pytest.mark.parametrize("e", range(3))
@@ -169,11 +168,11 @@ def test_a_disc_slides_and_spins_to_rest_where_theory_says(discs, e):
 def test_environments_do_what_mujoco_does(discs):
     d = copy.copy(discs.data[0])
     friction = adapter.Friction(discs.m, discs.patches)
-    for i in range(1, 601):
+    for i in range(1, STEPS + 1):
         friction.step(d)
-        # both solve to 1e-9 m/s a step, and what is left of that adds up over 600 steps of 2 ms
+        # both solve to 1e-9 m/s a step, and what is left of that adds up over all steps of 2 ms
         np.testing.assert_allclose(
-            discs.path[i, 0], d.qpos, atol=600 * DT * 1e-9 + 1e-9
+            discs.path[i, 0], d.qpos, atol=STEPS * DT * 1e-9 + 1e-9
         )
     ours = discs.friction
     theirs = friction
@@ -250,8 +249,11 @@ def test_gradients_of_a_roll_out_are_differences(discs):
 
     slopes = jax.jit(jax.grad(end))(jnp.array(STARTS[0]))
     weight = np.array([1.0, 0.0, 0.0, 0.1])
-    at = discs.path[steps] @ weight
-    differences = (at[[3, 5]] - at[[4, 6]]) / (2.0 * SMALL)
+    v, w = STARTS[0]
+    starts = (v + SMALL, w), (v - SMALL, w), (v, w + SMALL), (v, w - SMALL)
+    data = [started(discs.data[0], *start) for start in starts]
+    at = rolled(discs.friction, discs.m, data, steps)[1][steps] @ weight
+    differences = (at[::2] - at[1::2]) / (2.0 * SMALL)
     np.testing.assert_allclose(slopes, differences, rtol=1e-5)
 
 
