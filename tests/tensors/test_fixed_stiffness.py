@@ -5,7 +5,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from tests.tensors.test_discs import DT, assert_close, front, patch, samples  # noqa: F401
+from tests.tensors.test_discs import DT, assert_close, patch, samples
 
 REFERENCE = 1.5
 LAWS = {
@@ -29,7 +29,7 @@ LAWS = {
         "leaning discs",
     ],
 )
-def test_values_are_those_of_numpy(front, kind, law):  # noqa: F811
+def test_values_are_those_of_numpy(front, kind, law):
     model = pf.DistributedModel(patch(kind), LAWS[law])
     ours = front.model(patch(kind), LAWS[law])
     z, v, f = samples(model.state_shape)
@@ -43,9 +43,9 @@ def test_values_are_those_of_numpy(front, kind, law):  # noqa: F811
 
 @pytest.mark.parametrize(
     ("kind", "method"),
-    [("points", "eager"), ("points", "adjoint"), ("leaning discs", "adjoint")],
+    [("points", "eager"), ("leaning discs", "adjoint")],
 )
-def test_rollouts_are_steps_of_numpy_whose_slopes_are_differences(front, kind, method):  # noqa: F811
+def test_rollouts_are_steps_of_numpy_whose_slopes_are_differences(front, kind, method):
     law = LAWS["elasto-plastic"]
     model = pf.DistributedModel(patch(kind), law)
     ours = front.model(patch(kind), law)
@@ -83,8 +83,8 @@ def test_rollouts_are_steps_of_numpy_whose_slopes_are_differences(front, kind, m
         assert abs((front.plain(slope)[0] * step).sum() / (more - less) - 1.0) < 1e-6
 
 
-@pytest.mark.parametrize("single", [False, True])
-def test_without_load_slopes_are_zero_and_at_rest_they_are_finite(front, single):  # noqa: F811
+@pytest.mark.parametrize("single", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_without_load_slopes_are_zero_and_at_rest_they_are_finite(front, single):
     model = front.model(patch("discs"), LAWS["elasto-plastic"], single=single)
     z, v, f = samples(model.state_shape)
     f[:20:2] = 0.0
@@ -95,7 +95,7 @@ def test_without_load_slopes_are_zero_and_at_rest_they_are_finite(front, single)
     assert not any(each[f == 0.0].any() for each in found[:5])
 
 
-def test_a_fixed_stiffness_is_part_of_the_model(front):  # noqa: F811
+def test_a_fixed_stiffness_is_part_of_the_model(front):
     law = LAWS["elasto-plastic"]
     model = front.model(patch("points"), law)
     (z, v, f) = samples((2, 30))

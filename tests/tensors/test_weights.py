@@ -7,11 +7,10 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from tests.tensors.test_discs import DT, LAWS, front, patch  # noqa: F401
+from tests.tensors.test_discs import DT, LAWS, patch
 
 LAW = LAWS["elasto-plastic"]
 CASES = {
-    "points": ("points", LAW),
     "leaning discs": ("leaning discs", LAW),
     "fixed stiffness": ("turned discs", dataclasses.replace(LAW, reference_load=1.5)),
 }
@@ -25,7 +24,7 @@ def motion():
     return twists, loads, rng.normal(size=(3, 12, 3)) * [1.0, 1.0, 300.0]
 
 
-def power(front, model, twists, loads, bars, method):  # noqa: F811
+def power(front, model, twists, loads, bars, method):
     """A function of numbers of the weights: raw ones in PyTorch, weights in JAX."""
 
     def of(numbers):
@@ -58,7 +57,7 @@ def power(front, model, twists, loads, bars, method):  # noqa: F811
     return of
 
 
-def weighed(front, kind, law):  # noqa: F811
+def weighed(front, kind, law):
     options = (
         {"trainable": ("mu_c", "mu_s", "weights")} if front.name == "torch" else {}
     )
@@ -69,7 +68,7 @@ def weighed(front, kind, law):  # noqa: F811
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_gradients_to_weights_are_those_of_recorded_steps(front, case):  # noqa: F811
+def test_gradients_to_weights_are_those_of_recorded_steps(front, case):
     model, numbers = weighed(front, *CASES[case])
     at = front.arrays(*motion())
     grad = front.library.func.grad if front.name == "torch" else front.library.grad
@@ -84,7 +83,7 @@ def test_gradients_to_weights_are_those_of_recorded_steps(front, case):  # noqa:
     assert np.abs(wanted).max() > 1e-3
 
 
-def test_every_contact_may_have_weights_of_its_own(front):  # noqa: F811
+def test_every_contact_may_have_weights_of_its_own(front):
     model, numbers = weighed(front, "points", LAW)
     func = front.library.func if front.name == "torch" else front.library
     of = power(front, model, *front.arrays(*motion()), "adjoint")
@@ -108,7 +107,7 @@ def test_every_contact_may_have_weights_of_its_own(front):  # noqa: F811
     )
 
 
-def test_trained_weights_are_a_patch_again(front):  # noqa: F811
+def test_trained_weights_are_a_patch_again(front):
     whole = pf.ContactPatch.disc(0.01, cells=7)
     (twists, loads, _) = motion()
     for name, options in (("DistributedModel", {}), ("ReducedModel", {"cells": 9})):
