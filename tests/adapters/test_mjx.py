@@ -193,15 +193,29 @@ def test_the_lever_arm_of_a_patch_counts_the_radii_of_its_discs():
     )
 
 
+BALL = """<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type="plane" size="9 9 .1"/>
+    <body name="ball" pos="0 0 0.00998"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
+    <joint type="hinge" axis="0 0 1"/><geom name="ball" type="sphere" size="0.01" mass="0.2"/>
+    <site name="ball" pos="0 0 -0.01"/></body></worldbody></mujoco>"""
+"""Slides and spins on a patch; small, as it takes long to compile."""
+
+
+def ball(law):
+    """Return model and patches of the ball."""
+    face = pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law)
+    patches = [PatchContact(face, "ball", ("floor", "ball"))]
+    spec = mujoco.MjSpec.from_string(BALL)
+    prepare(spec, patches)
+    return spec.compile(), patches
+
+
 def test_a_stiffness_that_ignores_the_load_does_what_it_does_in_mujoco():
     law = pf.LuGre(
         mu_c=0.4, mu_s=0.5, sigma_0=1e5, elasto_plastic=0.9, reference_load=1.5
     )
-    scene = disc(0.05, 1.0)
-    m, d, patches = made(
-        scene, pf.DistributedModel(pf.ContactPatch.disc(radius=0.05, cells=5), law)
-    )
-    d.qvel[:] = scene.start
+    m, patches = ball(law)
+    d = mujoco.MjData(m)
+    d.qvel[:] = 0.05, 0.0, 1.0
     friction = Friction(m, patches)
     theirs = adapter.Friction(m, patches)
     end, path = rolled(friction, m, [d], 100)
@@ -257,27 +271,11 @@ def test_gradients_of_a_roll_out_are_differences(discs):
     np.testing.assert_allclose(slopes, differences, rtol=1e-5)
 
 
-BALL = """<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type="plane" size="9 9 .1"/>
-    <body name="ball" pos="0 0 0.00998"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>
-    <joint type="hinge" axis="0 0 1"/><geom name="ball" type="sphere" size="0.01" mass="0.2"/>
-    <site name="ball" pos="0 0 -0.01"/></body></worldbody></mujoco>"""
-"""Slides and spins on a patch; small, as derivatives take long to compile."""
-
-
 @pytest.mark.slow
 def test_gradients_are_differences_by_velocity_and_friction():
     """Backwards through MJX's solver, whose loop has no derivative, and through the step of the patches."""
     law = pf.LuGre(mu_s=0.5, mu_c=0.3, v_s=0.1, sigma_0=1e5, elasto_plastic=0.9)
-    patches = [
-        PatchContact(
-            pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law),
-            "ball",
-            ("floor", "ball"),
-        )
-    ]
-    spec = mujoco.MjSpec.from_string(BALL)
-    prepare(spec, patches)
-    m = spec.compile()
+    m, patches = ball(law)
     d = mjx.put_data(m, mujoco.MjData(m))
     mx = mjx.put_model(m)
     friction = Friction(m, patches)
@@ -424,7 +422,11 @@ def compare_with_compiled(seed, kinds, steps, bodies, reference_load=None):
     assert rounds / both < 0.2
 
 
-@pytest.mark.parametrize("reference_load", [None, 1.5])
+BY_LOAD = [pytest.param(None, marks=pytest.mark.slow), 1.5]
+"""Loads at which a stiffness holds; without one the discs above take the same steps."""
+
+
+@pytest.mark.parametrize("reference_load", BY_LOAD)
 def test_the_step_in_contact_space_is_the_compiled_one(reference_load):
     compare_with_compiled(1, (pf.DistributedModel,), 40, 64, reference_load)
 
@@ -435,7 +437,7 @@ def test_the_step_in_contact_space_is_the_compiled_one_for_all_models(kind):
     compare_with_compiled(3, (kind,), 100, 64)
 
 
-@pytest.mark.parametrize("reference_load", [None, 1.5])
+@pytest.mark.parametrize("reference_load", BY_LOAD)
 def test_derivatives_of_the_step_in_contact_space_are_differences(reference_load):
     """A patch slides and spins under a changing load: derivatives to the host's numbers and to friction."""
     law = pf.LuGre(mu_s=1.2, reference_load=reference_load)
