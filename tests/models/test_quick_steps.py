@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
@@ -77,18 +78,6 @@ def test_derivatives_are_differences_of_steps(name, load):
     np.testing.assert_allclose(found.wrench_load, small, rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_derivatives_of_a_batch_are_those_of_its_members(name):
-    model = MODELS[name]
-    states = _states(model)
-    many = model.step_jacobians(states, TWISTS, LOADS, 1e-3)
-    for b in range(4):
-        one = model.step_jacobians(states[b], TWISTS[b], float(LOADS[b]), 1e-3)
-        assert all(
-            np.array_equal(all_[b], own) for all_, own in zip(many, one, strict=True)
-        )
-
-
 WRONG = {
     "NaN in a state": ({"state": np.full((4, 3), np.nan)}, "state must be finite"),
     "a twist beyond all range": (
@@ -117,22 +106,20 @@ def test_what_is_not_in_order_is_refused(name):
         "dt": 1e-3,
         **wrong,
     }
-    with pytest.raises(pf.errors.InvalidValueError, match=message):
+    with refused(message):
         model.step(**given)
     one = {
         key: value[0] if isinstance(value, np.ndarray) else value
         for key, value in given.items()
     }
     if name != "loads for three":
-        with pytest.raises(pf.errors.InvalidValueError, match=message):
+        with refused(message):
             model.step_jacobians(**{**one, "normal_force": _plain(one["normal_force"])})
 
 
 @pytest.mark.parametrize("twist", [np.array(0.0), np.zeros((1, 3, 1))])
 def test_twists_of_other_axes_are_one_clear_line(twist):
-    with pytest.raises(
-        pf.errors.InvalidValueError, match=r"^twist must have shape \[..., 3\]"
-    ):
+    with refused(r"^twist must have shape \[..., 3\]"):
         MODELS["published"].step(np.zeros((1, 3)), twist, 1.0, 1e-3)
 
 

@@ -5,12 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel, ReducedModel
 from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
 from planarfriction.scenes.start import first_slopes, first_states
+from tests.support.refusals import refused
 
 ONE = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
 _GRID = ContactPatch.disc(0.02, cells=4)
@@ -89,9 +89,10 @@ def _explicit(model, body, load, pull, t_end, steps):
 
 
 @pytest.mark.parametrize(
-    "patch", [ONE, DISCS, LEANING], ids=["points", "discs", "leaning discs"]
+    "patch, ratio",
+    [(ONE, 0.8), (DISCS, None), (LEANING, 0.8)],
+    ids=["points", "discs", "leaning discs"],
 )
-@pytest.mark.parametrize("ratio", [None, 0.8])
 def test_the_solver_agrees_with_a_fine_explicit_integration(patch, ratio):
     """The load falls below what the bristles hold, again and again."""
     law = LuGre(
@@ -243,8 +244,7 @@ def test_a_pressure_that_follows_the_load_refuses():
         mounted_on="body",
         pressure="follows",
     )
-    with pytest.raises(
-        InvalidValueError,
-        match="law must have no reference_load for a pressure that follows the load",
+    with refused(
+        "law must have no reference_load for a pressure that follows the load"
     ):
         simulate(Scene(_body(), contact, 0.01))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 LAWS = {
     "plain": pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7),
@@ -170,5 +171,5 @@ def test_a_patch_that_depends_on_its_load_keeps_the_discs_of_one(front):
     found = ours.step(*front.arrays(z[20], v[20], 2.0), DT)
     for got, want in zip(found, model.step(z[20], v[20], 2.0, DT), strict=True):
         assert_close(front.plain(got), want, 1e-12)
-    with pytest.raises(pf.FrictionError, match="normal_force must be"):
+    with refused("normal_force must be", pf.FrictionError):
         front.model(soft, LAWS["plain"], "ReducedModel")

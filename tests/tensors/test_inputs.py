@@ -6,6 +6,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from tests.support.front_ends import Jax
+from tests.support.refusals import refused
 
 PATCH = pf.ContactPatch.points(
     [(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0]
@@ -121,7 +122,7 @@ def test_batches_that_do_not_match(front, kind):
         twist=front.array(np.zeros((4, 3))),
         normal_force=front.array(np.ones(5)),
     )
-    with pytest.raises(InvalidValueError, match="batch axes must broadcast"):
+    with refused("batch axes must broadcast"):
         model.step(**given)
 
 
@@ -215,10 +216,7 @@ def test_nan_in_traced_values_stays_and_spoils_no_other_contact(kind, method, na
 def test_parameters_are_as_many_as_their_names(front):
     model = made(front, "DistributedModel")
     assert model.names[0] == "sigma_0" and len(model.names) == 8
-    with pytest.raises(
-        InvalidValueError,
-        match=r"parameters must have shape \[..., 8\] \(sigma_0, .*got shape \[3\]",
-    ):
+    with refused(r"parameters must have shape \[..., 8\] \(sigma_0, .*got shape \[3\]"):
         model.rate(**{name: value for name, value in arguments(front, model).items() if name != "dt"},
                    parameters=front.array([1.0, 2.0, 3.0]))  # fmt: skip
 

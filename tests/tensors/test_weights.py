@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.errors import InvalidValueError
+from tests.support.refusals import refused
 from tests.tensors.test_discs import DT, LAWS, patch
 
 LAW = LAWS["elasto-plastic"]
 CASES = {
     "leaning discs": ("leaning discs", LAW),
-    "fixed stiffness": ("turned discs", dataclasses.replace(LAW, reference_load=1.5)),
+    "fixed stiffness": ("points", dataclasses.replace(LAW, reference_load=1.5)),
 }
 
 
@@ -127,7 +127,5 @@ def test_trained_weights_are_a_patch_again(front):
         np.testing.assert_allclose(
             front.plain(run.wrenches), wanted, rtol=1e-9, atol=1e-9
         )
-    with pytest.raises(
-        InvalidValueError, match="patch must have the 9 cells of the model, got 4"
-    ):
+    with refused("patch must have the 9 cells of the model, got 4"):
         ours.weighted(pf.ContactPatch.rectangle(0.01, 0.01, (2, 2)))
