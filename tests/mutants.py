@@ -31,8 +31,8 @@ SWAPS = {
     ast.Eq: ("==", "!="), ast.NotEq: ("!=", "=="), ast.And: ("and", "or"), ast.Or: ("or", "and"),
 }  # fmt: skip
 MIRRORS = {
-    "_engine/codegen": "_engine/test_derivatives.py _engine/test_rewriting.py _engine/test_steps.py export/test_trace.py"
-    " test_formulas.py test_golden.py export/test_c_library.py",
+    "_engine/codegen": "_engine/test_derivatives.py _engine/test_rewriting.py _engine/test_steps.py"
+    " export/test_trace.py test_formulas.py test_golden.py export/test_c_library.py",
     "_engine/bristles": "_engine/test_steps.py test_formulas.py models/test_rates.py models/test_steps.py"
     " models/test_fixed_stiffness.py models/test_energy.py laws test_golden.py",
     "_engine/cells": "_engine/test_cell_blocks.py _engine/test_discs.py models/test_batches.py models/test_rates.py"

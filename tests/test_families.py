@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -249,9 +250,8 @@ def test_laws_by_kind(tmp_path, table, law):
     ],
 )
 def test_wrong_kinds_get_one_line_with_all_names(tmp_path, contact, message):
-    with pytest.raises(FileError) as caught:
+    with refused(re.escape(message), FileError):
         read(tmp_path, contact)
-    assert message in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", families.SURFACES)

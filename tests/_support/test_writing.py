@@ -156,11 +156,8 @@ def test_a_disk_that_fails_late_leaves_the_old_file(tmp_path, monkeypatch, call)
     monkeypatch.setattr(os, "fsync", full) if call == "fsync" else monkeypatch.setattr(
         os, "replace", full
     )
-    with pytest.raises(
-        FrictionError, match=r"run.nc: cannot be written: No space left on device"
-    ) as caught:
+    with refused(r"run.nc: cannot be written: No space left on device", FrictionError):
         write_text(target, "new")
-    assert "\n" not in str(caught.value)
     assert target.read_bytes() == OLD
     assert names(tmp_path) == ["run.nc"]
 

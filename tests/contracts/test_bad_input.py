@@ -708,9 +708,8 @@ BODY = pf.Body(mass=0.2, inertia=1e-4)
     ],
 )
 def test_a_first_mistake_gets_a_line_that_says_what_is_wanted(mistake, line):
-    with pytest.raises(InvalidValueError, match=f"^{line}") as raised:
+    with refused(f"^{line}"):
         mistake()
-    assert "\n" not in str(raised.value)
 
 
 def test_python_can_ask_which_name_was_meant():

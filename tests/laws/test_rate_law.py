@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction._engine.cells.rate_law import fingerprint
 from planarfriction.derivatives import scene_gradient, scene_sensitivities
-from planarfriction.errors import InvalidValueError
 from planarfriction.laws.rate_law import norm, plus
 from planarfriction.patch import friction_metric
 from planarfriction.scenes import SolverOptions
@@ -342,12 +341,8 @@ def test_wrong_laws_are_refused_in_one_line():
         (Misspelt, "no attribute 'largest'"),
         (Joined, r"too many values to unpack \(expected 2\)"),
     ]:
-        with pytest.raises(
-            InvalidValueError,
-            match=rf"^law must be a formula \(.*{words}.*\), got {wrong.__name__}$",
-        ) as caught:
+        with refused(rf"^law must be a formula \(.*{words}.*\), got {wrong.__name__}$"):
             wrong()
-        assert "\n" not in str(caught.value)
     with refused("mu must be a number"):
         BoucWen(mu=True)
     with refused("largest_deflection must be"):

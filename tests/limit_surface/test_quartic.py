@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import planarfriction as pf
 from planarfriction._engine.published import surfaces as kernels
-from planarfriction.errors import InvalidValueError, MissingExtraError
+from planarfriction.errors import MissingExtraError
 from planarfriction.limit_surface import quartic as quartic_fit
 from planarfriction.patch import PUBLISHED_PATCHES
 from tests.support.refusals import refused
@@ -356,9 +356,8 @@ def test_stored_for_compiled_models():
     ],
 )
 def test_errors_are_one_line(act, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         act()
-    assert "\n" not in str(caught.value)
 
 
 def test_without_cvxpy(monkeypatch):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.errors import InvalidValueError
 from tests.support.refusals import refused
 
 FEET = pf.ContactPatch.points(
@@ -52,9 +51,8 @@ def test_wrong_input_gets_one_line(model, arguments, message):
         model.jacobians,
         lambda *a: model.step(*a, 1e-3),
     ):
-        with pytest.raises(InvalidValueError, match=message) as caught:
+        with refused(message):
             call(*arguments)
-        assert "\n" not in str(caught.value)
 
 
 @every_model

@@ -8,7 +8,6 @@ from numba.core.dispatcher import Dispatcher
 
 import planarfriction as pf
 from planarfriction import derivatives
-from planarfriction.errors import InvalidValueError
 from tests.support.refusals import refused
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
@@ -196,9 +195,8 @@ TWISTS = {
 def test_what_is_no_twist_is_refused(model, kind):
     for call in calls(model):
         before = compiled()
-        with pytest.raises(InvalidValueError, match="twist must") as caught:
+        with refused("twist must"):
             call(model.rest(), TWISTS[kind])
-        assert "\n" not in str(caught.value)
         assert compiled() == before
 
 

@@ -164,9 +164,8 @@ def test_black_and_white_image_is_a_mask(tmp_path):
     ],
 )
 def test_broken_arrays(values, cell_size, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         pf.ContactPatch.from_pressure(values, cell_size)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(

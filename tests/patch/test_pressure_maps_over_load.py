@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planarfriction as pf
-from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.errors import FrictionError
 from planarfriction.patch import shared
 from tests.support.refusals import refused
 
@@ -169,9 +169,8 @@ def test_scene_files(tmp_path):
     ],
 )
 def test_broken_maps(maps, loads, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         pf.ContactPatch.from_pressure(maps, 0.001, loads=loads)
-    assert "\n" not in str(caught.value)
 
 
 def test_maps_for_other_cells_are_refused():

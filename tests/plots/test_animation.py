@@ -794,9 +794,8 @@ def test_what_cannot_be_animated_is_named_in_one_line(
     arguments, message, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises((FileError, InvalidValueError), match=message) as caught:
+    with refused(message, (FileError, InvalidValueError)):
         synthetic.solution().animate(**{"path": "motion.gif", **arguments})
-    assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -860,11 +860,8 @@ def test_axes_of_three_dimensions_are_refused_in_the_plane():
         lambda: plots.plot_patch(pf.ContactPatch.disc(0.01), ax=space),
     ]
     for call in calls:
-        with pytest.raises(
-            pf.FrictionError, match="must be those of a plane"
-        ) as caught:
+        with refused("must be those of a plane", pf.FrictionError):
             call()
-        assert "\n" not in str(caught.value)
     flat = style.new_figure(3.0, 3.0).add_subplot()
     with refused("ax must have three dimensions", pf.FrictionError):
         plots.plot_limit_surface(

@@ -7,7 +7,7 @@ import pytest
 from scipy import integrate
 
 import planarfriction as pf
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import FileError
 from planarfriction.scenes import driven, in_hand
 from tests.support.anisotropic import (
     GRAIN,
@@ -179,9 +179,8 @@ def test_dropped_cells_take_their_metric_along():
     ],
 )
 def test_wrong_metrics_get_one_line(metric, asymmetry, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         PLAIN.with_friction_metric(metric, asymmetry)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -199,6 +198,5 @@ def test_wrong_metrics_get_one_line(metric, asymmetry, message):
     ],
 )
 def test_what_knows_only_isotropic_friction_refuses(make):
-    with pytest.raises(InvalidValueError, match="must") as caught:
+    with refused("must"):
         make()
-    assert "\n" not in str(caught.value)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -460,10 +461,8 @@ def test_files_of_the_wrong_kind_get_one_line(tmp_path):
     for name, content in cases.items():
         if content is not None:
             (tmp_path / name).write_bytes(content)
-        with pytest.raises(FrictionError) as caught:
+        with refused(re.escape(name), FrictionError):
             Scene.from_file(tmp_path / name)
-        assert name in str(caught.value)
-        assert "\n" not in str(caught.value)
     with refused("is a folder", FrictionError):
         (tmp_path / "folder.toml").mkdir()
         Scene.from_file(tmp_path / "folder.toml")

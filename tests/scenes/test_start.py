@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import FileError
 from planarfriction.scenes.start import contact_map, first_states
 from tests.support.refusals import refused
 
@@ -104,11 +104,8 @@ def test_where_nothing_holds_the_body_one_line_says_so():
     scene = pf.scenes.in_hand(
         MODELS[0], centre_of_mass=(0.0, 0.0), normal_force=0.6 * WEIGHT / 2, t_end=0.1
     )
-    with pytest.raises(
-        InvalidValueError, match=r"start must be .*they hold 60 % of the load at most"
-    ) as error:
+    with refused(r"start must be .*they hold 60 % of the load at most"):
         pf.simulate(dataclasses.replace(scene, start="equilibrium"))
-    assert "\n" not in str(error.value)
     with refused("do not hold the body"):
         pf.simulate(held(MODELS[0], load=0.0))
     with refused("law that creeps"):

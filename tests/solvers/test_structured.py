@@ -1,6 +1,7 @@
 """The structured solver: its linear algebra, order, stops, dense output, statistics and outcomes."""
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -448,10 +449,8 @@ def test_an_interruption_before_the_first_sample_keeps_nothing(monkeypatch):
     ],
 )
 def test_bad_options_get_one_clear_line(options, message):
-    with pytest.raises(pf.FrictionError) as caught:
+    with refused(re.escape(message), pf.FrictionError):
         pf.simulate(smooth_scene(), **options)
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_results_are_reproducible():

@@ -230,11 +230,8 @@ def test_runs_of_a_nameless_measurement_are_not_kept(tmp_path):
         return lambda solution: float(solution.histories["y"].values[-1] < limit)
 
     for nameless in (near(1.0), functools.partial(end), lambda solution: 1.0):
-        with pytest.raises(
-            pf.FrictionError, match="measure must be a function with a name"
-        ) as caught:
+        with refused("measure must be a function with a name", pf.FrictionError):
             pf.sweep(grip, {"grip": [1.0]}, out=tmp_path, measure=nameless)
-        assert "\n" not in str(caught.value)
     assert pf.sweep(
         grip, {"grip": [1.0]}, measure=near(1.0)
     ).measured.values.tolist() == [1.0]

@@ -296,9 +296,8 @@ def test_weights_stay_a_pressure_distribution():
     ],
 )
 def test_wrong_input_is_one_line(make, message):
-    with pytest.raises(pf.FrictionError, match=message) as caught:
+    with refused(message, pf.FrictionError):
         make()
-    assert "\n" not in str(caught.value)
 
 
 def test_state_dicts_travel():

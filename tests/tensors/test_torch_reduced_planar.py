@@ -256,9 +256,8 @@ def test_rollouts_take_the_compiled_adjoint(monkeypatch):
     ],
 )
 def test_numbers_out_of_range_are_one_line(numbers, message):
-    with pytest.raises(pf.FrictionError, match=message) as caught:
+    with refused(message, pf.FrictionError):
         build(**numbers)
-    assert "\n" not in str(caught.value)
 
 
 def test_smoke_test_prints_one_line_and_sees_a_torque_without_its_radius(

@@ -323,9 +323,8 @@ def test_wrong_input_is_one_line(change, message):
         "normal_force": 1.0,
         "dt": DT,
     }
-    with pytest.raises(pf.FrictionError, match=message) as caught:
+    with refused(message, pf.FrictionError):
         rollout(**{**given, **change})
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_package_names_its_extra(monkeypatch):
