@@ -31,8 +31,8 @@ class Torch:
     def plain(self, array):
         return array.detach().numpy()
 
-    def slope(self, function, value):
-        return self.library.func.grad(function)(self.array(value))
+    def grad(self, function):
+        return self.library.func.grad(function)
 
     def slopes(self, function, *values):
         """Return derivatives of `function(z, v, f)` for a batch, by all three."""
@@ -75,8 +75,9 @@ class Jax:
     def plain(self, array):
         return np.asarray(array)
 
-    def slope(self, function, value):
-        return self.library.grad(function)(self.array(value))
+    def grad(self, function):
+        """Return the gradient as one program, not operation by operation."""
+        return self.library.jit(self.library.grad(function))
 
     def slopes(self, function, *values):
         """Return derivatives of `function(z, v, f)` for a batch, by all three."""

@@ -71,9 +71,8 @@ def weighed(front, kind, law):
 def test_gradients_to_weights_are_those_of_recorded_steps(front, case):
     model, numbers = weighed(front, *CASES[case])
     at = front.arrays(*motion())
-    grad = front.library.func.grad if front.name == "torch" else front.library.grad
     compiled, recorded = (
-        grad(power(front, model, *at, method))(numbers)
+        front.grad(power(front, model, *at, method))(numbers)
         for method in ("adjoint", "eager")
     )
     wanted = front.plain(recorded)
