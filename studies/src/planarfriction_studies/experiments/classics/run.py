@@ -65,7 +65,7 @@ def run(work: Work) -> Result:
     )
     ours = _numbers(found, -1.0, "fx")
     theirs = _numbers(converged, 1.0, "friction")
-    dt = 4e-3 if work.quick else 1e-3
+    dt = 2e-3 if work.quick else 1e-3
     coarse, fine = (
         scenes.hunting(gains=GAINS, goal=GOAL, t_end=HUNTED, dt=each)
         for each in (2.0 * dt, dt)
