@@ -8,52 +8,42 @@ from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
-MODELS = {
-    "published": pf.ReducedModelPublished(DISC, LAW),
-}
+MODEL = pf.ReducedModelPublished(DISC, LAW)
 GENERATOR = np.random.default_rng(3)
 TWISTS = GENERATOR.normal(size=(4, 3)) * [0.01, 0.01, 1.0]
 LOADS = np.array([1.0, 2.0, 0.0, 0.5])
 
 
-def _states(model):
-    scale = [1.0, 1.0, 0.01] if isinstance(model, pf.ReducedModelPublished) else 1.0
-    return (
-        GENERATOR.uniform(-0.6, 0.6, (4, *model.state_shape))
-        * LAW.largest_deflection
-        * scale
-    )
+def _states():
+    draw = GENERATOR.uniform(-0.6, 0.6, (4, 3))
+    return draw * LAW.largest_deflection * [1.0, 1.0, 0.01]
 
 
-@pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize(
     "load", [LOADS, 2.0, 2], ids=["loads", "one load", "whole number"]
 )
-def test_batches_step_as_their_members_do(name, load):
-    model = MODELS[name]
-    states = _states(model)
-    new, wrenches = model.step(states, TWISTS, load, 1e-3)
-    assert model.compiled.step_batch(states, TWISTS, load, 1e-3) is not None
+def test_batches_step_as_their_members_do(load):
+    states = _states()
+    new, wrenches = MODEL.step(states, TWISTS, load, 1e-3)
+    assert MODEL.compiled.step_batch(states, TWISTS, load, 1e-3) is not None
     for b in range(4):
         own = float(np.broadcast_to(load, 4)[b])
-        one, wrench = model.step(states[b], TWISTS[b].tolist(), own, 1e-3)
+        one, wrench = MODEL.step(states[b], TWISTS[b].tolist(), own, 1e-3)
         assert np.array_equal(new[b], one)
         assert np.array_equal(wrenches[b], wrench)
 
 
-@pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("load", [2.0, 0.0])
-def test_derivatives_are_differences_of_steps(name, load):
-    model = MODELS[name]
-    state = _states(model)[0]
+def test_derivatives_are_differences_of_steps(load):
+    state = _states()[0]
     twist = TWISTS[0]
     dt = 1e-4
-    found = model.step_jacobians(state, twist, load, dt)
-    assert model.compiled.jacobians_one(state, twist, load, dt) is not None
+    found = MODEL.step_jacobians(state, twist, load, dt)
+    assert MODEL.compiled.jacobians_one(state, twist, load, dt) is not None
 
     def change(by_state, by_twist):
         ends = [
-            model.step(state + sign * by_state, twist + sign * by_twist, load, dt)
+            MODEL.step(state + sign * by_state, twist + sign * by_twist, load, dt)
             for sign in (1.0, -1.0)
         ]
         return [0.5 * (one - other) for one, other in zip(*ends, strict=True)]
@@ -74,7 +64,7 @@ def test_derivatives_are_differences_of_steps(name, load):
         np.testing.assert_allclose(
             new, found.state_twist @ direction, rtol=1e-4, atol=1e-17
         )
-    small = model.step(state, twist, 1e-9, dt)[1] * 1e9
+    small = MODEL.step(state, twist, 1e-9, dt)[1] * 1e9
     np.testing.assert_allclose(found.wrench_load, small, rtol=1e-9)
 
 
@@ -98,7 +88,6 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_not_in_order_is_refused(name):
     wrong, message = WRONG[name]
-    model = MODELS["published"]
     given = {
         "state": np.zeros((4, 3)),
         "twist": TWISTS,
@@ -107,20 +96,20 @@ def test_what_is_not_in_order_is_refused(name):
         **wrong,
     }
     with refused(message):
-        model.step(**given)
+        MODEL.step(**given)
     one = {
         key: value[0] if isinstance(value, np.ndarray) else value
         for key, value in given.items()
     }
     if name != "loads for three":
         with refused(message):
-            model.step_jacobians(**{**one, "normal_force": _plain(one["normal_force"])})
+            MODEL.step_jacobians(**{**one, "normal_force": _plain(one["normal_force"])})
 
 
 @pytest.mark.parametrize("twist", [np.array(0.0), np.zeros((1, 3, 1))])
 def test_twists_of_other_axes_are_one_clear_line(twist):
     with refused(r"^twist must have shape \[..., 3\]"):
-        MODELS["published"].step(np.zeros((1, 3)), twist, 1.0, 1e-3)
+        MODEL.step(np.zeros((1, 3)), twist, 1.0, 1e-3)
 
 
 def _plain(value):
