@@ -1,4 +1,4 @@
-"""The front ends that the tests of this folder run in."""
+"""The front ends of tensors that tests run in, one after the other."""
 
 import pytest
 
