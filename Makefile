@@ -39,15 +39,16 @@ test: $(VENV)/.test
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives.
 NUMERIC := _engine derivatives limit_surface models solvers test_coupling.py test_formulas.py test_golden.py
 
-# The share of these that compiles least and rounds most.
-QUICKEST := _engine/test_*.py limit_surface solvers test_coupling.py test_formulas.py
+# The share of these that compiles least and rounds most: sums over cells, linear algebra, searches that end at a tolerance.
+# What is compared with 60 digits at a millionth of them, and gradients, belong to the others.
+QUICKEST := _engine/test_cell_blocks.py _engine/test_discs.py limit_surface solvers test_coupling.py test_formulas.py
 
 test-generic: $(VENV)/.test
 	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(PYTEST) $(NUMERIC:%=tests/%) $(ARGS)
 
 # Loops whose indices are checked compile into their own machine code, of which the whole half takes an hour; pointers
-# have no bounds to check.
-BOUNDED := tests/_engine/test_*.py tests/test_coupling_hard.py
+# have no bounds to check, and the steps of one bristle no arrays.
+BOUNDED := tests/_engine/test_bounds.py tests/_engine/test_cell_blocks.py tests/_engine/test_discs.py tests/test_coupling_hard.py
 
 test-bounds: $(VENV)/.test
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) $(BOUNDED) $(ARGS)

@@ -31,9 +31,18 @@ SWAPS = {
     ast.Eq: ("==", "!="), ast.NotEq: ("!=", "=="), ast.And: ("and", "or"), ast.Or: ("or", "and"),
 }  # fmt: skip
 MIRRORS = {
-    "_engine/codegen": "_engine test_golden.py export/test_c_library.py",
-    "_engine/body": "test_sliding_body.py solvers scenes derivatives",
+    "_engine/codegen": "_engine/test_derivatives.py _engine/test_rewriting.py _engine/test_steps.py"
+    " export/test_trace.py test_formulas.py test_golden.py export/test_c_library.py",
+    "_engine/bristles": "_engine/test_steps.py test_formulas.py models/test_rates.py models/test_steps.py"
+    " models/test_pads.py models/test_energy.py laws test_golden.py",
+    "_engine/cells": "_engine/test_cell_blocks.py _engine/test_discs.py models/test_batches.py models/test_rates.py"
+    " models/test_anisotropic.py models/test_pressure_follows.py models/test_pads.py test_golden.py"
+    " derivatives/test_rollouts_of_every_model.py scenes/test_edge.py",
+    "_engine/published": "_engine/test_steps.py models/test_rates.py models/test_batches.py test_golden.py"
+    " limit_surface/test_closed_forms.py derivatives/test_rollouts_of_every_model.py",
+    "_engine/body": "solvers/test_structured.py test_golden.py derivatives/test_scene.py scenes derivatives",
     "_engine/coupled": "test_coupling.py test_sliding_body.py test_coupling_pads.py test_coupling_hard.py",
+    "_engine/records": "models/test_batches.py models/test_state_types.py models/test_steps.py test_golden.py models",
     "_engine/compiler": "_engine/compiler",
     "_engine": "_engine test_golden.py models derivatives limit_surface patch test_coupling.py",
     "models": "models test_golden.py derivatives",
@@ -121,8 +130,11 @@ def tests_of(name: str) -> list[str]:
         files = path.rglob("test_*.py") if path.is_dir() else [path]
         found += sorted(
             filter(Path.exists, files),
-            key=lambda f: (stem not in f.stem, -f.read_text().count(stem)),
+            key=lambda f: -f.read_text().count(stem),
         )
+    # Those that share words with its name first, then in the order of the table.
+    words = {*stem.split("_")}
+    found.sort(key=lambda file: -len(words & {*file.stem.split("_")}))
     told = [
         file.relative_to(ROOT).as_posix()
         for file in dict.fromkeys(found)

@@ -12,16 +12,19 @@ LAW = pf.LuGre(mu_s=1.2, sigma_0=1e8, elasto_plastic=0.9)
 
 PATCH = pf.ContactPatch.disc(radius=0.01, cells=9)
 ELLIPSOID = pf.LimitSurfaceEllipsoid(PATCH)
-PATCHES = CoupledPatches([pf.ReducedModelPublished(PATCH, LAW, ELLIPSOID)] * 4)
 
 
-def _runs(height, steps):
+def _patches(count=4):
+    return CoupledPatches([pf.ReducedModelPublished(PATCH, LAW, ELLIPSOID)] * count)
+
+
+def _runs(patches, height, steps):
     """Steps of 0.1 to 10 ms, of bodies that stay and of others in each; friction tilts the loads by the `height`."""
     generator = np.random.default_rng(14)
     yield from random_run(
-        generator, PATCHES, random_bodies(generator, 256, 4, height), steps
+        generator, patches, random_bodies(generator, 256, 4, height), steps
     )
-    yield from abrupt_run(generator, PATCHES, 256, height, steps)
+    yield from abrupt_run(generator, patches, 256, height, steps)
 
 
 def _excess_work(state, host, step, dt):
@@ -45,10 +48,11 @@ def _excess_work(state, host, step, dt):
 
 
 def test_what_does_not_converge_is_tried_again():
+    patches = _patches()
     once = 0
     again = 0
-    for state, host, dt, step in _runs(0.05, 12):
-        first = PATCHES.step(state, host, dt, iterations=50)
+    for state, host, dt, step in _runs(patches, 0.05, 12):
+        first = patches.step(state, host, dt, iterations=50)
         once = once + (~first.converged).sum()
         again = again + (~step.converged).sum()
         assert (step.residual <= first.residual).all() and (
@@ -59,10 +63,11 @@ def test_what_does_not_converge_is_tried_again():
 
 def test_what_does_not_converge_does_no_work_that_bristles_do_not_give():
     """Loads that grow faster with friction than friction with loads: some steps have no solution."""
+    patches = _patches()
     lost = 0
     wrong = 0
-    for state, host, dt, step in _runs(3.0, 6):
-        first = PATCHES.step(state, host, dt, iterations=50)
+    for state, host, dt, step in _runs(patches, 3.0, 6):
+        first = patches.step(state, host, dt, iterations=50)
         lost += (~step.converged).sum()
         wrong += (_excess_work(state, host, first, dt)[~first.converged] > 1e-9).sum()
         assert (_excess_work(state, host, step, dt)[~step.converged] <= 1e-9).all()
@@ -75,7 +80,7 @@ def test_what_does_not_converge_does_no_work_that_bristles_do_not_give():
 )
 def test_a_wedge_that_jams_stops(speed, growth):
     """The load grows by so many newtons for each of friction, which is 1.2 N for each of load: above 1/1.2 it jams."""
-    patches = CoupledPatches(PATCHES.models[:1])
+    patches = _patches(1)
     response = np.diag([1e-3, 1e-3, 10.0])
     jam = np.array([[-growth, 0.0, 0.0]])
     host = HostStep(

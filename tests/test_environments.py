@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=0.4, mu_s=0.5)
 
@@ -59,10 +60,10 @@ def test_static_friction_is_never_below_sliding_friction():
     ],
 )
 def test_ranges_that_break_rules_are_refused(ranges, message):
-    with pytest.raises(pf.errors.InvalidValueError, match=message):
+    with refused(message):
         pf.randomise(LAW, ranges, 5)
 
 
 def test_counts_beyond_memory_are_refused():
-    with pytest.raises(pf.errors.InvalidValueError, match="count must be at most"):
+    with refused("count must be at most"):
         pf.randomise(LAW, {"mu_c": (0.1, 0.2)}, 10**9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from planarfriction.cli.run import build_scenes
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.scenes import Solution, Statistics, in_hand
 from planarfriction.scenes.solution import History
+from tests.support.refusals import refused
 
 DOCS = Path(__file__).parents[1] / "docs"
 DISC = pf.ContactPatch.disc(0.01, 7)
@@ -184,7 +186,7 @@ def test_what_cannot_be_registered():
         ),
         ("bronze", Bronze(), "law must be a class, or a function that makes one"),
     ):
-        with pytest.raises(InvalidValueError, match=message):
+        with refused(message):
             pf.laws.register(name, make)
 
 
@@ -248,9 +250,8 @@ def test_laws_by_kind(tmp_path, table, law):
     ],
 )
 def test_wrong_kinds_get_one_line_with_all_names(tmp_path, contact, message):
-    with pytest.raises(FileError) as caught:
+    with refused(re.escape(message), FileError):
         read(tmp_path, contact)
-    assert message in str(caught.value) and "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", families.SURFACES)
@@ -321,14 +322,13 @@ def test_a_scene_that_cannot_be_written_still_plots_and_saves(tmp_path):
     again = pf.Solution.load(solution.save(tmp_path / "run.nc"))
     assert again.scene is None and again.data.attrs == solution.data.attrs
     assert np.array_equal(again.data.fx, solution.data.fx)
-    with pytest.raises(
-        FileError,
-        match="the file has no scene, which the plot needs: model must be one of",
+    with refused(
+        "the file has no scene, which the plot needs: model must be one of", FileError
     ):
         again.plot()
     twice = pf.Solution.load(again.save(tmp_path / "twice.nc"))
     assert twice.data.attrs == again.data.attrs
-    with pytest.raises(InvalidValueError, match="got Coarse"):
+    with refused("got Coarse"):
         solution.scene.to_file(tmp_path / "scene.toml")
 
 
@@ -340,10 +340,7 @@ def test_only_what_can_be_written_has_its_scene_in_the_data(law):
 
 
 def test_a_parameter_that_is_no_plain_data_is_named(own):
-    with pytest.raises(
-        InvalidValueError,
-        match=r"grit must be an attribute of Coarse and plain data .* got function",
-    ):
+    with refused(r"grit must be an attribute of Coarse and plain data .* got function"):
         in_hand(Coarse(DISC, LAW, grit=lambda: 3)).to_dict()  # pyright: ignore
 
 

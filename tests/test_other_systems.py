@@ -5,12 +5,11 @@ import os
 import subprocess
 import sys
 
-import pytest
-
 from planarfriction._engine.compiler.threads import processors
 from planarfriction._support import writing
 from planarfriction.errors import FileError
 from planarfriction_studies.bench import workflows
+from tests.support.refusals import refused
 
 POSIX = ("fcntl", "grp", "pty", "pwd", "resource", "termios")
 
@@ -36,9 +35,7 @@ def test_a_file_that_is_open_elsewhere_is_tried_again(tmp_path, monkeypatch):
     writing.write_text(path, "new")
     assert path.read_text() == "new"
     refusing(monkeypatch, 3)
-    with pytest.raises(
-        FileError, match=r"run\.json: cannot be written: Access is denied"
-    ):
+    with refused(r"run\.json: cannot be written: Access is denied", FileError):
         writing.write_text(path, "newer")
     assert path.read_text() == "new" and os.listdir(tmp_path) == ["run.json"]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from planarfriction.cli import main
-from planarfriction.errors import InvalidValueError
 from planarfriction_studies import bench
 from planarfriction_studies.bench.measurement import line
+from tests.support.refusals import refused
 from tests.support.repository import script
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -26,7 +26,7 @@ def test_a_benchmark_is_run_by_its_name():
     (found,) = bench.run(["table.build"])
     assert found.name == "table.build" and found.value is not None and found.value > 0.0
     assert found.ratio == pytest.approx(found.baseline_value / found.value)
-    with pytest.raises(InvalidValueError, match="name must be one of"):
+    with refused("name must be one of"):
         bench.run(["nothing"])
 
 

@@ -12,6 +12,7 @@ from planarfriction.errors import FileError
 from planarfriction_studies import bench
 from planarfriction_studies.bench import comparison, running
 from planarfriction_studies.bench.measurement import Measurement
+from tests.support.refusals import refused
 
 
 def measured(name, *ratios):
@@ -109,9 +110,7 @@ def test_busy_loops_say_what_they_got(monkeypatch):
 @pytest.mark.parametrize("text", ["{", "[1]", '[{"name": "import"}]', '{"name": 1}'])
 def test_another_file_is_refused_in_one_line(tmp_path, text):
     (tmp_path / "old.json").write_text(text, encoding="utf-8")
-    with pytest.raises(
-        FileError, match="is not what planarfriction bench --json prints"
-    ):
+    with refused("is not what planarfriction bench --json prints", FileError):
         comparison.read_run(tmp_path / "old.json")
 
 

@@ -17,7 +17,6 @@ from jinja2 import UndefinedError
 from PIL import Image
 
 from planarfriction.cli import main
-from planarfriction.errors import InvalidValueError
 from planarfriction_studies import experiments
 from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import (
@@ -48,6 +47,7 @@ from planarfriction_studies.experiments.wording import (
     short,
     span,
 )
+from tests.support.refusals import refused
 
 
 class Made:
@@ -473,7 +473,7 @@ def test_a_converged_solution_is_compared_at_all_its_times():
 
 def test_unknown_facts_are_named():
     for call in (facts.published_curve, facts.published_table, facts.converged):
-        with pytest.raises(InvalidValueError, match="nothing"):
+        with refused("nothing"):
             call("nothing")
 
 
@@ -515,13 +515,10 @@ def test_a_full_disk_ends_in_one_line_and_keeps_what_was_there(tmp_path, monkeyp
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(writing.os, "fsync", full)
-    with pytest.raises(
-        FileError, match=r"cannot be written: No space left on device"
-    ) as caught:
+    with refused(r"cannot be written: No space left on device", FileError):
         Work(folder=tmp_path, fingerprint="two").piece(
             "a piece", lambda: {"x": np.zeros(3)}
         )
-    assert "\n" not in str(caught.value)
     assert len(list(tmp_path.iterdir())) == 1
     again = Work(folder=tmp_path, fingerprint="one").piece("a piece", dict)
     assert np.array_equal(again["x"], kept["x"])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -253,10 +254,7 @@ def test_another_model_of_the_same_size_is_not_served():
     law = dataclasses.replace(LAW, mu_c=0.4)
     m, other, slippery = scene.ours(model=pf.ReducedModel(PAD.patch, law))
     assert (m.nv, m.nuserdata) == (friction.m.nv, friction.m.nuserdata)
-    with pytest.raises(
-        pf.errors.InvalidValueError,
-        match="d must be data of the model of the patches, or of a copy",
-    ):
+    with refused("d must be data of the model of the patches, or of a copy"):
         friction.step(other)
     with friction.install():
         for data in (other, mujoco.MjData(scene.ours()[0])):
@@ -403,9 +401,9 @@ def test_options_that_do_not_fit_are_refused(name):
     option, value, message = BAD[name]
     m, _, friction = mujoco_scenes.grip().ours()
     setattr(m.opt, option, value)
-    with pytest.raises(pf.errors.InvalidValueError, match=message):
+    with refused(message):
         Friction(m, friction.patches)
-    with pytest.raises(pf.errors.InvalidValueError, match=message), friction.install():
+    with refused(message), friction.install():
         pass
     assert mujoco.get_mjcb_control() is None
 
@@ -423,10 +421,10 @@ def test_options_changed_at_run_time_are_refused_before_the_step(name):
         option, value, message = CHANGED[name]
         setattr(m.opt, option, value)
     time = d.time
-    with pytest.raises(pf.errors.InvalidValueError, match=message):
+    with refused(message):
         friction.step(d)
     assert d.time == time and (friction.wrenches(d) == 0.0).all()
-    with pytest.raises(pf.errors.InvalidValueError, match=message):
+    with refused(message):
         friction.step(d)
     m.opt.integrator = 0
     m.opt.noslip_iterations = 0
@@ -434,7 +432,7 @@ def test_options_changed_at_run_time_are_refused_before_the_step(name):
     m.opt.enableflags = 0
     m.pair_dim[:] = 1
     with (
-        pytest.raises(pf.errors.InvalidValueError, match="integrator"),
+        refused("integrator"),
         friction.install(),
     ):
         friction.step(d)
@@ -448,16 +446,13 @@ def test_options_changed_at_run_time_are_refused_before_the_step(name):
 def test_implicit_steps_may_be_longer_than_contacts_are_stiff(integrator):
     """A quarter of what Euler takes: MuJoCo makes contacts softer (`refsafe`), unless it may not."""
     scene = dataclasses.replace(mujoco_scenes.grip(), time=1.0)
-    with pytest.raises(
-        pf.errors.InvalidValueError,
-        match=r"or 0\.01 s with refsafe and implicit or implicitfast, got",
-    ):
+    with refused(r"or 0\.01 s with refsafe and implicit or implicitfast, got"):
         scene.ours(5e-3, "Euler", 0.004)
     m, d, friction = scene.ours(5e-3, integrator, 0.004)
     path = scene.run(m, d, lambda: friction.step(d))
     assert abs(path[-1, :3] - path[100, :3]).max() < 4e-10  # 0.0004 um
     m.opt.disableflags = int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
-    with pytest.raises(pf.errors.InvalidValueError, match="timestep"):
+    with refused("timestep"):
         friction.step(d)
 
 
@@ -487,25 +482,17 @@ def test_unprepared_models_and_unknown_names_are_refused():
     patches = friction.patches
     pads = ("pad left", "block")
     bare, _ = scene.native(mujoco_scenes.Native())
-    with pytest.raises(
-        pf.errors.InvalidValueError,
-        match=r"pair must be in the model \(prepare adds it\)",
-    ):
+    with refused(r"pair must be in the model \(prepare adds it\)"):
         Friction(bare, patches)
     text = scene.text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler")
     spec = mujoco.MjSpec.from_string(text)
     prepare(spec, patches)
     spec.pairs[0].condim = 3
-    with pytest.raises(
-        pf.errors.InvalidValueError, match=r"pair must have condim 1 between .* got 3"
-    ):
+    with refused(r"pair must have condim 1 between .* got 3"):
         Friction(spec.compile(), patches)
     spec.pairs[0].condim = 1
     spec.nuserdata = 5
-    with pytest.raises(
-        pf.errors.InvalidValueError,
-        match=r"nuserdata must be at least \d+ \(prepare adds them\), got 5",
-    ):
+    with refused(r"nuserdata must be at least \d+ \(prepare adds them\), got 5"):
         Friction(spec.compile(), patches)
     soft = pf.ContactPatch.rectangle(
         0.02, cells=9, pressure=pf.SoftFinger(c=0.01, n=0.3, k=2.0)
@@ -542,7 +529,7 @@ def test_unprepared_models_and_unknown_names_are_refused():
         ),
         ([PAD], "patches must be patches"),
     ):
-        with pytest.raises(pf.errors.InvalidValueError, match=message):
+        with refused(message):
             Friction(m, wrong)
     for wrong, message in (
         (
@@ -555,11 +542,9 @@ def test_unprepared_models_and_unknown_names_are_refused():
         ),
         ([patches[0], patches[0]], "patches must have each pair of geoms once"),
     ):
-        with pytest.raises(pf.errors.InvalidValueError, match=message):
+        with refused(message):
             prepare(mujoco.MjSpec.from_string(text), wrong)
-    with pytest.raises(
-        pf.errors.InvalidValueError, match="centre must be one of auto, site, contact"
-    ):
+    with refused("centre must be one of auto, site, contact"):
         PatchContact(PAD, site="L", geoms=pads, centre="middle")
 
 
@@ -581,7 +566,7 @@ def test_one_callback_at_a_time():
 def test_a_state_that_is_not_finite_is_told():
     _, d, friction = _held(mujoco_scenes.grip())
     friction.state(d)[1] = np.nan
-    with pytest.raises(pf.errors.InvalidValueError, match="state must be finite"):
+    with refused("state must be finite"):
         friction.step(d)
     assert not friction.report(d).converged and (friction.state(d) == 0.0).all()
     friction.step(d)

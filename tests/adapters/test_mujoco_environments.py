@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -153,12 +154,12 @@ def test_parameters_may_change_between_steps():
 )
 def test_numbers_out_of_range_are_refused_and_have_no_friction(name, value, rule):
     friction = _made("reduced")
-    with pytest.raises(pf.errors.InvalidValueError, match=rule):
+    with refused(rule):
         friction.copies({name: [value]})
     m = copy.copy(friction.m)
     friction.parameters(m)[name][:] = value
     d = mujoco.MjData(m)
-    with pytest.raises(pf.errors.InvalidValueError, match=rule):
+    with refused(rule):
         friction.step(d)
     with friction.install():
         mujoco.mj_step(m, d)
@@ -167,16 +168,11 @@ def test_numbers_out_of_range_are_refused_and_have_no_friction(name, value, rule
 
 def test_arrays_of_other_shapes_are_refused():
     friction = _made("reduced")
-    with pytest.raises(
-        pf.errors.InvalidValueError,
-        match=r"mu_c must have shape \[\] or \[2\] or \[2, 1\]",
-    ):
+    with refused(r"mu_c must have shape \[\] or \[2\] or \[2, 1\]"):
         friction.copies({"v_s": [1e-3, 2e-3], "mu_c": [0.1, 0.2, 0.3]})
-    with pytest.raises(
-        pf.errors.InvalidValueError, match="parameters must hold an array"
-    ):
+    with refused("parameters must hold an array"):
         friction.copies({"mu_c": 0.3})
-    with pytest.raises(pf.errors.InvalidValueError, match="did you mean 'scale'"):
+    with refused("did you mean 'scale'"):
         friction.copies({"scal": [0.3]})
 
 

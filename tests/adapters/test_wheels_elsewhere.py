@@ -153,13 +153,9 @@ def test_patches_lie_in_mjx_where_they_lie_in_mujoco():
     mujoco.mj_forward(m, d)
     none = np.zeros((len(patches), 3))
     with jax.enable_x64(True):
-        where = responses.geometry(
-            mjx.put_model(m),
-            mjx.put_data(m, d),
-            Friction(m, patches)._fixed.places,
-            none,
-            none,
-        )
+        places = Friction(m, patches)._fixed.places
+        geometry = jax.jit(lambda m, d: responses.geometry(m, d, places, none, none))
+        where = geometry(mjx.put_model(m), mjx.put_data(m, d))
         assert (
             where.at_contact.tolist() == [True, True, True, False]
             and not where.upright.any()

@@ -17,10 +17,16 @@ PATCHES = {
         [pf.friction_metric(0.3 * i, 0.6, 1.1) for i in range(PLAIN.cells)]
     ),
 }
-MODELS = [("reduced", "of each cell"), ("published", "grain")]
+REDUCED = "reduced", "of each cell"
+PUBLISHED = "published", "grain"
 DT, T = 1e-4, 10
 
-every_model = pytest.mark.parametrize(("kind", "patch"), MODELS)
+
+def models(quick, slow):
+    """Run one model in each front end, and the other one there in slow tests."""
+    return pytest.mark.parametrize(
+        "kind, patch", [quick, pytest.param(*slow, marks=pytest.mark.slow)]
+    )
 
 
 @functools.cache
@@ -50,7 +56,7 @@ def bars(model, seed=1):
 
 
 @pytest.mark.torch
-@every_model
+@models(REDUCED, PUBLISHED)
 def test_pytorch_has_the_same_numbers_and_gradients(kind, patch):
     torch = pytest.importorskip(
         "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
@@ -96,7 +102,7 @@ def test_pytorch_has_the_same_numbers_and_gradients(kind, patch):
 
 
 @pytest.mark.jax
-@every_model
+@models(PUBLISHED, REDUCED)
 def test_jax_has_the_same_numbers_and_gradients(kind, patch):
     jax = pytest.importorskip("jax", reason="needs the extra [jax]")
     import planarfriction.jax as pj
@@ -124,9 +130,8 @@ def test_jax_has_the_same_numbers_and_gradients(kind, patch):
             run = pj.rollout(pytree, state, twists, loads, DT, parameters=parameters)
             return (bar * run.wrenches).sum() + (end_bar * run.state).sum()
 
-        by, *slopes = jax.grad(value, (0, 1, 2, 3))(
-            pytree.parameters, state, twists, loads
-        )
+        gradient = jax.jit(jax.grad(value, (0, 1, 2, 3)))
+        by, *slopes = gradient(pytree.parameters, state, twists, loads)
         wanted = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
         for slope, want in zip((*slopes, np.stack(by)), wanted, strict=True):
             assert np.asarray(slope) == pytest.approx(

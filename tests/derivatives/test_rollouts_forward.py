@@ -7,7 +7,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import derivatives
-from planarfriction.errors import InvalidValueError
+from tests.support.refusals import refused
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAW = pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.6))
@@ -75,14 +75,12 @@ def test_changes_broadcast_with_contacts():
     ],
 )
 def test_wrong_changes_are_one_clear_line(changes, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         derivatives.rollout_jvp(
             model_of(), *drive()[0], DT, derivatives.RolloutTangent(**changes)
         )
-    assert "\n" not in str(caught.value)
 
 
 def test_ragged_twists_are_one_clear_line():
-    with pytest.raises(InvalidValueError, match=r"^twist must") as caught:
+    with refused(r"^twist must"):
         derivatives.rollout_jvp(model_of(), None, [[], [1.0, None], []], 1.0, 1e-3)
-    assert "\n" not in str(caught.value)

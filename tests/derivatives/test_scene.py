@@ -13,8 +13,9 @@ from planarfriction.derivatives import (
     scene_gradient,
     scene_sensitivities,
 )
-from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.errors import SolverError
 from planarfriction.scenes import SolverOptions
+from tests.support.refusals import refused
 
 LAW = pf.LuGre(
     mu_c=0.3,
@@ -236,27 +237,23 @@ def test_derivatives_end_after_max_steps_and_before_memory_does(monkeypatch):
     few = SolverOptions(max_steps=25)
     for derivatives_of in (lambda o: scene_sensitivities(scene, ("mu",), options=o),
                            lambda o: scene_gradient(scene, lambda _, motion: motion, ("mu",), options=o)):  # fmt: skip
-        with pytest.raises(
-            SolverError, match="max_steps steps were taken before the end: raise it"
+        with refused(
+            "max_steps steps were taken before the end: raise it", SolverError
         ):
             derivatives_of(few)
         derivatives_of(SolverOptions(max_steps=100_000))
     monkeypatch.setattr("planarfriction.derivatives.path.MOST_KEPT", 1000)
-    with pytest.raises(SolverError, match=r"the path has more than [0-9]+ steps"):
+    with refused(r"the path has more than [0-9]+ steps", SolverError):
         scene_gradient(scene, lambda _, motion: motion, ("mu",))
 
 
 def test_wrong_input_is_named():
     scene = slide("ellipsoid")
-    with pytest.raises(
-        InvalidValueError, match="parameters must be one of mu, r, mass, inertia, load"
-    ):
+    with refused("parameters must be one of mu, r, mass, inertia, load"):
         scene_sensitivities(scene, ("my",))
-    with pytest.raises(
-        InvalidValueError, match=r"t_end must be at most the scene's 0\.4 s"
-    ):
+    with refused(r"t_end must be at most the scene's 0\.4 s"):
         scene_sensitivities(scene, options=SolverOptions(t_end=1.0))
-    with pytest.raises(InvalidValueError, match="rtol must be > 0"):
+    with refused("rtol must be > 0"):
         scene_sensitivities(scene, options=SolverOptions(rtol=0.0))
-    with pytest.raises(InvalidValueError, match="scene must be a Scene"):
+    with refused("scene must be a Scene"):
         scene_sensitivities("in-hand")

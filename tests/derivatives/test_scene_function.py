@@ -8,9 +8,10 @@ import pytest
 import planarfriction as pf
 from planarfriction.derivatives import scene_sensitivities
 from planarfriction.derivatives.scene_function import SceneFunction
-from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.errors import FrictionError
 from planarfriction.scenes import SolverOptions
 from tests.derivatives.test_scene import model_of
+from tests.support.refusals import refused
 
 KNOTS = [0.0, 0.03, 0.06]
 LOAD = np.array([1.0, 1.2, 0.9])
@@ -103,9 +104,7 @@ def test_a_motion_that_ends_early_stays():
 
 
 def test_wrong_numbers_are_named():
-    with pytest.raises(
-        InvalidValueError, match="parameters must be one of mu, mass, inertia, load"
-    ):
+    with refused("parameters must be one of mu, mass, inertia, load"):
         SceneFunction(scene(), ("r",))
     law = pf.CoulombStribeck(mu_c=0.3)
     own = dataclasses.replace(
@@ -114,9 +113,8 @@ def test_wrong_numbers_are_named():
             pf.Contact(pf.DistributedModel(pf.ContactPatch.disc(0.01), law), 1.0)
         ],
     )
-    with pytest.raises(
-        InvalidValueError,
-        match="must not contain mu: CoulombStribeck has other friction coefficients too",
+    with refused(
+        "must not contain mu: CoulombStribeck has other friction coefficients too"
     ):
         SceneFunction(own, ("mu",)).run(np.array([[1.1]]))
 
@@ -167,7 +165,7 @@ def test_pytorch_maps_and_goes_forwards():
     assert backwards.numpy() == pytest.approx(forwards.numpy(), rel=1e-5, abs=1e-7)
     mapped = torch.func.vmap(torch.func.grad(lambda v: end(v).sum()))(two)
     assert mapped[0].item() == pytest.approx(forwards.sum().item(), rel=1e-5)
-    with pytest.raises(FrictionError, match="first derivatives"):
+    with refused("first derivatives", FrictionError):
         torch.func.grad(torch.func.grad(lambda v: end(v).sum()))(one)
 
 
@@ -175,20 +173,13 @@ def test_pytorch_names_wrong_numbers():
     torch = pytest.importorskip("torch")
     from planarfriction.torch import simulate_scene
 
-    with pytest.raises(InvalidValueError, match="mu must be > 0, got -1"):
+    with refused("mu must be > 0, got -1"):
         simulate_scene(scene(), {"mu": torch.tensor(-1.0)})
-    with pytest.raises(
-        InvalidValueError,
-        match=r"values of force must have shape \[..., 3, 3\], got shape \[3\]",
-    ):
+    with refused(r"values of force must have shape \[..., 3, 3\], got shape \[3\]"):
         simulate_scene(scene(), signals={"force": (KNOTS, torch.ones(3))})
-    with pytest.raises(
-        InvalidValueError, match="signals of force must be a pair of times and values"
-    ):
+    with refused("signals of force must be a pair of times and values"):
         simulate_scene(scene(), signals={"force": torch.ones(3)})
-    with pytest.raises(
-        InvalidValueError, match="the numbers of a scene must have axes that broadcast"
-    ):
+    with refused("the numbers of a scene must have axes that broadcast"):
         simulate_scene(scene(), {"mu": torch.ones(2), "mass": torch.ones(3)})
 
 
@@ -232,10 +223,10 @@ def test_jax_agrees_with_the_derivatives_forwards():
             jnp.array([0.08, 0.1])
         )
         assert mapped[0] == pytest.approx(expected[:, 1].sum(), rel=1e-5)
-        with pytest.raises(FrictionError, match="first derivatives only"):
+        with refused("first derivatives only", FrictionError):
             jax.grad(jax.grad(lambda v: motion(at[0], at[1], v).sum()))(0.08)
-        with pytest.raises(InvalidValueError, match="mu must be > 0"):
+        with refused("mu must be > 0"):
             motion(-1.0, at[1], at[2])
         for number in (0.0, -1.0):
-            with pytest.raises(InvalidValueError, match="mu must be > 0"):
+            with refused("mu must be > 0"):
                 jax.grad(lambda mu: motion(mu, at[1], at[2])[0])(number)

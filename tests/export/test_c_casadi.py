@@ -8,6 +8,7 @@ import pytest
 
 import planarfriction as pf
 from tests.support.c_libraries import MODELS, PADS, STRICT, samples
+from tests.support.refusals import refused
 
 ca = pytest.importorskip("casadi", reason="needs the extra [casadi]")
 pytestmark = [
@@ -126,5 +127,5 @@ def test_jacobians(loaded):
 
 
 def test_single_precision_is_refused(tmp_path):
-    with pytest.raises(pf.FrictionError, match="precision must be double for CasADi"):
+    with refused("precision must be double for CasADi", pf.FrictionError):
         pf.export_c(MODELS["few"](), tmp_path, precision="float", casadi=True)

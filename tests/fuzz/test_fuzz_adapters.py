@@ -13,6 +13,7 @@ from attack import attack
 from judge import CASES, Broken
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 
 @attack("adapters", 1)
@@ -74,9 +75,7 @@ def test_models_of_mujoco_that_change(draw: random.Random) -> None:
     (another, there, own) = scene.ours(model=pad)
     d.ctrl[:] = there.ctrl[:] = scene.control(0.0)
     CASES["models of MuJoCo that change"] += 1
-    with pytest.raises(
-        pf.errors.InvalidValueError, match="data of the model of the patches"
-    ):
+    with refused("data of the model of the patches"):
         friction.step(there)
     with friction.install():
         for _ in range(5):

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction._engine.cells.rate_law import fingerprint
 from planarfriction.derivatives import scene_gradient, scene_sensitivities
-from planarfriction.errors import InvalidValueError
 from planarfriction.laws.rate_law import norm, plus
 from planarfriction.patch import friction_metric
 from planarfriction.scenes import SolverOptions
 from tests.support.rate_laws import BoucWen, Gum, Written
+from tests.support.refusals import refused
 
 DISC = pf.ContactPatch.disc(0.01, cells=7)
 POINT = pf.ContactPatch.points([(0.0, 0.0)])
@@ -266,10 +266,7 @@ def test_a_contact_sticks_where_bristles_keep_their_deflection():
     )
     assert abs(float(pf.simulate(scene).data.x[-1])) < 1e-12
     contact = dataclasses.replace(contact, model=pf.DistributedModel(DISC, Gum()))
-    with pytest.raises(
-        InvalidValueError,
-        match="start must be 'rest' or 'sliding' with a law that creeps",
-    ):
+    with refused("start must be 'rest' or 'sliding' with a law that creeps"):
         pf.simulate(dataclasses.replace(scene, contacts=[contact]))
 
 
@@ -290,21 +287,21 @@ def test_a_law_that_was_used_goes_to_another_process():
 
 def test_what_needs_the_bristles_of_lugre_refuses_it_in_one_line():
     rule = "^law must have the bristles of LuGre for ReducedModelPublished, not a rate of its own, got BoucWen$"
-    with pytest.raises(InvalidValueError, match=rule):
+    with refused(rule):
         pf.ReducedModelPublished(DISC, BoucWen())
-    with pytest.raises(InvalidValueError, match="for patches with an asymmetry"):
+    with refused("for patches with an asymmetry"):
         pf.DistributedModel(
             DISC.with_friction_metric(np.eye(2), asymmetry=(0.2, 0.1)), BoucWen()
         )
     scene = pf.scenes.in_hand(pf.DistributedModel(DISC, BoucWen()), t_end=0.1)
-    with pytest.raises(InvalidValueError, match="for derivatives by mu"):
+    with refused("for derivatives by mu"):
         scene_sensitivities(scene, ("mu",))
 
 
 @pytest.mark.torch
 def test_tensors_refuse_it():
     torch = pytest.importorskip("planarfriction.torch")
-    with pytest.raises(InvalidValueError, match=r"for .*not a rate of its own"):
+    with refused(r"for .*not a rate of its own"):
         torch.DistributedModel(DISC, BoucWen())
 
 
@@ -344,18 +341,14 @@ def test_wrong_laws_are_refused_in_one_line():
         (Misspelt, "no attribute 'largest'"),
         (Joined, r"too many values to unpack \(expected 2\)"),
     ]:
-        with pytest.raises(
-            InvalidValueError,
-            match=rf"^law must be a formula \(.*{words}.*\), got {wrong.__name__}$",
-        ) as caught:
+        with refused(rf"^law must be a formula \(.*{words}.*\), got {wrong.__name__}$"):
             wrong()
-        assert "\n" not in str(caught.value)
-    with pytest.raises(InvalidValueError, match="mu must be a number"):
+    with refused("mu must be a number"):
         BoucWen(mu=True)
-    with pytest.raises(InvalidValueError, match="largest_deflection must be"):
+    with refused("largest_deflection must be"):
         BoucWen(mu=-1.0)
     model = pf.DistributedModel(POINT, Bursts())
-    with pytest.raises(InvalidValueError, match="law must give finite rates"):
+    with refused("law must give finite rates"):
         model.step(1e-6 + model.rest(), (0.1, 0.0, 0.0), 1.0, 1e-3)
 
 

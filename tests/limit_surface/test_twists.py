@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.errors import SolverError
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.limit_surface.loops.cell_twists import cell_twists
 from planarfriction.patch import PUBLISHED_PATCHES
+from tests.support.refusals import refused
 
 ELL = [
     (0.0, 0.0),
@@ -56,7 +57,7 @@ KINDS = {
 }
 
 
-def refused(kind, patch):
+def left_out(kind, patch):
     """Return True if a surface does not take a patch, or is a table of cells with metrics, which is not convex."""
     each = patch == "a grain in each cell"
     grained = patch in ("grain", "feet with a grain") or each
@@ -69,7 +70,7 @@ CASES = [
     pytest.param(kind, name, id=f"{kind}, {name}")
     for kind in KINDS
     for name in PATCHES
-    if not refused(kind, name)
+    if not left_out(kind, name)
 ]
 
 
@@ -193,9 +194,8 @@ class Turned(LimitSurface):
 
 
 def test_a_twist_that_is_not_found_is_an_error():
-    with pytest.raises(
-        SolverError,
-        match=r"no twist found: the wrench of the nearest one is .* rad off",
+    with refused(
+        r"no twist found: the wrench of the nearest one is .* rad off", SolverError
     ):
         Turned(PATCHES["disc"]).twist((1.0, 0.2, 0.001))
 
@@ -222,9 +222,9 @@ def test_what_is_no_number_is_no_certificate():
 
 def test_a_bad_wrench_among_good_ones_is_named():
     for surface in (KINDS[kind](FEET) for kind in KINDS):
-        with pytest.raises(InvalidValueError, match="wrench must not be zero"):
+        with refused("wrench must not be zero"):
             surface.twist([(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
-        with pytest.raises(InvalidValueError, match="wrench must be finite"):
+        with refused("wrench must be finite"):
             surface.twist([(1.0, 0.0, 0.0), (0.0, np.inf, 0.0)])
 
 

@@ -489,22 +489,3 @@ def test_a_cell_rests_at_its_centre(name):
     state = (u / speed + PATCHES[name].asymmetries().T) * g / STRIBECK.sigma_0
     np.testing.assert_allclose(model.rate(state, TWIST, 1.0), 0.0, atol=1e-14)
     np.testing.assert_allclose(model.step(state, TWIST, 1.0, 0.1)[0], state, rtol=1e-11)
-
-
-def test_batches_and_no_load():
-    model = pf.DistributedModel(PATCHES["cells"], STRIBECK)
-    states = RANDOM.normal(size=(3, *model.state_shape)) * 5e-7
-    twists = TWIST * np.array([1.0, -0.5, 2.0])[:, None]
-    loads = np.array([0.0, 1.0, 2.0])
-    new, wrench = model.step(states, twists, loads, 1e-4)
-    slope = model.step_jacobians(states, twists, loads, 1e-4)
-    assert not new[0].any() and not wrench[0].any() and not slope.state_state[0].any()
-    assert slope.wrench_load[0].any()
-    for i in (1, 2):
-        one = model.step(states[i], twists[i], loads[i], 1e-4)
-        assert np.array_equal(new[i], one[0]) and np.array_equal(wrench[i], one[1])
-        close(
-            slope.wrench_twist[i],
-            model.step_jacobians(states[i], twists[i], loads[i], 1e-4).wrench_twist,
-            1e-13,
-        )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.errors import InvalidValueError
+from tests.support.refusals import refused
 
 FEET = pf.ContactPatch.points(
     [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
@@ -51,23 +51,22 @@ def test_wrong_input_gets_one_line(model, arguments, message):
         model.jacobians,
         lambda *a: model.step(*a, 1e-3),
     ):
-        with pytest.raises(InvalidValueError, match=message) as caught:
+        with refused(message):
             call(*arguments)
-        assert "\n" not in str(caught.value)
 
 
 @every_model
 def test_wrong_states_and_steps(model):
     broken = model.rest()
     broken.flat[1] = math.nan
-    with pytest.raises(InvalidValueError, match="state must be finite"):
+    with refused("state must be finite"):
         model.step(broken, (1, 0, 0), 1.0, 1e-3)
     for dt, message in (
         (-1e-3, "dt must be >= 0, got -0.001"),
         (math.nan, "dt must be finite"),
         ("now", "dt must be an"),
     ):
-        with pytest.raises(InvalidValueError, match=message):
+        with refused(message):
             model.step(model.rest(), (1, 0, 0), 1.0, dt)
 
 
@@ -94,23 +93,17 @@ def test_wrong_states_and_steps(model):
     ],
 )
 def test_wrong_models(call, message):
-    with pytest.raises(InvalidValueError, match=message):
+    with refused(message):
         call()
 
 
 @every_model
 def test_huge_numbers_and_batches_are_refused_before_allocation(model):
-    with pytest.raises(
-        InvalidValueError,
-        match=r"batch axes must hold .* of state, twist, normal_force, dt$",
-    ):
+    with refused(r"batch axes must hold .* of state, twist, normal_force, dt$"):
         model.step(model.rest(), (1, 0, 0), np.broadcast_to(1.0, (10**5, 10**5)), 1e-3)
-    with pytest.raises(
-        InvalidValueError,
-        match="normal_force must be an array of numbers along at most 16 axes",
-    ):
+    with refused("normal_force must be an array of numbers along at most 16 axes"):
         model.step(model.rest(), (1, 0, 0), np.ones((1,) * 40), 1e-3)
-    with pytest.raises(InvalidValueError, match="twist must be finite"):
+    with refused("twist must be finite"):
         model.step_jacobians(model.rest(), (10**400, 0, 0), 1.0, 1e-3)
 
 
@@ -130,7 +123,7 @@ def test_a_truth_value_is_no_number_for_one_contact_or_many(model, truth):
                 "dt": 1e-3,
                 **wrong,
             }
-            with pytest.raises(InvalidValueError, match="no truth value"):
+            with refused("no truth value"):
                 model.step(**given)
 
 
@@ -147,7 +140,7 @@ def test_an_empty_batch_has_empty_derivatives(model):
 )
 def test_a_gradient_takes_no_cotangent_that_is_not_finite(wrong):
     inputs = {"wrenches_bar": np.ones((5, 3)), **wrong}
-    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+    with refused(next(iter(wrong))):
         pf.derivatives.rollout_vjp(
             MODELS["reduced"], None, np.zeros((5, 3)), 1.0, 1e-3, **inputs
         )

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction import formulas, geometry
 from planarfriction.patch import PUBLISHED_PATCHES
+from tests.support.refusals import refused
 
 PLAIN = pf.LuGre(mu_s=1.2)
 ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
@@ -432,5 +433,5 @@ def test_batches_at_rest(front):
         ):
             assert tuple(model.rest(batch).shape) == (*axes, *model.state_shape)
         for wrong in (-1, 1.5, "many", (2, -1), 10**9, (1,) * 40, None):
-            with pytest.raises(pf.errors.InvalidValueError, match="batch must"):
+            with refused("batch must"):
                 model.rest(wrong)

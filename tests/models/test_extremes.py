@@ -5,8 +5,8 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import derivatives
-from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
+from tests.support.refusals import refused
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAWS = {
@@ -111,7 +111,5 @@ def test_larger_ones_are_refused(model, name, value):
         lambda: derivatives.rollout(model, **sequence),
     ]
     for call in calls:
-        with pytest.raises(
-            InvalidValueError, match=rf"{name} must be between -1e\+50 and 1e\+50"
-        ):
+        with refused(rf"{name} must be between -1e\+50 and 1e\+50"):
             call()

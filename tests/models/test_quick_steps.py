@@ -4,55 +4,46 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
-MODELS = {
-    "published": pf.ReducedModelPublished(DISC, LAW),
-}
+MODEL = pf.ReducedModelPublished(DISC, LAW)
 GENERATOR = np.random.default_rng(3)
 TWISTS = GENERATOR.normal(size=(4, 3)) * [0.01, 0.01, 1.0]
 LOADS = np.array([1.0, 2.0, 0.0, 0.5])
 
 
-def _states(model):
-    scale = [1.0, 1.0, 0.01] if isinstance(model, pf.ReducedModelPublished) else 1.0
-    return (
-        GENERATOR.uniform(-0.6, 0.6, (4, *model.state_shape))
-        * LAW.largest_deflection
-        * scale
-    )
+def _states():
+    draw = GENERATOR.uniform(-0.6, 0.6, (4, 3))
+    return draw * LAW.largest_deflection * [1.0, 1.0, 0.01]
 
 
-@pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize(
     "load", [LOADS, 2.0, 2], ids=["loads", "one load", "whole number"]
 )
-def test_batches_step_as_their_members_do(name, load):
-    model = MODELS[name]
-    states = _states(model)
-    new, wrenches = model.step(states, TWISTS, load, 1e-3)
-    assert model.compiled.step_batch(states, TWISTS, load, 1e-3) is not None
+def test_batches_step_as_their_members_do(load):
+    states = _states()
+    new, wrenches = MODEL.step(states, TWISTS, load, 1e-3)
+    assert MODEL.compiled.step_batch(states, TWISTS, load, 1e-3) is not None
     for b in range(4):
         own = float(np.broadcast_to(load, 4)[b])
-        one, wrench = model.step(states[b], TWISTS[b].tolist(), own, 1e-3)
+        one, wrench = MODEL.step(states[b], TWISTS[b].tolist(), own, 1e-3)
         assert np.array_equal(new[b], one)
         assert np.array_equal(wrenches[b], wrench)
 
 
-@pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("load", [2.0, 0.0])
-def test_derivatives_are_differences_of_steps(name, load):
-    model = MODELS[name]
-    state = _states(model)[0]
+def test_derivatives_are_differences_of_steps(load):
+    state = _states()[0]
     twist = TWISTS[0]
     dt = 1e-4
-    found = model.step_jacobians(state, twist, load, dt)
-    assert model.compiled.jacobians_one(state, twist, load, dt) is not None
+    found = MODEL.step_jacobians(state, twist, load, dt)
+    assert MODEL.compiled.jacobians_one(state, twist, load, dt) is not None
 
     def change(by_state, by_twist):
         ends = [
-            model.step(state + sign * by_state, twist + sign * by_twist, load, dt)
+            MODEL.step(state + sign * by_state, twist + sign * by_twist, load, dt)
             for sign in (1.0, -1.0)
         ]
         return [0.5 * (one - other) for one, other in zip(*ends, strict=True)]
@@ -73,20 +64,8 @@ def test_derivatives_are_differences_of_steps(name, load):
         np.testing.assert_allclose(
             new, found.state_twist @ direction, rtol=1e-4, atol=1e-17
         )
-    small = model.step(state, twist, 1e-9, dt)[1] * 1e9
+    small = MODEL.step(state, twist, 1e-9, dt)[1] * 1e9
     np.testing.assert_allclose(found.wrench_load, small, rtol=1e-9)
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_derivatives_of_a_batch_are_those_of_its_members(name):
-    model = MODELS[name]
-    states = _states(model)
-    many = model.step_jacobians(states, TWISTS, LOADS, 1e-3)
-    for b in range(4):
-        one = model.step_jacobians(states[b], TWISTS[b], float(LOADS[b]), 1e-3)
-        assert all(
-            np.array_equal(all_[b], own) for all_, own in zip(many, one, strict=True)
-        )
 
 
 WRONG = {
@@ -109,7 +88,6 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_what_is_not_in_order_is_refused(name):
     wrong, message = WRONG[name]
-    model = MODELS["published"]
     given = {
         "state": np.zeros((4, 3)),
         "twist": TWISTS,
@@ -117,23 +95,21 @@ def test_what_is_not_in_order_is_refused(name):
         "dt": 1e-3,
         **wrong,
     }
-    with pytest.raises(pf.errors.InvalidValueError, match=message):
-        model.step(**given)
+    with refused(message):
+        MODEL.step(**given)
     one = {
         key: value[0] if isinstance(value, np.ndarray) else value
         for key, value in given.items()
     }
     if name != "loads for three":
-        with pytest.raises(pf.errors.InvalidValueError, match=message):
-            model.step_jacobians(**{**one, "normal_force": _plain(one["normal_force"])})
+        with refused(message):
+            MODEL.step_jacobians(**{**one, "normal_force": _plain(one["normal_force"])})
 
 
 @pytest.mark.parametrize("twist", [np.array(0.0), np.zeros((1, 3, 1))])
 def test_twists_of_other_axes_are_one_clear_line(twist):
-    with pytest.raises(
-        pf.errors.InvalidValueError, match=r"^twist must have shape \[..., 3\]"
-    ):
-        MODELS["published"].step(np.zeros((1, 3)), twist, 1.0, 1e-3)
+    with refused(r"^twist must have shape \[..., 3\]"):
+        MODEL.step(np.zeros((1, 3)), twist, 1.0, 1e-3)
 
 
 def _plain(value):

@@ -8,7 +8,7 @@ from numba.core.dispatcher import Dispatcher
 
 import planarfriction as pf
 from planarfriction import derivatives
-from planarfriction.errors import InvalidValueError
+from tests.support.refusals import refused
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
@@ -195,9 +195,8 @@ TWISTS = {
 def test_what_is_no_twist_is_refused(model, kind):
     for call in calls(model):
         before = compiled()
-        with pytest.raises(InvalidValueError, match="twist must") as caught:
+        with refused("twist must"):
             call(model.rest(), TWISTS[kind])
-        assert "\n" not in str(caught.value)
         assert compiled() == before
 
 
@@ -205,7 +204,7 @@ def test_what_is_no_twist_is_refused(model, kind):
 @pytest.mark.parametrize("kind", TWISTS)
 def test_what_is_no_state_is_refused(model, kind):
     for call in calls(model):
-        with pytest.raises(InvalidValueError, match="state must"):
+        with refused("state must"):
             call(TWISTS[kind], TWIST)
 
 
@@ -229,9 +228,9 @@ def test_what_is_no_load_or_step_is_refused(model, value):
         lambda x: model.step_jacobians(model.rest(), TWIST, x, DT),
     ):
         before = compiled()
-        with pytest.raises(InvalidValueError, match="normal_force must"):
+        with refused("normal_force must"):
             call(value)
         assert compiled() == before
     for call in (model.step, model.step_jacobians):
-        with pytest.raises(InvalidValueError, match="dt must"):
+        with refused("dt must"):
             call(model.rest(), TWIST, LOAD, value)

@@ -8,6 +8,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.patch import Grid, LinearGradient, Pressure, Uniform
+from tests.support.refusals import refused
 
 SQUARE = pf.ContactPatch.rectangle(0.02, cells=3)
 FINGER = pf.ContactPatch.rectangle(
@@ -192,8 +193,5 @@ def test_a_law_of_ones_own_cannot_make_nan():
 
     patch = pf.ContactPatch.rectangle(0.02, cells=3, pressure=Vanishing())
     assert patch.weights(1.0) == pytest.approx([1 / 9] * 9)
-    with pytest.raises(
-        InvalidValueError,
-        match="pressure must be > 0 on at least one cell at every load",
-    ):
+    with refused("pressure must be > 0 on at least one cell at every load"):
         patch.weights(3.0)

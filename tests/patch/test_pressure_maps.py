@@ -9,6 +9,7 @@ from PIL import Image
 
 import planarfriction as pf
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
+from tests.support.refusals import refused
 
 ROUNDING = 1e-15
 """Relative: a handful of operations, each rounded at 1e-16."""
@@ -163,9 +164,8 @@ def test_black_and_white_image_is_a_mask(tmp_path):
     ],
 )
 def test_broken_arrays(values, cell_size, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         pf.ContactPatch.from_pressure(values, cell_size)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -203,16 +203,13 @@ def test_missing_file_and_folder(tmp_path):
         ("missing.csv", "no such file"),
         ("folder.csv", "is a folder"),
     ):
-        with pytest.raises(FileError, match=reason):
+        with refused(reason, FileError):
             pf.ContactPatch.from_pressure(tmp_path / name, 0.001)
 
 
 def test_negative_pressures_in_a_file_name_the_file(tmp_path):
     (tmp_path / "pad.csv").write_text("1,-2\n")
-    with pytest.raises(
-        InvalidValueError,
-        match=r"pressure map .*pad.csv must be >= 0, got -2.0 at index \(0, 1\)",
-    ):
+    with refused(r"pressure map .*pad.csv must be >= 0, got -2.0 at index \(0, 1\)"):
         pf.ContactPatch.from_pressure(tmp_path / "pad.csv", 0.001)
 
 
@@ -235,9 +232,9 @@ def test_npy_files_that_hold_something_else(tmp_path):
 def test_colours_and_transparency_are_refused(tmp_path):
     Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "colour.png")
     Image.new("LA", (2, 2), (255, 100)).save(tmp_path / "clear.png")
-    with pytest.raises(FileError, match="colour image"):
+    with refused("colour image", FileError):
         pf.ContactPatch.from_pressure(tmp_path / "colour.png", 0.001)
-    with pytest.raises(FileError, match="partly transparent"):
+    with refused("partly transparent", FileError):
         pf.ContactPatch.from_pressure(tmp_path / "clear.png", 0.001)
 
 
@@ -256,9 +253,7 @@ def test_pixels_that_are_no_numbers_are_refused_without_a_warning(tmp_path):
     signalling = np.array([0x7FA00000], "<u4").tobytes()
     content = (tmp_path / "map.tif").read_bytes()
     (tmp_path / "map.tif").write_bytes(content.replace(ones, signalling + ones[4:], 1))
-    with pytest.raises(
-        InvalidValueError, match=r"must be finite, got nan at index \(0, 0\)"
-    ):
+    with refused(r"must be finite, got nan at index \(0, 0\)"):
         pf.ContactPatch.from_pressure(tmp_path / "map.tif", 0.001)
 
 
@@ -302,16 +297,16 @@ def test_labels_of_pandas_are_no_pressures(tmp_path, writing, options):
 def test_labels_that_may_be_pressures_are_asked_about(tmp_path):
     path = tmp_path / "pad.csv"
     path.write_text("0,1,2\n5,6,7\n")
-    with pytest.raises(
+    with refused(
+        r"first row is 0, 1, 2: labels \(header = true\) or pressures \(header = fal",
         FileError,
-        match=r"first row is 0, 1, 2: labels \(header = true\) or pressures \(header = fal",
     ):
         read(path)
     assert read(path, header=True).tolist() == [[5, 6, 7]]
     assert read(path, header=False).tolist() == [[0, 1, 2], [5, 6, 7]]
     path.write_text("0,5\n1,6\n2,7\n3,8\n")
-    with pytest.raises(
-        FileError, match=r"first column is 0, 1, 2, \.\.\.: labels \(index = true\)"
+    with refused(
+        r"first column is 0, 1, 2, \.\.\.: labels \(index = true\)", FileError
     ):
         read(path)
     assert read(path, index=False).shape == (4, 2)
@@ -343,12 +338,12 @@ def test_frames_are_chosen_and_never_stacked(tmp_path):
     images[0].save(tmp_path / "pad.tif", save_all=True, append_images=images[1:])
     for name in (*names, "pad.npy", "pad.npz", "pad.mat", "pad.tif"):
         scale = 4.0 if name == "pad.tif" else 1.0
-        with pytest.raises(
+        with refused(
+            rf"frame must be one of the 3 frames of .*{name}, 0 to 2, got None",
             FrictionError,
-            match=rf"frame must be one of the 3 frames of .*{name}, 0 to 2, got None",
         ):
             read(tmp_path / name)
-        with pytest.raises(FrictionError, match="got 3"):
+        with refused("got 3", FrictionError):
             read(tmp_path / name, frame=3)
         for i, each in enumerate(frames):
             np.testing.assert_array_equal(
@@ -363,7 +358,7 @@ def test_blank_lines_behind_every_row_part_nothing(tmp_path):
     (tmp_path / "pad.csv").write_bytes(b"5,6\r\r\n7,8\r\r\n")
     assert read(tmp_path / "pad.csv").tolist() == [[5, 6], [7, 8]]
     (tmp_path / "pad.csv").write_text("5,6\n7,8\n\n1,2\n")
-    with pytest.raises(FileError, match="blocks of 2, 1 rows"):
+    with refused("blocks of 2, 1 rows", FileError):
         read(tmp_path / "pad.csv")
     assert read(tmp_path / "pad.csv", frame=1).tolist() == [[1, 2]]
 
@@ -379,9 +374,7 @@ def test_frames_in_rows_and_one_below_another_have_a_shape(tmp_path):
     for name, index in (("rows.csv", True), ("stacked.csv", None)):
         found = read(tmp_path / name, index=index, frame_shape=(4, 3), frame=1)
         np.testing.assert_array_equal(found, frames[1])
-    with pytest.raises(
-        InvalidValueError, match="frame_shape must divide the 24 values"
-    ):
+    with refused("frame_shape must divide the 24 values"):
         read(tmp_path / "stacked.csv", frame_shape=(5, 3))
 
 
@@ -392,7 +385,7 @@ def test_exports_of_tekscan(tmp_path, name):
         head + "Frame 1\nB,1,2\nB,B,3\n\nFrame 2\nB,4,5\nB,B,6\n@@\n"
     )
     assert read(tmp_path / name, frame=1).tolist() == [[0, 4, 5], [0, 0, 6]]
-    with pytest.raises(FrictionError, match="one of the 2 frames"):
+    with refused("one of the 2 frames", FrictionError):
         read(tmp_path / name)
 
 
@@ -426,9 +419,8 @@ def test_prints_are_asked_about_and_inverted(tmp_path):
     rng = np.random.default_rng(1)
     paper = 250.0 - 0.8 * disc_image() + rng.integers(-3, 4, (64, 64))
     Image.fromarray(paper.astype(np.uint8)).save(tmp_path / "print.png")
-    with pytest.raises(
-        FileError,
-        match=r"ink on paper \(invert = true\) or pressure \(invert = false\)",
+    with refused(
+        r"ink on paper \(invert = true\) or pressure \(invert = false\)", FileError
     ):
         read(tmp_path / "print.png")
     patch = pf.ContactPatch.from_pressure(
@@ -450,11 +442,9 @@ def test_width_stands_in_for_the_cell_size():
         (0.002, 0.002), rel=1e-15
     )
     for sizes in ({}, {"cell_size": 1e-3, "width": 1e-3}):
-        with pytest.raises(
-            InvalidValueError, match="cell_size must be given, or else the width"
-        ):
+        with refused("cell_size must be given, or else the width"):
             pf.ContactPatch.from_pressure(PRESSURES, **sizes)
-    with pytest.raises(InvalidValueError, match="width must be > 0"):
+    with refused("width must be > 0"):
         pf.ContactPatch.from_pressure(PRESSURES, width=0.0)
 
 
@@ -469,5 +459,5 @@ def test_width_stands_in_for_the_cell_size():
     ],
 )
 def test_options_that_break_their_rule(options, message):
-    with pytest.raises(InvalidValueError, match=message):
+    with refused(message):
         pf.ContactPatch.from_pressure(PRESSURES, 1e-3, **options)

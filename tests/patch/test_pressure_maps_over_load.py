@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planarfriction as pf
-from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.errors import FrictionError
 from planarfriction.patch import shared
+from tests.support.refusals import refused
 
 LIGHT = np.array([[0.0, 2.0, 0.0], [0.0, 4.0, 2.0]])
 HEAVY = np.array([[30.0, 10.0, 0.0], [0.0, 20.0, 40.0]])
@@ -130,7 +131,7 @@ def test_scene_files(tmp_path):
     (tmp_path / "own.toml").write_text(
         (tmp_path / "own.toml").read_text().replace("values", "files")
     )
-    with pytest.raises(FrictionError, match=r"own\.toml"):
+    with refused(r"own\.toml", FrictionError):
         pf.Scene.from_file(tmp_path / "own.toml")
 
 
@@ -168,13 +169,12 @@ def test_scene_files(tmp_path):
     ],
 )
 def test_broken_maps(maps, loads, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         pf.ContactPatch.from_pressure(maps, 0.001, loads=loads)
-    assert "\n" not in str(caught.value)
 
 
 def test_maps_for_other_cells_are_refused():
-    with pytest.raises(InvalidValueError, match=r"pressure must have shape \[L, 9\]"):
+    with refused(r"pressure must have shape \[L, 9\]"):
         pf.ContactPatch.rectangle(
             0.01, cells=3, pressure=pf.PressureMaps([1.0, 2.0], [[1, 2], [3, 4]])
         )

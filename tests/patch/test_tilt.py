@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 import planarfriction as pf
-from planarfriction.errors import InvalidValueError
+from tests.support.refusals import refused
 
 LOAD = 3.0
 RECTANGLE = pf.ContactPatch.rectangle(0.1, 0.06)
@@ -130,5 +130,5 @@ def test_batches_broadcast_and_are_those_of_each():
     ],
 )
 def test_bad_moments_say_so(load, moments):
-    with pytest.raises(InvalidValueError, match=r"moments|normal_force"):
+    with refused(r"moments|normal_force"):
         RECTANGLE.weights(load, moments)

@@ -22,6 +22,7 @@ from planarfriction.plots.track import track_of
 from planarfriction.scenes.slip import bristles_of, slip_field
 from tests.support import synthetic
 from tests.support.pictures import faults
+from tests.support.refusals import refused
 
 LAW = pf.LuGre(
     mu_c=1.0, mu_s=1.0, sigma_0=1e4, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9
@@ -686,9 +687,9 @@ def test_an_mp4_file_is_a_film(tmp_path):
 def test_without_ffmpeg_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(film_files.shutil, "which", lambda name: None)
     monkeypatch.setitem(__import__("sys").modules, "imageio_ffmpeg", None)
-    with pytest.raises(
+    with refused(
+        r"ffmpeg is not installed: run pip install 'planarfriction\[ffmpeg\]'",
         FileError,
-        match=r"ffmpeg is not installed: run pip install 'planarfriction\[ffmpeg\]'",
     ):
         synthetic.solution().animate(tmp_path / "motion.mp4")
 
@@ -699,8 +700,8 @@ def test_an_ffmpeg_that_is_not_where_it_is_named_is_said_to_be_missing(
     pytest.importorskip("imageio_ffmpeg")
     monkeypatch.setattr(film_files.shutil, "which", lambda name: None)
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "gone"))
-    with pytest.raises(
-        FileError, match=r"there is no ffmpeg at .*gone, which imageio-ffmpeg names"
+    with refused(
+        r"there is no ffmpeg at .*gone, which imageio-ffmpeg names", FileError
     ):
         synthetic.solution().animate(tmp_path / "motion.mp4")
 
@@ -793,18 +794,17 @@ def test_what_cannot_be_animated_is_named_in_one_line(
     arguments, message, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises((FileError, InvalidValueError), match=message) as caught:
+    with refused(message, (FileError, InvalidValueError)):
         synthetic.solution().animate(**{"path": "motion.gif", **arguments})
-    assert "\n" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_solution_without_its_scene_is_not_animated(tmp_path):
     run = dataclasses.replace(synthetic.solution(), scene=None)
     run.data.attrs["scene_left_out"] = "it was so"
-    with pytest.raises(
-        FileError, match="the file has no scene, which the animation needs: it was so"
+    with refused(
+        "the file has no scene, which the animation needs: it was so", FileError
     ):
         run.animate(tmp_path / "motion.gif")
-    with pytest.raises(InvalidValueError, match="solution must be a Solution, got 5"):
+    with refused("solution must be a Solution, got 5"):
         plots.animate_solution(5, tmp_path / "motion.gif")

@@ -7,7 +7,7 @@ import pytest
 from scipy import integrate
 
 import planarfriction as pf
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import FileError
 from planarfriction.scenes import driven, in_hand
 from tests.support.anisotropic import (
     GRAIN,
@@ -18,6 +18,7 @@ from tests.support.anisotropic import (
     STRIBECK,
     reduced,
 )
+from tests.support.refusals import refused
 from tests.support.repository import script
 
 every_patch = pytest.mark.parametrize("name", PATCHES)
@@ -131,7 +132,7 @@ def test_a_grain_in_a_scene_file(tmp_path):
         ("[0.1, 0]", "[2, 0]", r"\[contact.patch\]: asymmetry must be shorter than 1"),
     ):
         (tmp_path / "wrong.toml").write_text(SHORT.replace(old, new))
-        with pytest.raises(FileError, match=message):
+        with refused(message, FileError):
             pf.Scene.from_file(tmp_path / "wrong.toml")
 
 
@@ -178,9 +179,8 @@ def test_dropped_cells_take_their_metric_along():
     ],
 )
 def test_wrong_metrics_get_one_line(metric, asymmetry, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         PLAIN.with_friction_metric(metric, asymmetry)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -198,6 +198,5 @@ def test_wrong_metrics_get_one_line(metric, asymmetry, message):
     ],
 )
 def test_what_knows_only_isotropic_friction_refuses(make):
-    with pytest.raises(InvalidValueError, match="must") as caught:
+    with refused("must"):
         make()
-    assert "\n" not in str(caught.value)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import tomllib
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import planarfriction as pf
 from planarfriction import FrictionError, Scene, Signal
 from planarfriction.scenes import drift, in_hand, published_velocity
 from planarfriction.scenes.files import to_toml
+from tests.support.refusals import refused
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 CSV_DIGITS = 1e-11  # the tables of the examples are printed with 12 digits
@@ -459,20 +461,18 @@ def test_files_of_the_wrong_kind_get_one_line(tmp_path):
     for name, content in cases.items():
         if content is not None:
             (tmp_path / name).write_bytes(content)
-        with pytest.raises(FrictionError) as caught:
+        with refused(re.escape(name), FrictionError):
             Scene.from_file(tmp_path / name)
-        assert name in str(caught.value)
-        assert "\n" not in str(caught.value)
-    with pytest.raises(FrictionError, match="is a folder"):
+    with refused("is a folder", FrictionError):
         (tmp_path / "folder.toml").mkdir()
         Scene.from_file(tmp_path / "folder.toml")
 
 
 def test_writing_says_why_it_cannot(tmp_path):
     scene = read(tmp_path, GOOD)
-    with pytest.raises(FrictionError, match=r"must end in \.toml or \.json"):
+    with refused(r"must end in \.toml or \.json", FrictionError):
         scene.to_file(tmp_path / "scene.yaml")
-    with pytest.raises(FrictionError, match="cannot be written"):
+    with refused("cannot be written", FrictionError):
         scene.to_file(tmp_path / "nowhere" / "scene.toml")
 
 
@@ -497,9 +497,8 @@ def test_a_key_of_many_names_is_refused_at_once(tmp_path, name):
     """The reader of the standard library would take minutes and gigabytes."""
     path = tmp_path / "scene.toml"
     path.write_text(f"{'.'.join([name] * 50_000)} = 1\n")
-    with pytest.raises(
-        pf.FrictionError,
-        match=r"scene\.toml: not valid TOML: a key of more than 100 names$",
+    with refused(
+        r"scene\.toml: not valid TOML: a key of more than 100 names$", pf.FrictionError
     ):
         pf.Scene.from_file(path)
 
@@ -511,7 +510,7 @@ def test_a_key_of_many_names_is_refused_at_once(tmp_path, name):
 def test_long_names_are_looked_at_once(tmp_path, name):
     path = tmp_path / "scene.toml"
     path.write_text(f"[{name} x")
-    with pytest.raises(pf.FrictionError, match=r"scene\.toml: not valid TOML"):
+    with refused(r"scene\.toml: not valid TOML", pf.FrictionError):
         pf.Scene.from_file(path)
 
 
@@ -521,9 +520,7 @@ def test_published_patches_check_their_width(tmp_path, width):
     patch = f'{{ shape = "published", name = "Circle", width = {width} }}'
     contact = f"[[contact]]\nnormal_force = 1.0\nlaw = {{}}\npatch = {patch}\n"
     path.write_text(f"t_end = 0.1\n[body]\nmass = 1.0\ninertia = 1.0\n{contact}")
-    with pytest.raises(
-        pf.FrictionError, match=r"\[contact\.patch\]: width must be a number"
-    ):
+    with refused(r"\[contact\.patch\]: width must be a number", pf.FrictionError):
         pf.Scene.from_file(path)
 
 
@@ -534,5 +531,5 @@ def test_maps_in_scene_files_take_the_options_of_maps(tmp_path):
     table = 'shape = "pressure-map"\nfile = "map.csv"\nwidth = 0.004\nframe = 1\nthreshold = 0.5\n'
     patch = read(tmp_path, GOOD[:start] + table + GOOD[end:]).contacts[0].model.patch
     assert patch.positions.tolist() == [[0.001, -0.001]]
-    with pytest.raises(FrictionError, match="frame must be one of the 2 frames"):
+    with refused("frame must be one of the 2 frames", FrictionError):
         read(tmp_path, GOOD[:start] + table.replace("frame = 1\n", "") + GOOD[end:])

@@ -9,6 +9,7 @@ import planarfriction as pf
 from planarfriction._engine.records import packed as limits
 from planarfriction.scenes import packing
 from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches, Segments
+from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 FINGER = pf.SoftFinger(c=6 * 0.02 / 9, n=1 / 3, k_per_newton=2.0, radius_max=0.01)
@@ -278,9 +279,8 @@ def test_pieces_that_no_run_would_end_are_refused():
         1e12,
         save_every=1e11,
     )
-    with pytest.raises(
+    with refused(
+        r"^t_end must be at most 1e\+09 s if the shape of a patch changes with the load, got 1",
         pf.FrictionError,
-        match=r"^t_end must be at most 1e\+09 s if the shape of a patch changes with the load, got 1",
-    ) as caught:
+    ):
         pf.simulate(scene)
-    assert "\n" not in str(caught.value)

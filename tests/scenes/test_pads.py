@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel, ReducedModel
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
 from planarfriction.scenes.start import first_slopes, first_states
+from tests.support.refusals import refused
 
 ONE = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
 _GRID = ContactPatch.disc(0.02, cells=4)
@@ -89,8 +89,9 @@ def _explicit(model, body, load, pull, t_end, steps):
     return y[size:]
 
 
-@pytest.mark.parametrize("patch", [ONE, DISCS], ids=["points", "discs"])
-@pytest.mark.parametrize("ratio", [None, 0.8])
+@pytest.mark.parametrize(
+    "patch, ratio", [(ONE, 0.8), (DISCS, None)], ids=["points", "discs"]
+)
 def test_the_solver_agrees_with_a_fine_explicit_integration(patch, ratio):
     """The load falls below what the bristles hold, again and again."""
     law = LuGre(mu_s=1.2, sigma_0=1e4, sigma_1=20.0, elasto_plastic=ratio)
@@ -238,15 +239,12 @@ def test_a_pressure_that_follows_the_load_refuses():
         mounted_on="body",
         pressure="follows",
     )
-    with pytest.raises(
-        InvalidValueError,
-        match="pad must be None for a pressure that follows the load",
-    ):
+    with refused("pad must be None for a pressure that follows the load"):
         simulate(Scene(_body(), contact, 0.01))
 
 
 def test_a_common_compliance_refuses():
     law = LuGre(sigma_1=0.0, elasto_plastic=0.9)
     contact = Contact(DistributedModel(_GRID, law, pad=Pad.measured(1e4, 0.5)), 1.0)
-    with pytest.raises(InvalidValueError, match="pad must have no common compliance"):
+    with refused("pad must have no common compliance"):
         simulate(Scene(_body(), contact, 0.01))

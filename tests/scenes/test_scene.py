@@ -1,6 +1,7 @@
 """Scenes: what makes one, what does not, and the ready scenes against the description of the experiments."""
 
 import dataclasses
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,6 +26,7 @@ from planarfriction.scenes import (
     in_hand_load,
     published_velocity,
 )
+from tests.support.refusals import refused
 
 ROUNDING = 1e-14  # a few roundings of numbers of order one
 
@@ -141,10 +143,8 @@ def test_a_scene_keeps_its_parts_and_makes_signals_of_numbers():
     ],
 )
 def test_what_is_no_scene_gets_one_line(make, message):
-    with pytest.raises(FrictionError) as caught:
+    with refused(re.escape(message), FrictionError):
         make()
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def test_breaks_are_those_of_all_signals_and_rounding_makes_no_new_ones():
@@ -239,7 +239,7 @@ def test_in_hand_load_1_of_the_second_placement():
 
 
 def test_in_hand_load_refuses_others():
-    with pytest.raises(FrictionError, match="each be 1 or 2, got load=3, placement=1"):
+    with refused("each be 1 or 2, got load=3, placement=1", FrictionError):
         in_hand_load(3)
 
 
@@ -283,7 +283,7 @@ def test_normal_drift_forces():
     assert load([0.5, 1.0, 1.08]) == pytest.approx(
         [9.81, 9.81, 9.81 + np.sin(6 * np.pi * 1.08)], abs=ROUNDING
     )
-    with pytest.raises(FrictionError, match="did you mean 'normal'"):
+    with refused("did you mean 'normal'", FrictionError):
         drift(stand_in(), load="nomral")
 
 
@@ -333,7 +333,7 @@ def test_driven_puts_the_named_point_where_the_velocity_is():
     assert driven(stand_in(patch), twist=(0, 0, 1)).velocity == Signal.constant(
         [0.0, 0.0, 1.0]
     )
-    with pytest.raises(FrictionError, match="did you mean 'origin'"):
+    with refused("did you mean 'origin'", FrictionError):
         driven(stand_in(patch), at="orgin")
 
 
@@ -408,9 +408,7 @@ def test_digests_tell_scenes_apart():
 
 
 def test_only_models_of_the_library_have_a_written_form():
-    with pytest.raises(
-        FrictionError, match="to be written to a file, got SimpleNamespace"
-    ):
+    with refused("to be written to a file, got SimpleNamespace", FrictionError):
         in_hand(stand_in()).to_dict()
 
 
@@ -425,5 +423,5 @@ def test_a_prescribed_velocity_needs_no_body():
         pf.Scene(None, scene.contacts, scene.t_end, velocity=[0.1, 0.0, 0.0]).body
         == scene.body
     )
-    with pytest.raises(FrictionError, match="body must be a Body, got None"):
+    with refused("body must be a Body, got None", FrictionError):
         a_scene(body=None)

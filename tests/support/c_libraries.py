@@ -46,7 +46,7 @@ MAPS = {
 FOLLOWING = {
     "soft": lambda: pf.ReducedModel(
         pf.ContactPatch.disc(
-            0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0), cells=15
+            0.01, pressure=pf.SoftFinger(k=2.0, c=0.009, n=1.0 / 3.0), cells=5
         ),
         LAW,
     ),

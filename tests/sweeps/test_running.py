@@ -27,6 +27,7 @@ from planarfriction import sweeps
 from planarfriction.errors import FileError, SweepError, SweepInterrupted
 from planarfriction.sweeps import keys, records, running
 from planarfriction.sweeps.settings import grid_of
+from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
@@ -229,11 +230,8 @@ def test_runs_of_a_nameless_measurement_are_not_kept(tmp_path):
         return lambda solution: float(solution.histories["y"].values[-1] < limit)
 
     for nameless in (near(1.0), functools.partial(end), lambda solution: 1.0):
-        with pytest.raises(
-            pf.FrictionError, match="measure must be a function with a name"
-        ) as caught:
+        with refused("measure must be a function with a name", pf.FrictionError):
             pf.sweep(grip, {"grip": [1.0]}, out=tmp_path, measure=nameless)
-        assert "\n" not in str(caught.value)
     assert pf.sweep(
         grip, {"grip": [1.0]}, measure=near(1.0)
     ).measured.values.tolist() == [1.0]
@@ -250,7 +248,7 @@ def test_runs_of_a_model_that_files_do_not_know_are_not_kept(tmp_path):
         pf.sweep(make, {"grip": [1.0, 2.0]}, measure=end).status.values.tolist()
         == ["success"] * 2
     )
-    with pytest.raises(pf.FrictionError, match=r"model must be one of .*registered"):
+    with refused(r"model must be one of .*registered", pf.FrictionError):
         pf.sweep(make, {"grip": [1.0]}, out=tmp_path)
 
 
@@ -338,12 +336,12 @@ def test_a_folder_in_place_of_a_file_changes_nothing(tmp_path):
     (file,) = tmp_path.glob("*.npz")
     file.unlink()
     file.mkdir()
-    with pytest.raises(FileError, match="cannot be written: it is a folder"):
+    with refused("cannot be written: it is a folder", FileError):
         pf.sweep(grip, {"grip": GRIPS}, out=tmp_path)
-    refused = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES})
-    (tmp_path / f"{refused.run.values[2, 0]}.failed.json").mkdir()
+    fails = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES})
+    (tmp_path / f"{fails.run.values[2, 0]}.failed.json").mkdir()
     again = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES}, out=tmp_path)
-    assert again.failure.values.tolist() == refused.failure.values.tolist()
+    assert again.failure.values.tolist() == fails.failure.values.tolist()
 
 
 def test_files_hold_what_runs_have_left_and_nothing_is_lost():
@@ -689,9 +687,9 @@ def leave(solution):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_processes_give_the_same_bits_take_no_lambda_and_may_die(tmp_path):
     with concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool:
-        with pytest.raises(
+        with refused(
+            "measure must be a function that other processes can import",
             pf.FrictionError,
-            match="measure must be a function that other processes can import",
         ):
             pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
         data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planarfriction as pf
-from planarfriction.errors import InvalidValueError, MissingExtraError
+from planarfriction.errors import MissingExtraError
+from tests.support.refusals import refused
 from tests.support.repository import script
 
 jax = pytest.importorskip("jax", reason="needs the extra [jax]")
 import jax.numpy as jnp  # noqa: E402
-from jax.flatten_util import ravel_pytree  # noqa: E402
 
 import planarfriction.jax as pj  # noqa: E402
 from planarfriction.jax.namespace import xp  # noqa: E402
@@ -194,22 +194,6 @@ def test_forward_values_are_those_of_numpy(kind, law):
             close(actual, expected)
 
 
-@every_model
-def test_rollouts_are_those_of_numpy(kind):
-    numpy_model, model = pairs(kind, "elasto-plastic")
-    motion = sway(300, 1e-4)
-    loads = np.linspace(0.5, 2.0, 300)
-    state = numpy_model.rest()
-    expected = []
-    loads[100:110] = 0.0
-    for twist, load in zip(motion, loads, strict=True):
-        state, wrench = numpy_model.step(state, twist, load, 1e-4)
-        expected.append(wrench)
-    actual = jax.jit(pj.rollout)(model, None, motion, loads, 1e-4)
-    close(actual.wrenches, expected)
-    close(actual.state, state, 1e-11)  # 300 steps of rounding
-
-
 EDGES = [
     [x, y, s]
     for x in (-1.0, 0.0, 1.0)
@@ -236,50 +220,6 @@ def test_derivative_of_sliding_is_that_of_the_kernel(kind):
     along = np.einsum("mi,mj->mij", numpy_model.surface.direction(units), units)
     wanted[speed > 0.0] = numpy_model.surface.direction_slope(units) + along
     assert np.abs(slope(scaled) - wanted).max() < 1e-11
-
-
-@pytest.mark.parametrize(
-    ("kind", "law"),
-    [("ellipsoid", "plain"), ("table", "wide"), ("distributed", "wide")],
-)
-def test_gradients_are_central_differences(kind, law):
-    numpy_model, model = pairs(kind, law)
-    count = 40
-    dt = 1e-4
-    motion = sway(count, dt)
-    loads = np.linspace(0.5, 2.0, count)
-    z0 = states(numpy_model, 2, seed=5)[1] * 0.2
-    weights = np.random.default_rng(2).normal(size=(count, 3)) * (1.0, 1.0, 100.0)
-    sizes = (
-        model.parameters,
-        1e-6 * np.ones_like(z0),
-        1e-3 * np.ones_like(motion),
-        np.ones_like(loads),
-    )
-    if z0.ndim == 1:
-        sizes[1][2] *= numpy_model.surface.contact_radius
-    flat_sizes, unravel = ravel_pytree(sizes)
-    start, _ = ravel_pytree((model.parameters, z0, motion, loads))
-
-    @jax.jit
-    def loss(change):
-        parameters, state, twist, load = unravel(start + flat_sizes * change)
-        run = pj.rollout(model.replace(parameters=parameters), state, twist, load, dt)
-        return (run.wrenches * weights).sum() + (run.state / sizes[1]).sum()
-
-    gradient = jax.jit(jax.grad(loss))(np.zeros_like(start))
-    random = np.random.default_rng(4)
-    directions = [
-        *np.eye(len(start))[: len(model.parameters)],
-        *random.normal(size=(5, len(start))),
-    ]
-    for direction in directions:
-        h = 1e-5  # error of the difference: 1e-10 of curvature, 1e-11 of rounding
-        expected = (loss(h * direction) - loss(-h * direction)) / (2.0 * h)
-        small = 1e-7 * np.linalg.norm(gradient)
-        assert float(gradient @ direction) == pytest.approx(
-            float(expected), rel=1e-5, abs=small
-        )
 
 
 # ---------------------------------------------------------------------- kinks
@@ -381,17 +321,13 @@ def test_eager_and_adjoint_agree_at_kinks_too(kind, law):
 def test_adjoint_says_what_it_cannot_differentiate():
     model = pairs("published", "wide")[1]
     motion = sway(5, 1e-4)
-    with pytest.raises(
-        InvalidValueError, match="surface must be held fixed with method='adjoint'"
-    ):
+    with refused("surface must be held fixed with method='adjoint'"):
         jax.grad(
             lambda m: pj.rollout(
                 m, None, motion, 1.0, 1e-4, method="adjoint"
             ).wrenches.sum()
         )(model)
-    with pytest.raises(
-        InvalidValueError, match="positions must be held fixed with method='adjoint'"
-    ):
+    with refused("positions must be held fixed with method='adjoint'"):
         jax.grad(
             lambda m: pj.rollout(
                 m, None, motion, 1.0, 1e-4, method="adjoint"
@@ -493,20 +429,15 @@ def test_leading_axes_broadcast():
 
 def test_wrong_input_is_named():
     model = pairs("ellipsoid", "plain")[1]
-    with pytest.raises(
-        InvalidValueError, match=r"twist must have shape \[\.\.\., T, 3\]"
-    ):
+    with refused(r"twist must have shape \[\.\.\., T, 3\]"):
         pj.rollout(model, None, np.zeros(3), 1.0, 1e-3)
-    with pytest.raises(InvalidValueError, match="broadcast"):
+    with refused("broadcast"):
         pj.rollout(model, None, np.zeros((4, 3)), np.ones(3), 1e-3)
-    with pytest.raises(InvalidValueError, match="method must be one of adjoint, eager"):
+    with refused("method must be one of adjoint, eager"):
         pj.rollout(model, None, np.zeros((4, 3)), 1.0, 1e-3, method="adjont")
-    with pytest.raises(InvalidValueError, match="patch must be a ContactPatch"):
+    with refused("patch must be a ContactPatch"):
         pj.DistributedModel("disc", PLAIN)
-    with pytest.raises(
-        InvalidValueError,
-        match=r"model must be one of planarfriction.jax .* got planarfriction\.mod",
-    ):
+    with refused(r"model must be one of planarfriction.jax .* got planarfriction\.mod"):
         pj.rollout(pairs("ellipsoid", "plain")[0], None, np.zeros((4, 3)), 1.0, 1e-3)
 
 
@@ -514,7 +445,7 @@ def test_a_missing_package_names_its_extra(monkeypatch):
     for name in [name for name in sys.modules if name.startswith("planarfriction.jax")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "jax", None)
-    with pytest.raises(MissingExtraError, match=r"pip install 'planarfriction\[jax\]'"):
+    with refused(r"pip install 'planarfriction\[jax\]'", MissingExtraError):
         importlib.import_module("planarfriction.jax")
 
 

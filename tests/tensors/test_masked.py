@@ -1,23 +1,13 @@
 """Arrays with a mask that masks nothing are plain numbers."""
 
-import importlib
-
 import numpy as np
-import pytest
 
 import planarfriction as pf
 
 
-@pytest.mark.parametrize(
-    "front",
-    [pytest.param(name, marks=getattr(pytest.mark, name)) for name in ("jax", "torch")],
-)
 def test_a_mask_that_masks_nothing_is_left_out(front):
-    pytest.importorskip(front)
-    models = importlib.import_module(f"planarfriction.{front}")
-    model = models.ReducedModel(
-        pf.ContactPatch.disc(0.02), pf.LuGre(mu_c=0.3, mu_s=0.4)
-    )
+    law = pf.LuGre(mu_c=0.3, mu_s=0.4)
+    model = front.model(pf.ContactPatch.disc(0.02), law, "ReducedModel")
     twist = np.array([0.01, 0.0, 1.0])
     load = np.array(2.0)
     _, plain = model.step(model.rest(), twist, load, 1e-3)

@@ -5,6 +5,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import PARAMETERS
+from tests.support.refusals import refused
 
 torch = pytest.importorskip(
     "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
@@ -171,7 +172,7 @@ def test_a_patch_that_depends_on_the_load_keeps_its_surface_s_shape():
         model.step(tensor(inputs[0]), tensor(inputs[1]), 2.0, 1e-4),
         reference.step(*inputs),
     )
-    with pytest.raises(pf.FrictionError, match="normal_force must be"):
+    with refused("normal_force must be", pf.FrictionError):
         DistributedModel(patch, PLAIN)
 
 
@@ -295,9 +296,8 @@ def test_weights_stay_a_pressure_distribution():
     ],
 )
 def test_wrong_input_is_one_line(make, message):
-    with pytest.raises(pf.FrictionError, match=message) as caught:
+    with refused(message, pf.FrictionError):
         make()
-    assert "\n" not in str(caught.value)
 
 
 def test_state_dicts_travel():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 torch = pytest.importorskip(
     "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
@@ -107,13 +108,10 @@ SECOND = {
 def test_second_derivatives_by_the_adjoint_are_one_line(way):
     model = module("reduced")
     *held, parameters = inputs(model)
-    with pytest.raises(
-        pf.FrictionError, match="use method='eager' to differentiate twice"
-    ) as caught:
+    with refused("use method='eager' to differentiate twice", pf.FrictionError):
         SECOND[way](lambda p: wrenches(model, "adjoint")(*held, p).square().sum())(
             parameters
         )
-    assert "\n" not in str(caught.value)
 
 
 def test_a_hessian_vector_product_is_eager():

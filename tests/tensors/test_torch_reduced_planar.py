@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 torch = pytest.importorskip(
     "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
@@ -255,9 +256,8 @@ def test_rollouts_take_the_compiled_adjoint(monkeypatch):
     ],
 )
 def test_numbers_out_of_range_are_one_line(numbers, message):
-    with pytest.raises(pf.FrictionError, match=message) as caught:
+    with refused(message, pf.FrictionError):
         build(**numbers)
-    assert "\n" not in str(caught.value)
 
 
 def test_smoke_test_prints_one_line_and_sees_a_torque_without_its_radius(
@@ -269,5 +269,5 @@ def test_smoke_test_prints_one_line_and_sees_a_torque_without_its_radius(
     monkeypatch.setattr(
         reduced_planar, "simulate", lambda *a: simulate(*a) / tensor([1.0, 1.0, 0.05])
     )
-    with pytest.raises(pf.FrictionError, match="above mu_s f_n r"):
+    with refused("above mu_s f_n r", pf.FrictionError):
         smoke_test()

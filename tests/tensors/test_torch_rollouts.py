@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.refusals import refused
 
 torch = pytest.importorskip(
     "torch", reason="needs PyTorch: pip install 'planarfriction[torch]'"
@@ -270,7 +271,7 @@ def test_second_derivatives_need_the_eager_roll_out():
         wrenches = rollout(model, None, v, 1.0, DT, method=method).wrenches
         return torch.autograd.grad(wrenches.square().sum(), [raw], create_graph=True)[0]
 
-    with pytest.raises(pf.FrictionError, match="method='eager'"):
+    with refused("method='eager'", pf.FrictionError):
         slope("adjoint").backward()
     slope("eager").backward()
     assert raw.grad.isfinite()
@@ -322,9 +323,8 @@ def test_wrong_input_is_one_line(change, message):
         "normal_force": 1.0,
         "dt": DT,
     }
-    with pytest.raises(pf.FrictionError, match=message) as caught:
+    with refused(message, pf.FrictionError):
         rollout(**{**given, **change})
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_package_names_its_extra(monkeypatch):
@@ -343,8 +343,8 @@ def test_a_missing_package_names_its_extra(monkeypatch):
         return original(name, *rest)
 
     monkeypatch.setattr(builtins, "__import__", without_torch)
-    with pytest.raises(
+    with refused(
+        r"torch is not installed: run pip install 'planarfriction\[torch\]'",
         pf.FrictionError,
-        match=r"torch is not installed: run pip install 'planarfriction\[torch\]'",
     ):
         import planarfriction.torch  # noqa: F401

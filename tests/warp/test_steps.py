@@ -7,6 +7,7 @@ import pytest
 
 import planarfriction as pf
 from tests.support import single_precision
+from tests.support.refusals import refused
 from tests.support.walks import walk
 
 wp = pytest.importorskip("warp", reason="needs the extra [warp]")
@@ -213,9 +214,9 @@ def test_shapes():
     ]
     assert found() == pytest.approx(np.array(then), rel=1e-9)
     friction.which.assign(np.array([0, 2, 1], dtype=np.int32))
-    with pytest.raises(
+    with refused(
+        r"parameters must be finite and in range, got .* contacts \[1\]",
         pf.FrictionError,
-        match=r"parameters must be finite and in range, got .* contacts \[1\]",
     ):
         found()
 
@@ -321,9 +322,8 @@ def test_bad_numbers(place, value):
     )
     assert np.array_equal(new.numpy()[1], given["state"][1])
     what = "parameters" if place == "mu_s" else "state, twist and normal_force"
-    with pytest.raises(
-        pf.FrictionError,
-        match=rf"{what} must be finite and in range, got .* contacts \[1\]",
+    with refused(
+        rf"{what} must be finite and in range, got .* contacts \[1\]", pf.FrictionError
     ):
         friction.check()
     friction.check()
@@ -349,7 +349,7 @@ def test_bad_numbers(place, value):
     ],
 )
 def test_bad_options(options, words):
-    with pytest.raises(pf.FrictionError, match=words):
+    with refused(words, pf.FrictionError):
         Model(**{"model": MODELS["few"](), "contacts": 3, "device": "cpu"} | options)
 
 
@@ -372,5 +372,5 @@ def test_bad_arrays():
         "dt must": (3, -1.0),
     }
     for words, (place, value) in wrong.items():
-        with pytest.raises(pf.FrictionError, match=words):
+        with refused(words, pf.FrictionError):
             friction.step(*given[:place], value, *given[place + 1 :])

@@ -161,7 +161,7 @@ def step(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, cell_rows: Any, advance: Any,
     copied: int, pad: bool, read: Any,
 ) -> None:  # fmt: skip
-    """Advance the bristles by `dt` at a held twist, and write the wrench at the end; the load of a `pad` is behind V."""
+    """Advance the bristles by `dt` at a held twist, and write the wrench at the end; behind V is a load."""
     shared = (dt, v[3] if pad else 0.0)
     put(
         out,
