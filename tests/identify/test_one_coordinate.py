@@ -10,7 +10,6 @@ from planarfriction.identify import Log, verdicts
 from planarfriction.identify.problem import SOFT, softened
 from planarfriction.identify.sensor_errors import Rig
 from tests.support.identification_logs import LOAD, PATCH, clean_log, fitted
-from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=0.25, mu_s=0.4, v_s=0.01, sigma_0=3000.0, sigma_1=3.0, sigma_2=0.75)
 FEW = pf.ContactPatch.disc(0.01, cells=3)

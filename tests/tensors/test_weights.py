@@ -55,7 +55,7 @@ def power(front, model, twists, loads, bars, method):
     return of
 
 
-def weighed(front, kind, law, pad=None):  # noqa: F811
+def weighed(front, kind, law, pad=None):
     options = {"pad": pad}
     if front.name == "torch":
         options["trainable"] = ("mu_c", "mu_s", "weights")
