@@ -223,13 +223,7 @@ def _with(function: Any, **others: Any) -> Any:
 LIGHTEST = 1e-6
 """Takes the place of `formulas.LIGHTEST` for pads in single precision, whose range of numbers is short."""
 
-STILL = 1e-18
-"""Takes the place of `elastic.STILL` in single precision, where squares of smaller ones leave the range."""
-
-_SINGLE = {
-    "factors": _with(elastic.factors, formulas=SimpleNamespace(LIGHTEST=LIGHTEST)),
-    "traction": _with(elastic.traction, STILL=STILL),
-}
+_FACTORS = _with(elastic.factors, formulas=SimpleNamespace(LIGHTEST=LIGHTEST))
 
 
 def _cell(size: int, pad: bool, precision: str) -> tuple[Any, Any, Any]:
@@ -244,7 +238,7 @@ def _cell(size: int, pad: bool, precision: str) -> tuple[Any, Any, Any]:
             sliding = _sliding_of_disc
             moved = _with(moved, sliding=sliding)
             plain = _with(plain, moved=moved)
-        step = _with(step, moved=moved, **_SINGLE)
+        step = _with(step, moved=moved, factors=_FACTORS)
     return step if pad else plain, plain, sliding
 
 
