@@ -135,11 +135,6 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         per = 1.0 / xp.stop_gradient(slide + spin + math.sqrt(rest))
         return formulas.disc_friction_above(per * slide, per * spin, rest * per * per)
 
-    def factors(pad: Any) -> tuple[Any, Any]:
-        """Return `elastic.factors` of a piece that has a stiffness, whose slopes stay in range."""
-        load = xp.maximum(pad.load, formulas.LIGHTEST * pad.stiff)
-        return pad.stiff / load, load / pad.stiff
-
     def traction(law: Any, y: Any, rate: Any, u: Any) -> Any:
         """Return `elastic.traction` in a unit of speed that keeps squares and their slopes in range."""
         speed = xp.stop_gradient(xp.root(dot(u, u)))
@@ -164,7 +159,6 @@ def _twins(xp: Any) -> list[tuple[Any, Any]]:
         (vectors.dot, dot),
         (vectors.square, lambda a: dot(a, a)),
         (formulas.disc_friction, disc_friction),
-        (elastic.factors, factors),
         (elastic.traction, traction),
         (surfaces.place, functools.partial(_place, xp)),
         (published_contact.through, through),
