@@ -65,7 +65,10 @@ class DistributedModel(FrictionPytree, CellsModel):
         self.of_law = pad is None or pad.springs_of_law
 
     def compiled(self) -> PackedRollout:
-        """Return the model as compiled rollouts take it."""
+        """Return the model as compiled rollouts take it.
+
+        Raises InvalidValueError as `pack_cells` does.
+        """
         kind = self.kind, self.elasto_plastic, self.of_law
         return pack_cells(*kind, self.weights, self.positions, self.stiffness)  # pyright: ignore
 
