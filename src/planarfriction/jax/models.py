@@ -65,8 +65,9 @@ class DistributedModel(FrictionPytree, CellsModel):
         self.of_law = pad is None or pad.springs_of_law
 
     def compiled(self) -> PackedRollout:
-        """Return the model as compiled rollouts take it. Raises InvalidValueError for contacts with
-        different weights on a pad with the stiffness of the law.
+        """Return the model as compiled rollouts take it.
+
+        Raises InvalidValueError as `pack_cells` does.
         """
         kind = self.kind, self.elasto_plastic, self.of_law
         return pack_cells(*kind, self.weights, self.positions, self.stiffness)  # pyright: ignore
