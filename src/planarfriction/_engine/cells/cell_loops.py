@@ -49,7 +49,7 @@ class Element(NamedTuple):
 
 
 POINT = Element("points", 2, points.evaluate, points.step, slopes=(2, 0))
-DISC = Element("discs", 3, discs.evaluate, discs.step)
+DISC = Element("discs", 3, discs.evaluate, discs.step, forward=(16, 0))
 LEANING_POINT = Element(
     "leaning points",
     2,
@@ -63,6 +63,7 @@ LEANING_DISC = Element(
     asymmetric_cells.evaluate_disc,
     asymmetric_cells.step_disc,
     asymmetric_cells.within_disc,
+    forward=(16, 0),
 )
 """Elements whose law is a `Leaning`; the asymmetry stands behind the numbers of the lever."""
 
