@@ -266,7 +266,7 @@ def test_a_grip_beside_the_centre_of_mass_holds_as_in_mujoco():
 def in_operations(patches):
     """`CoupledPatches.step` in operations of JAX, for a batch of problems."""
     models = [_in_jax(model) for model in patches.models]
-    by_load = any(model.pad is not None for model in models)
+    by_load = any(model.stiffness is not None for model in models)
     radius = jnp.array(
         [np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models]
     )

@@ -333,7 +333,8 @@ def test_scenes_page_names_every_key_and_every_member():
     page = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
     keys = {*files.SCENE_KEYS, *files.BODY_KEYS, *files.CONTACT_KEYS}
     keys |= {field.name for field in dataclasses.fields(SoftFinger)}
-    for family in (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES):
+    parts = families.LAWS, families.PADS, families.SHAPES
+    for family in (*parts, families.MODELS, families.SURFACES):
         keys |= {*family}.union(
             *(inspect.signature(make).parameters for make in family.values())
         )

@@ -189,14 +189,15 @@ def test_a_part_of_the_motion_at_a_time_gives_the_same(monkeypatch):
         ("ellipsoid", 1e-4, 1e-5),
         ("table", 1e-5, 1e-4),
         ("reduced", 1e-4, 1e-5),
-        ("fixed reduced", 1e-4, 3e-5),
+        ("fixed reduced", 1e-4, 1e-4),
     ],
 )
 def test_derivatives_are_central_differences(kind, h, rtol):
     """Through sliding, a stop, a contact that loses its load, and a new slip.
 
     The Jacobian of a table jumps from cell to cell, so that differences are off by a share of their step; the smaller
-    step has more rounding. Bristles of a fixed stiffness that a falling load brings back are stiffer.
+    step has more rounding. Bristles of a pad that a falling load brings back are stiffer, and the ends of its damping are
+    kinks.
     """
     found = sensitivities(kind)
     for p, name in enumerate(NAMES):

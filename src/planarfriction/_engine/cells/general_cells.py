@@ -13,10 +13,12 @@ from typing import Any, NamedTuple
 from planarfriction._engine.bristles.law import traction
 from planarfriction._engine.cells.cells import Lever
 from planarfriction._engine.codegen.derivatives import derive
+from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.small_matrices import inverse
 from planarfriction._engine.codegen.source import run_source, text_of
 from planarfriction._engine.codegen.vectors import (
     Vector,
+    dot,
     matrix_applied,
     matrix_applied_back,
     matrix_product,
@@ -207,9 +209,18 @@ def back_substitute(
         scatter(out, i, n, matrix_applied(_matrix(bristle, lin, INVERSE, i, n), driven))
 
 
+@kernel
+def _along(change: Vector, u: Vector, rate: Vector) -> Vector:
+    """Return the part of a change of z' that the damping of a pad sees: along u, while its lambda is inside (0, 1)."""
+    square = dot(u, u)
+    share = ratio(dot(rate, u), square)
+    inside = share > 0.0 and share < 1.0
+    return times(ratio(dot(change, u), square) if inside else 0.0, u)
+
+
 def change(
     contact: Place, z: Doubles, zdot: Doubles, lin: Doubles, dz: Doubles, dzdot: Doubles, rows: Doubles,
-    friction: float, size: float, *, lever: Lever, bristle: Bristle, read: Any,
+    friction: float, size: float, *, lever: Lever, bristle: Bristle, read: Any, pad: bool,
 ) -> None:  # fmt: skip
     """Write the changes of `z'` and of the wrench; bristles and their limits grow with friction."""
     record = read(contact)
@@ -233,10 +244,14 @@ def change(
         if bristle.linear:
             t = plus(traction(record.law, a, rate, u), -record.law.sigma_0, grown)
         else:  # the traction sees the bristle as it is, and only its rate as that of a smaller one
+            slower = matrix_applied(by_z, grown)
+            if pad:
+                v = lever.seen(cell, three(rows.twist))
+                slower = _along(slower, v, bristle.vector(zdot, i, n))
             t = plus(
                 matrix_applied(_matrix(bristle, lin, C, i, n), dz_i),
                 record.law.sigma_1,
-                matrix_applied(by_z, grown),
+                slower,
             )
             t = plus(t, 1.0, matrix_applied(_matrix(bristle, lin, E, i, n), u))
         total = plus(total, record.weights[i], lever.wrench(cell, t))
