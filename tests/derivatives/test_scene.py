@@ -196,8 +196,7 @@ def test_derivatives_are_central_differences(kind, h, rtol):
     """Through sliding, a stop, a contact that loses its load, and a new slip.
 
     The Jacobian of a table jumps from cell to cell, so that differences are off by a share of their step; the smaller
-    step has more rounding. Bristles of a pad that a falling load brings back are stiffer, and the ends of its damping are
-    kinks.
+    step has more rounding. Bristles of a pad that a falling load brings back are stiffer, and its damping has kinks.
     """
     found = sensitivities(kind)
     for p, name in enumerate(NAMES):
