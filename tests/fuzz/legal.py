@@ -25,6 +25,10 @@ SQUARE = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)]
 
 SKIPPED = {
     "warm_up": "compiles for minutes",
+    **{
+        f"Pad.{name}": "is called by models alone, which check"
+        for name in ("check", "pieces", "compliance", "shares")
+    },
     "plots.animate_solution": "draws for seconds; tests/plots/test_animation.py attacks it",
     "plots.interactive_limit_surface": "needs plotly; checks what plot_limit_surface checks",
     "Solution.animate": "draws for seconds; tests/plots/test_animation.py attacks it",

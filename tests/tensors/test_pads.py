@@ -5,7 +5,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from tests.tensors.test_discs import DT, assert_close, front, patch, samples  # noqa: F401
+from tests.tensors.test_discs import DT, assert_close, patch, samples
 
 PLAIN = pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7)
 LAW = pf.LuGre(mu_s=1.2, sigma_1=30.0, elasto_plastic=0.9)
@@ -27,7 +27,7 @@ def moments_of(z, f):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_values_are_those_of_numpy(front, case):  # noqa: F811
+def test_values_are_those_of_numpy(front, case):
     kind, pad = CASES[case]
     law = PLAIN if case == "layer of points" else LAW
     model = pf.DistributedModel(patch(kind), law, pad=pad)
@@ -45,7 +45,7 @@ def test_values_are_those_of_numpy(front, case):  # noqa: F811
         assert_close(front.plain(got), want, 1e-9)
 
 
-def test_single_precision_has_values_and_slopes(front):  # noqa: F811
+def test_single_precision_has_values_and_slopes(front):
     soft = pf.Pad.layer(1e4, 2e-3)  # whose numbers without load are the least
     model = pf.DistributedModel(patch("discs"), LAW, pad=soft)
     ours = front.model(patch("discs"), LAW, single=True, pad=soft)
@@ -62,7 +62,7 @@ def test_single_precision_has_values_and_slopes(front):  # noqa: F811
 
 
 @pytest.mark.parametrize("case", ["turned discs at a load", "layer of discs"])
-def test_rollouts_are_steps_of_numpy_whose_slopes_are_differences(front, case):  # noqa: F811
+def test_rollouts_are_steps_of_numpy_whose_slopes_are_differences(front, case):
     kind, pad = CASES[case]
     model = pf.DistributedModel(patch(kind), LAW, pad=pad)
     ours = front.model(patch(kind), LAW, pad=pad)
@@ -100,7 +100,7 @@ def test_rollouts_are_steps_of_numpy_whose_slopes_are_differences(front, case): 
 
 
 @pytest.mark.parametrize("method", ["adjoint", "eager"])
-def test_the_law_moves_its_own_stiffness_only(front, method):  # noqa: F811
+def test_the_law_moves_its_own_stiffness_only(front, method):
     """A stiffness of the pad's own does not feel `sigma_0`; one of the law does, and other numbers are felt by both."""
     rng = np.random.default_rng(6)
     v = rng.normal(size=(8, 3)) * [0.03, 0.03, 6.0]
@@ -138,7 +138,7 @@ def test_the_law_moves_its_own_stiffness_only(front, method):  # noqa: F811
         assert (abs(front.plain(power(other) / power(vector)) - 1.0) < 1e-9) == (pad is LAYER)  # fmt: skip
 
 
-def test_few_discs_of_a_pad_are_those_of_numpy(front):  # noqa: F811
+def test_few_discs_of_a_pad_are_those_of_numpy(front):
     model = pf.ReducedModel(patch("points"), LAW, cells=9, pad=LAYER)
     ours = front.model(patch("points"), LAW, "ReducedModel", cells=9, pad=LAYER)
     z, v, f = samples(model.state_shape)
@@ -147,7 +147,7 @@ def test_few_discs_of_a_pad_are_those_of_numpy(front):  # noqa: F811
         assert_close(front.plain(got), want, 1e-9)
 
 
-def test_a_pad_is_part_of_the_model(front):  # noqa: F811
+def test_a_pad_is_part_of_the_model(front):
     soft = pf.Pad.measured(4e3, common=0.4)
     rule = f"pad must have no common compliance for {front.name}.DistributedModel"
     with pytest.raises(InvalidValueError, match=rule):

@@ -130,7 +130,7 @@ class RateLaw(FrictionLaw):
         pull = np.empty((speed.size, 3))
         for _ in range(400):
             steps.ready(steps.step_many)(
-                table, z, twist, _ALONE, dt, new, pull, np.empty(3)
+                table, z, twist, _ALONE, dt, new, pull, np.empty(steps.SCRATCH)
             )
             z, new = new, z
         return np.where(

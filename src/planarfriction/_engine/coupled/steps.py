@@ -28,6 +28,10 @@ NUDGE = 1e-5
 """Share of the load over which steps of a pad are compared for their slopes."""
 
 
+SCRATCH = 7
+"""Numbers of the scratch of `step_many`: a twist, its load, and a wrench."""
+
+
 class Stepped(NamedTuple):
     """A contact at R loads, and the function that steps it."""
 
@@ -124,13 +128,14 @@ def step_many(
     stepped: np.ndarray, z: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray, new: np.ndarray,
     wrench: np.ndarray, scratch: np.ndarray,
 ) -> bool:  # fmt: skip
-    """Step B contacts: `z`, `new` [B, S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [7]."""
+    """Step B contacts: `z`, `new` [B, S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [`SCRATCH`]."""
     table = _read(stepped)
     (count, n) = z.shape
     loads = load.shape[0]
     steps = dt.shape[0]
     valid = n == table.states and twist.shape[0] == count and twist.shape[1] == 3
     valid = valid and (loads == 1 or loads == count) and (steps == 1 or steps == count)
+    valid = valid and scratch.shape[0] >= SCRATCH
     for b in range(count if valid else 0):
         valid = valid and _positive(
             load[b if loads > 1 else 0], dt[b if steps > 1 else 0]

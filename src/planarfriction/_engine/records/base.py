@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction._engine.coupled.steps import (
+    SCRATCH,
     UNFIT,
     jacobians,
     ready,
@@ -238,7 +239,7 @@ class CompiledModel:
             new = _EMPTY((count, self._size))
             wrench = _EMPTY((count, 3))
             if not step_many(
-                table, rows, twist, normal_force, dt, new, wrench, _EMPTY(7)
+                table, rows, twist, normal_force, dt, new, wrench, _EMPTY(SCRATCH)
             ):
                 return None
         except _REFUSED:
@@ -321,7 +322,7 @@ class CompiledModel:
             table = self.step_table(contact)
             seen = _seen(v[rows], offset)
             ready(step_many)(
-                table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(7)
+                table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(SCRATCH)
             )
             new[rows], wrench[rows] = end, _pull(pull, offset)
         return new.reshape(state.shape), wrench.reshape(twist.shape)
