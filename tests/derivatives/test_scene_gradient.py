@@ -153,8 +153,9 @@ def agree(scene, numbers, of_motion, of_wrenches):
 def test_the_reverse_is_the_product_with_the_derivatives_forwards(kind):
     """Two methods of order 4 with steps of their own; through a lost load, stops and a new slip.
 
-    Each is right to a few 1e-7 of the motion, on a pad, whose damping has kinks, to a few 1e-6. Wrenches follow stiff bristles: of the ellipsoid 7e-6 to 4e-5 were seen,
-    in programs that differ in last bits, and so in the steps that they take.
+    Each is right to a few 1e-7 of the motion; on a pad, whose damping has kinks, to a few 1e-6. Wrenches follow stiff
+    bristles: of the ellipsoid 7e-6 to 4e-5 were seen, in programs that differ in last bits, and so in the steps that
+    they take.
     """
     numbers = {
         "signals": SIGNALS | {"fixed.normal_force": KNOTS},
