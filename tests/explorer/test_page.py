@@ -509,6 +509,7 @@ def test_a_server_leaves_ctrl_c_as_it_was():
     assert signal.getsignal(signal.SIGINT) is heard
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_both_names_of_this_computer_open_a_socket():
     """The handshake of a browser at either address; a page of another site gets 403."""
     from tornado.httpclient import HTTPClientError, HTTPRequest

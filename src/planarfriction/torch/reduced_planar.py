@@ -161,7 +161,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         Raises InvalidValueError for what is not a tensor `[..., 3]`.
         """
         v_scaled = self._number("v_scaled", v_scaled)
-        (law, shape, _) = self._contact_at(None)
+        law, shape = self._contact_at(None)
         speed = xp.norm(v_scaled, -1)
         # Zero at rest.
         h = shape.surface(v_scaled, speed) / torch.where(speed > 0.0, speed, 1.0)
@@ -177,7 +177,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
         Raises InvalidValueError for tensors whose shapes do not fit.
         """
-        law, shape, _ = self._contact_at(None)
+        law, shape = self._contact_at(None)
         z, v, load = self._inputs(z, v, f_n)
         by = published.drive(xp, law, shape, v)
         z, rate = (
