@@ -38,9 +38,8 @@ def stuck(
     places = np.array([np.bincount(rectangle, areas * each) for each in positions.T])
     places = (places / whole).T
     sides = np.broadcast_to(np.sqrt(whole)[:, None], places.shape)
-    if len(whole) == len(areas):
-        places = positions[np.argsort(rectangle)]
-        sides = sizes[np.argsort(rectangle)]
+    if len(whole) == len(areas):  # none is taken together with others
+        sides = sizes
     moved = np.zeros((2, len(whole), 3))
     moved[0, :, 0] = 1.0
     moved[1, :, 1] = 1.0

@@ -121,7 +121,9 @@ def _frame(pad: Pad, patch: ContactPatch) -> _Frame:
     if compliance is None:
         return _Frame(turn, None)
     about_middle = turn @ compliance @ turn.T
-    turn[:2] = np.linalg.eigh(about_middle[:2, :2])[1].T @ turn[:2]
+    # Axes of a square or a disc are not determined: rounding must not choose them.
+    if abs(about_middle[0, 1]) > ALIKE * about_middle[:2, :2].trace():
+        turn[:2] = np.linalg.eigh(about_middle[:2, :2])[1].T @ turn[:2]
     return _Frame(turn, np.diag(turn @ compliance @ turn.T))
 
 
@@ -187,5 +189,6 @@ def _kinds(few: ContactPatch, stiffness: np.ndarray, middle: np.ndarray) -> np.n
     """Return the number `[n]` of the kind of each disc: images of each other are of one kind."""
     distances = np.hypot(*(few.positions - middle).T)
     told = np.stack([distances, few.radii, few.weights(), stiffness], -1)
-    alike = np.round(told / (ALIKE * told.max(axis=0)))
-    return np.unique(alike, axis=0, return_inverse=True)[1].reshape(-1)
+    apart = np.abs(told[:, None] - told) / told.max(axis=0)
+    first = (apart <= ALIKE).all(axis=-1).argmax(axis=1)
+    return np.unique(first, return_inverse=True)[1].reshape(-1)

@@ -310,8 +310,8 @@ class ContactPatch(ByValue):
     ) -> ContactPatch:
         """Return a patch of contact points `[N, 2]` [m] with relative `weights` `[N]` (equal if None), such as feet.
 
-        `area` [m^2] is what each point stands for; only `areas`, `area` and `pressure_values` look at it. Raises
-        InvalidValueError for weights below zero.
+        `area` [m^2] is what each point stands for; only `areas`, `area`, `pressure_values` and `Pad.layer` look at it.
+        Raises InvalidValueError for weights below zero.
         """
         positions = validation.array("positions", positions, (None, 2))
         shape = positions.shape[:1]
