@@ -99,8 +99,20 @@ def reference(model: Any, inputs: tuple[np.ndarray, ...]) -> np.ndarray:
     return model.step(*given, moments=moments)[1]
 
 
-def error(model: Any, inputs: tuple[np.ndarray, ...], found: Any) -> float:
-    """Return the largest error of wrenches in the load, or the wrench where that is larger; torques over the radius."""
+def fastest(model: Any, inputs: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Return the largest speed of a place of the patch in each contact [m/s]."""
+    vx, vy, spin = inputs[1].T[..., None]
+    x, y = model.patch.positions.T
+    return np.hypot(vx - spin * y, vy + spin * x).max(-1)
+
+
+def error(
+    model: Any, inputs: tuple[np.ndarray, ...], found: Any, *, beside: Any = 0.0
+) -> float:
+    """Return the largest error of wrenches in the load, or the wrench where that is larger; torques over the radius.
+
+    Only what is beyond `beside`, a share of the load, counts.
+    """
     wanted = reference(model, inputs)
     lever = np.array([1.0, 1.0, 1.0 / np.abs(model.patch.positions).max()])
     size = np.maximum(inputs[2], np.abs(wanted * lever).max(1))[:, None]
@@ -109,7 +121,7 @@ def error(model: Any, inputs: tuple[np.ndarray, ...], found: Any) -> float:
         * lever
         / np.where(size > 0.0, size, 1.0)
     )
-    return float(off.max())  # NaN stays
+    return float((off.max(1) - beside).max())  # NaN stays
 
 
 def settled(model: Any, inputs: tuple[np.ndarray, ...]) -> np.ndarray:
