@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike
 
 from planarfriction._engine.records.base import CompiledModel, StepJacobians
 from planarfriction._engine.records.packed import PackedModel
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, by_parts, unusual
 from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LIGHTEST
 from planarfriction.laws import FrictionLaw
+from planarfriction.models.cell_loads import Cells
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.moment_pressure import centre_of, moments_of
@@ -153,7 +155,15 @@ class FrictionModel(ByValue):
         return rate, load[..., None] * unit
 
     def step(
-        self, state: Any, twist: Any, normal_force: Any, dt: Any, *, moments: Any = None
+        self,
+        state: Any,
+        twist: Any,
+        normal_force: Any,
+        dt: Any,
+        *,
+        moments: Any = None,
+        loads: Any = None,
+        cover: Any = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Advance by `dt` [s] at a held twist; return the new state and the wrench at the end. Stable at any `dt`.
 
@@ -167,9 +177,20 @@ class FrictionModel(ByValue):
         them (see `ContactPatch.weights`); bristles keep their deflections. `ReducedModelPublished` moves as a whole to
         the centre of pressure.
 
-        Raises InvalidValueError for shapes that do not fit, numbers that are not finite, and a load or time below zero.
+        With `loads` `[..., N]` [N] of the N cells of the patch, or of the model's discs, the pressure is given anew;
+        `normal_force` is None, as they add up to it. A pad must know which cells were pressed in the step before:
+        `loads` is a tuple of two arrays then, (before, now). `cover` `[..., N]` are the pressed shares of the cells, 1
+        under load unless given, now or (before, now). See `models.cell_loads`.
+
+        Raises InvalidValueError for shapes that do not fit, numbers that are not finite, a load or time below zero, and
+        for `loads` beside another load or in a model without cells.
         """
         compiled = self.compiled
+        if loads is not None or cover is not None:
+            *inputs, pressing = self._given(
+                state, twist, normal_force, moments, loads, cover, dt
+            )
+            return compiled.step(*inputs, pressing)
         if moments is not None:
             return compiled.step(
                 *self._inputs(state, twist, normal_force, moments, dt=dt)
@@ -181,14 +202,27 @@ class FrictionModel(ByValue):
         )
 
     def step_jacobians(
-        self, state: Any, twist: Any, normal_force: Any, dt: Any, moments: Any = None
+        self,
+        state: Any,
+        twist: Any,
+        normal_force: Any,
+        dt: Any,
+        moments: Any = None,
+        *,
+        loads: Any = None,
+        cover: Any = None,
     ) -> StepJacobians:
         """Return the analytic derivatives of `step` (see `StepJacobians`); one-sided at kinks.
 
-        With `moments` those at the pressure that they cause, which is held.
+        With `moments` or `loads` those at the pressure that they cause, which is held.
 
         Raises InvalidValueError as `step` does.
         """
+        if loads is not None or cover is not None:
+            *inputs, pressing = self._given(
+                state, twist, normal_force, moments, loads, cover, dt
+            )
+            return self.compiled.step_jacobians(*inputs, pressing)
         done = (
             None
             if moments is not None
@@ -197,6 +231,30 @@ class FrictionModel(ByValue):
         return done or self.compiled.step_jacobians(
             *self._inputs(state, twist, normal_force, moments, dt=dt)
         )
+
+    # ------------------------------------------------------------------ pressure given anew
+
+    def _pressing(self, loads: Any, cover: Any) -> Pressing:
+        """Return the cells under given loads (see `cell_loads`)."""
+        return self._cells.under(loads, cover)
+
+    @property
+    def _cells(self) -> Cells:
+        rule = "be None for a model without cells"
+        raise InvalidValueError("loads", rule, type(self).__name__)
+
+    def _given(
+        self, state: Any, twist: Any, load: Any, moments: Any, loads: Any, cover: Any, dt: Any
+    ) -> list[Any]:  # fmt: skip
+        """Return checked inputs of a step under given loads, the pressure last."""
+        for name, value in (("normal_force", load), ("moments", moments)):
+            if value is not None:
+                raise InvalidValueError(name, "be None beside loads of cells", value)
+        if loads is None:
+            raise InvalidValueError("loads", "be given with a cover", "None")
+        pressing = self._pressing(loads, cover)
+        state, twist, load, dt, _ = self._inputs(state, twist, pressing.load, dt=dt)
+        return [state, twist, load, dt, pressing.spread(load.shape)]
 
     # ------------------------------------------------------------------ machine form
 

@@ -20,6 +20,7 @@ from planarfriction.models.base import (
     arm_of,
     refuse_common,
 )
+from planarfriction.models.cell_loads import Cells
 from planarfriction.pads import Pad
 
 
@@ -87,6 +88,11 @@ class DistributedModel(FrictionModel):
     def _common(self) -> bool:
         """True if the pieces of the pad have a compliance in common."""
         return self.pad is not None and self.pad.compliance(self.patch) is not None
+
+    @functools.cached_property
+    def _cells(self) -> Cells:
+        stiffness = None if self.pad is None else self.pad.pieces(self.patch, self.law)
+        return Cells(self.patch.cells, stiffness)
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Return the analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.

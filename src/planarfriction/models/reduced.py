@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 
 from planarfriction._engine.records.base import CompiledModel
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction._support.equality import checked
 from planarfriction.laws import FrictionLaw
@@ -20,10 +21,13 @@ from planarfriction.models.base import (
     ModelJacobians,
     refuse_common,
 )
+from planarfriction.models.cell_loads import Cells
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.models.pad_discs import discs_of
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.discs import clusters_of, members_of, own_discs
+from planarfriction.patch.shared import mean_weights
 
 POINTS = 2
 """Times as many points as discs stand for a patch whose law knows no discs."""
@@ -83,6 +87,31 @@ class ReducedModel(FrictionModel):
     @property
     def compiled(self) -> CompiledModel:
         return self.reduction.compiled
+
+    @functools.cached_property
+    def _cells(self) -> Cells:
+        patch = self.patch
+        n = POINTS * self.cells if is_rate_law(self.law) else self.cells
+        if self.pad is None or self.pad.springs_of_law or patch.cells <= n:
+            members = members_of(patch, n)
+        else:
+            members = clusters_of(patch, self.pad.shares(patch), n)
+        stiffness = None if self.pad is None else self.pad.pieces(patch, self.law)
+        if members is None or is_rate_law(self.law):
+            return Cells(patch.cells, stiffness, members)
+        places = np.stack(patch.lever_coordinates(*patch.positions.T), -1)
+        squares = 0.5 * own_discs(patch).lever_radii ** 2
+        shares = mean_weights(patch)
+        return Cells(patch.cells, stiffness, members, places, squares, shares)
+
+    def _pressing(self, loads: Any, cover: Any) -> Pressing:
+        """Return the discs under loads of the cells, or of the discs."""
+        count = self.reduction.patch.cells
+        shape = np.shape(loads[-1] if isinstance(loads, tuple) else loads)
+        if shape[-1:] == (count,) != (self.patch.cells,):
+            alike = None if self.pad is None else np.ones(count)
+            return Cells(count, alike).under(loads, cover)
+        return self._cells.under(loads, cover)
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Return the analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.

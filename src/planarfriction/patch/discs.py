@@ -73,10 +73,16 @@ def discs(patch: ContactPatch, n: Any) -> ContactPatch:
     """Implement `ContactPatch.discs`."""
     n = patch.cells if n is None else validation.count("n", n)
     n = OF_ALL_LOADS * n if patch.depends_on_load else n
-    return _own_discs(patch) if patch.cells <= n else _few_discs(patch, n)
+    return own_discs(patch) if patch.cells <= n else _few_discs(patch, n)[0]
 
 
-def _own_discs(patch: ContactPatch) -> ContactPatch:
+def members_of(patch: ContactPatch, n: int) -> Membership | None:
+    """Return the cells of each of the discs that stand for a patch; None if each is one of its own."""
+    n = OF_ALL_LOADS * n if patch.depends_on_load else n
+    return None if patch.cells <= n else _few_discs(patch, n)[1]
+
+
+def own_discs(patch: ContactPatch) -> ContactPatch:
     """Return the patch with each cell as the disc of its own second moment; points remain points."""
     radii = np.sqrt((patch.cell_extents() ** 2).sum(axis=1) / 6.0)
     if patch.has_discs or not radii.any():
@@ -89,9 +95,9 @@ def _own_discs(patch: ContactPatch) -> ContactPatch:
 
 
 @functools.lru_cache(REMEMBERED)
-def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
-    """Return fewer discs than the patch has cells; those of each kind of friction are chosen by themselves."""
-    cells = _own_discs(patch)
+def _few_discs(patch: ContactPatch, n: int) -> tuple[ContactPatch, Membership]:
+    """Return fewer discs than the patch has cells, and these; each kind of friction has its own discs."""
+    cells = own_discs(patch)
     places = np.stack(cells.lever_coordinates(*cells.positions.T), -1)
     weights = mean_weights(cells)
     squares = 0.5 * cells.lever_radii**2
@@ -110,6 +116,7 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     members = np.concatenate([part.cells for part in parts])[order]
     parted = np.concatenate([part.parted for part in parts])[order]
     begins = np.searchsorted(labels[order], np.arange(start[-1]))
+    chosen_cells = Membership(members, parted, begins)
     root = np.eye(2) if cells.root is None else cells.root
     # Radius of a disc in the space of its metric over its radius.
     ratio = np.broadcast_to(np.sqrt(0.5 * (root**2).sum((-2, -1))), cells.cells)
@@ -127,7 +134,8 @@ def _few_discs(patch: ContactPatch, n: int) -> ContactPatch:
     joined = np.concatenate([part.places for part in parts])
     positions = _from_lever_coordinates(cells, joined, first)
     with warnings.catch_warnings(action="ignore"):
-        return type(patch)(positions, areas, law, None, patch.name, **fields)
+        few = type(patch)(positions, areas, law, None, patch.name, **fields)
+    return few, chosen_cells
 
 
 class Membership(NamedTuple):

@@ -18,13 +18,14 @@ from planarfriction._engine.cells.rollouts import ShapesByLoad
 from planarfriction._engine.compiler.memory import places_of, rows_of, size_of
 from planarfriction._engine.protocol import ModelFunctions, StepFunctions
 from planarfriction._engine.records import packed
-from planarfriction._engine.records.base import CompiledModel
+from planarfriction._engine.records.base import CompiledModel, StepJacobians
 from planarfriction._engine.records.packed import (
     PackedModel,
     cells_by_load,
     driven,
     linearised,
 )
+from planarfriction._engine.records.pressing import Pressing
 
 LOAD_STEP = 1e-5
 """Step of the central differences of weights by the load, as a share of the load [-]; their relative error is 1e-10."""
@@ -62,11 +63,15 @@ class CompiledDistributed(CompiledModel):
             return PAD
         return LEANS if self.patch.asymmetric else PLAIN
 
+    @property
+    def _behind(self) -> int:
+        """Numbers of a cell behind those of its lever."""
+        return {PLAIN: 0, LEANS: 2, PAD: 1}[self.sort]
+
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         matrices = MATRICES if self.sort == PAD else LINEAR
-        behind = {PLAIN: 0, LEANS: 2, PAD: 1}[self.sort]
-        rows = numbers[len(numbers) - behind :]
+        rows = numbers[len(numbers) - self._behind :]
         lean = rows if self.sort == LEANS else rows[:0]
         stiff = rows if self.sort == PAD else rows[:0]
         return CellsContact(
@@ -76,9 +81,12 @@ class CompiledDistributed(CompiledModel):
     # ------------------------------------------------------------------ at given loads
 
     def pressed(
-        self, load: np.ndarray, centre: np.ndarray | None = None
+        self, load: np.ndarray, centre: np.ndarray | Pressing | None = None
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""
+        if isinstance(centre, Pressing):
+            yield slice(None), self._under(centre), None
+            return
         contact = self.fixed if centre is None else None
         if contact is None:
             weights = self.patch.weights(load.reshape(-1))
@@ -89,6 +97,68 @@ class CompiledDistributed(CompiledModel):
             )
             contact = self._packed(moved)
         yield slice(None), contact, None
+
+    def _under(self, given: Pressing) -> PackedModel:
+        """Pack the cells under given loads, with numbers of their own if they move or their stiffness changes."""
+        packed = self._packed(given.weights)
+        (weights, numbers) = packed.keepalive
+        if given.places is None and given.stiffer is None:
+            return packed
+        numbers = np.tile(numbers, (len(weights), 1, 1))
+        if given.places is not None:
+            x, y = np.moveaxis(given.places, -1, 0)
+            first = 3 if self.patch.anisotropic else 0
+            numbers[:, first] = -y if first else x
+            numbers[:, first + 1] = x if first else y
+            numbers[:, first + 2] = KAPPA * given.radii
+        if given.stiffer is not None:
+            numbers[:, -1] *= given.stiffer
+        (record, _) = self.record(numbers[0], weights)
+        at = places_of(numbers)
+        behind = 8 * numbers.shape[-1] * (numbers.shape[1] - self._behind)
+        columns = {"weights": places_of(weights), "cells": at}
+        columns |= {PLAIN: {}, LEANS: {"lean": at + behind}, PAD: {"stiff": at + behind}}[self.sort]  # fmt: skip
+        rows = rows_of(record, len(weights), **columns)
+        return packed._replace(records=rows, keepalive=(weights, numbers))
+
+    def _left(self, state: np.ndarray, given: Any) -> np.ndarray:
+        """Return the state that a new pressure leaves of one before."""
+        if not isinstance(given, Pressing) or given.kept is None:
+            return state
+        left = state.reshape(len(given.kept), -1).copy()
+        bristles = left[:, : self.size * given.kept.shape[1]]
+        bristles *= np.tile(given.kept, self.size)
+        return left.reshape(state.shape)
+
+    def step(
+        self,
+        state: np.ndarray,
+        twist: np.ndarray,
+        load: np.ndarray,
+        dt: np.ndarray,
+        centre: np.ndarray | Pressing | None = None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """See `CompiledModel`."""
+        return super().step(self._left(state, centre), twist, load, dt, centre)
+
+    def step_jacobians(
+        self,
+        state: np.ndarray,
+        twist: np.ndarray,
+        load: np.ndarray,
+        dt: np.ndarray,
+        centre: np.ndarray | Pressing | None = None,
+    ) -> StepJacobians:
+        """See `CompiledModel`; by the state before it was left."""
+        state = self._left(state, centre)
+        slopes = super().step_jacobians(state, twist, load, dt, centre)
+        if not isinstance(centre, Pressing) or centre.kept is None:
+            return slopes
+        kept = centre.kept.reshape(*load.shape, 1, 1, -1)
+        return slopes._replace(
+            state_state=slopes.state_state * kept,
+            wrench_state=slopes.wrench_state * kept,
+        )
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""

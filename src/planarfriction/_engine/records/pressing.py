@@ -1,0 +1,38 @@
+"""Cells of contacts under loads that are given anew at each step (see `planarfriction.models.cell_loads`)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Pressing(NamedTuple):
+    """Cells or discs of contacts under given loads; leading axes are those of the loads."""
+
+    load: np.ndarray
+    """Loads of the contacts `[...]` [N]."""
+    weights: np.ndarray
+    """Shares of them that each bears `[..., n]`."""
+    places: np.ndarray | None = None
+    """Centres of discs in lever coordinates `[..., n, 2]` [m]; None if they stay."""
+    radii: np.ndarray | None = None
+    """Radii of discs in lever coordinates `[..., n]` [m]."""
+    stiffer: np.ndarray | None = None
+    """Stiffness over that with all cells pressed `[..., n]`; None without a pad."""
+    kept: np.ndarray | None = None
+    """Share of the deflection that stays `[..., n]`; None if all does."""
+
+    def spread(self, batch: tuple[int, ...]) -> Pressing:
+        """Return the rows of a batch of contacts, one for each."""
+        lead = self.load.ndim
+        return Pressing(
+            *(
+                None
+                if each is None
+                else np.broadcast_to(each, (*batch, *each.shape[lead:])).reshape(
+                    -1, *each.shape[lead:]
+                )
+                for each in self
+            )
+        )

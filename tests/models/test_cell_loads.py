@@ -1,0 +1,231 @@
+"""Loads of cells that are given anew at each step: against all cells, closed forms and the energy of bristles."""
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from tests.support.refusals import refused
+
+LAW = pf.LuGre(mu_c=1.0, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+DAMPED = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_1=300.0, sigma_2=0.1, elasto_plastic=0.9)
+SIDE = 0.02
+SHORT = 1e-5
+"""Displacement [m] at which the stuck square would carry all of its friction."""
+
+LAYER = pf.Pad.layer(1.0 / SHORT / SIDE**2 * 3e-3, 3e-3)
+GRADED = pf.ContactPatch.rectangle(
+    SIDE, 0.012, (24, 16), pressure=pf.LinearGradient((30.0, -20.0))
+)
+GRAINED = GRADED.with_friction_metric(pf.friction_metric(0.4, 1.0, 1.6))
+FEET = pf.ContactPatch.points([[0.0, 0.0], [0.01, 0.0], [0.002, 0.008]])
+
+MODELS = {
+    "cells": pf.DistributedModel(GRADED, DAMPED),
+    "discs": pf.ReducedModel(GRADED, DAMPED),
+    "discs with a metric": pf.ReducedModel(GRAINED, DAMPED),
+    "feet": pf.ReducedModel(FEET, DAMPED),
+    "cells of a layer": pf.DistributedModel(GRADED, DAMPED, pad=LAYER),
+    "discs of a layer": pf.ReducedModel(GRADED, DAMPED, pad=LAYER),
+    "stiffness of the law": pf.ReducedModel(GRAINED, DAMPED, pad=pf.Pad.at_load(3.0)),
+    "common compliance": pf.ReducedModel(
+        GRADED, LAW, pad=pf.Pad.measured(1e5, common=0.3)
+    ),
+}
+
+
+def drawn(model, count, rng):
+    """Return states, twists, and loads of the cells of contacts."""
+    state = 3e-6 * rng.normal(size=(count, *model.state_shape))
+    twist = rng.normal(size=(count, 3)) * [0.01, 0.01, 1.0]
+    cells = model.patch.cells
+    loads = rng.uniform(0.0, 2.0, (count, cells)) * rng.integers(0, 2, (count, cells))
+    return state, twist, loads
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_loads_of_the_pressure_are_the_normal_force(name):
+    model = MODELS[name]
+    state, twist, _ = drawn(model, 4, np.random.default_rng(1))
+    loads = 2.5 * model.patch.weights(2.5)
+    given = model.step(state, twist, None, 1e-3, loads=loads)
+    for got, wanted in zip(given, model.step(state, twist, 2.5, 1e-3), strict=True):
+        np.testing.assert_allclose(
+            got, wanted, rtol=0.0, atol=1e-13 * abs(wanted).max()
+        )
+
+
+def test_loads_under_moments_are_those_of_the_tilted_pressure():
+    model = MODELS["cells"]
+    state, twist, _ = drawn(model, 4, np.random.default_rng(2))
+    moments = np.array([3e-3, 8e-3])
+    loads = 2.5 * model.patch.weights(2.5, moments=moments)
+    assert (loads == 0.0).any()
+    given = model.step(state, twist, None, 1e-3, loads=loads)
+    wanted = model.step(state, twist, 2.5, 1e-3, moments=moments)
+    np.testing.assert_allclose(given[1], wanted[1], rtol=1e-12)
+
+
+def test_what_lifts_takes_its_force_along_and_comes_back_unstressed():
+    """Two feet on a pad, of stiffness K/2 each, pulled by d: K d, K d/2 without one, and K d/2 when it is back."""
+    feet = pf.ContactPatch.points([[0.0, 0.005], [0.0, -0.005]])
+    model = pf.DistributedModel(feet, LAW, pad=pf.Pad.measured(1e5))
+    both = np.array([1.0, 1.0])
+    one = np.array([1.0, 0.0])
+    state, wrench = model.step(model.rest(), [2e-3, 0.0, 0.0], None, 1e-3, loads=both)
+    assert wrench[0] == pytest.approx(-0.2)
+    still = [0.0, 0.0, 0.0]
+    state, wrench = model.step(state, still, None, 1e-3, loads=(both, one))
+    assert wrench == pytest.approx([-0.1, 0.0, 0.1 * 0.005])
+    state, wrench = model.step(state, still, None, 1e-3, loads=(one, both))
+    assert wrench[0] == pytest.approx(-0.1)
+    # Half of a foot leaves with half of its force, and with half of its stiffness.
+    half = np.array([0.5, 1.0])
+    state, wrench = model.step(
+        state, still, None, 1e-3, loads=(both, both), cover=(np.ones(2), half)
+    )
+    assert wrench[0] == pytest.approx(-0.05)
+
+
+@pytest.mark.parametrize("name", [each for each in MODELS if "layer" in each])
+def test_no_pressure_makes_energy(name):
+    """The energy of the bristles rises by no more than the work at their ends, with pressure and cover of any kind."""
+    model = MODELS[name].with_law(LAW)
+    cells = model.patch.cells
+    rng = np.random.default_rng(4)
+    before = np.ones((200, cells))
+    state = model.rest(200)
+    few = model.reduction
+    stiff = few.pad.pieces(few.patch, LAW)
+    members = model._cells.members
+    loads = before
+    energy = np.zeros(200)
+    pressed = 1.0
+    for _ in range(30):
+        cover = rng.uniform(0.0, 1.0, before.shape) ** 0.3
+        new = rng.exponential(1.0 / cells, before.shape) * rng.integers(0, 2, before.shape)  # fmt: skip
+        twist = rng.normal(size=(200, 3)) * [0.01, 0.01, 1.0]
+        dt = 10.0 ** rng.uniform(-6.0, -1.0, 200)
+        state, wrench = model.step(
+            state, twist, None, dt, loads=(loads, new), cover=(before, cover)
+        )
+        pressed = model._cells.under(new, cover).stiffer
+        after = 0.5 * (stiff * pressed * (state**2).sum(axis=1)).sum(axis=1)
+        work = -dt * (wrench * twist).sum(axis=1)
+        assert (after <= energy + work + 1e-12 * (energy + abs(work))).all()
+        energy = after
+        before, loads = cover, new
+    assert members is None or len(members.begins) == model.state_shape[-1]
+
+
+def along(count, pace):
+    """Return the steps `[count, 3]` of a path in stick-slip, or of one that slides."""
+    t = np.arange(count + 1) / count
+    if pace == "stick-slip":
+        y = 0.6 * np.cos(2.0 * np.pi * t) * np.minimum(1.0, 4.0 * t)
+        path = np.stack([1.2 * np.sin(2 * np.pi * t), y, np.sin(3 * np.pi * t)], -1)
+    else:
+        path = np.stack([6.0 * t, 0.5 * t, 2.0 * t], -1)
+    return np.diff(path, axis=0) * SHORT * [1.0, 1.0, 2.0 / SIDE]
+
+
+def pressures(kind, x, y, t):
+    """Return pressures and covers of cells at (x, y), in half sides, at times from 0 to 1."""
+    x, y, t = x[None], y[None], t[:, None]
+    if kind == "plate leaves over an edge":
+        half = x.max() - np.sort(np.unique(x))[-2]
+        cover = np.clip((1.0 - 1.2 * t - (x - 0.5 * half)) / half, 0.0, 1.0)
+        return cover + 0.0 * y, cover + 0.0 * y
+    if kind == "part lifts under a moment":
+        bends = 1.26 * np.sin(4 * np.pi * t) * x + 0.5 * np.cos(6 * np.pi * t) * y
+        press = np.maximum(1.0 + bends, 0.0)
+    else:
+        away = (x + 0.5 - t) ** 2 + (y - 0.3 * np.sin(2 * np.pi * t)) ** 2
+        press = np.sqrt(np.maximum(0.36 - away, 0.0))
+    return press, (press > 0.0) + 0.0
+
+
+def errors(kind, pace, side=48, count=400):
+    """Return the largest errors of force and torque of 24 discs, in the friction and the torque of the whole square."""
+    square = pf.ContactPatch.rectangle(SIDE, cells=side)
+    x, y = square.positions.T / (0.5 * SIDE)
+    t = np.arange(count) / count
+    loads, cover = pressures(kind, x, y, t)
+    loads = loads / loads.sum(-1, keepdims=True)
+    loads = loads * (1.0 + 0.3 * np.sin(10.0 * np.pi * t))[:, None]
+    wrenches = []
+    for model in (
+        pf.DistributedModel(square.discs(), LAW, pad=LAYER),
+        pf.ReducedModel(square, LAW, pad=LAYER),
+    ):
+        state = model.rest()
+        last = 0
+        found = []
+        for j, step in enumerate(along(count, pace)):
+            state, wrench = model.step(
+                state, step / 1e-3, None, 1e-3,
+                loads=(loads[last], loads[j]), cover=(cover[last], cover[j]),
+            )  # fmt: skip
+            found.append(wrench)
+            last = j
+        wrenches.append(found)
+    off = abs(np.subtract(*wrenches)).max(axis=0)
+    arm = np.hypot(*square.positions.T).mean()
+    return max(off[:2]), off[2] / arm
+
+
+EDGE = "plate leaves over an edge"
+CASES = [
+    (EDGE, "stick-slip", 0.012, 0.022),
+    (EDGE, "sliding", 0.006, 0.012),
+    ("part lifts under a moment", "stick-slip", 0.015, 0.025),
+    ("a round spot rolls across", "stick-slip", 0.010, 0.014),
+    ("a round spot rolls across", "sliding", 0.040, 0.026),
+]
+
+
+@pytest.mark.parametrize(("kind", "pace", "force", "torque"), CASES)
+def test_discs_bear_pressures_as_all_cells_do(kind, pace, force, torque):
+    """A thin layer under a square, load +-30 %: 24 discs against 48 x 48 cells, in the friction of the whole."""
+    assert np.all(np.array(errors(kind, pace)) < [force, torque])
+
+
+@pytest.mark.parametrize("name", ["cells", "discs of a layer", "common compliance"])
+def test_derivatives_are_those_of_the_step(name):
+    model = MODELS[name]
+    rng = np.random.default_rng(5)
+    state, twist, loads = drawn(model, 1, rng)
+    state, twist, before = 0.03 * state[0], 0.1 * twist[0], np.roll(loads[0], 1)
+    given = {"loads": (before, loads[0])}
+    slopes = model.step_jacobians(state, twist, None, 1e-3, **given)
+    change = 1e-5 * state * rng.normal(size=state.shape)
+    turn = 1e-6 * rng.normal(size=3) * twist
+    ends = [
+        model.step(state + k * change, twist + k * turn, None, 1e-3, **given)[1]
+        for k in (1.0, -1.0)
+    ]
+    wanted = 0.5 * (ends[0] - ends[1])
+    axes = "di,i->d" if state.ndim == 1 else "dan,an->d"
+    got = np.einsum(axes, slopes.wrench_state, change) + slopes.wrench_twist @ turn
+    np.testing.assert_allclose(got, wanted, atol=1e-6 * abs(wanted).max())
+
+
+def test_loads_that_make_no_sense_are_refused():
+    model = MODELS["discs of a layer"]
+    loads = model.patch.weights()
+    inputs = model.rest(), [0.0, 0.0, 0.0]
+    for given, words in (
+        ({"loads": loads[1:]}, r"loads.*have shape \[..., 384\]"),
+        ({"loads": -loads}, "loads.*>= 0"),
+        ({"loads": loads, "cover": 2.0 * np.ones(384)}, r"cover.*\[0, 1\]"),
+        ({"loads": loads, "cover": 0.0 * loads}, "cover.*> 0 where a cell bears load"),
+        ({"cover": loads}, "loads.*be given"),
+    ):
+        with refused(words):
+            model.step(*inputs, None, 1e-3, **given)
+    with refused("normal_force.*None beside loads"):
+        model.step(*inputs, 1.0, 1e-3, loads=loads)
+    with refused("moments.*None beside loads"):
+        model.step(*inputs, None, 1e-3, moments=[0.0, 0.0], loads=loads)
+    one = pf.ReducedModelPublished(GRADED, DAMPED)
+    with refused("loads.*without cells"):
+        one.step(one.rest(), [0.0, 0.0, 0.0], None, 1e-3, loads=loads)
