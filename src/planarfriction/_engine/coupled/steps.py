@@ -286,14 +286,21 @@ def linearise_many(
 UNFIT = (TypeError, ValueError, NumbaError)
 """Exceptions that the entry points raise for arguments of other types."""
 
+REFUSED = (*UNFIT, OverflowError)
+"""Exceptions that these and NumPy raise for numbers that are none, or too large."""
+
+PLAIN = frozenset((float, int, np.float64))
+"""Types of numbers that need no check before compiled code checks their values."""
+
 _NUMBER = types.float64
 _VECTOR = types.float64[::1]
 _ROWS = types.float64[:, ::1]
-_SIGNATURES: dict[Any, tuple] = {
+SIGNATURES: dict[Any, tuple] = {
     step_one: (_VECTOR, _VECTOR, *(_NUMBER,) * 5, _VECTOR),
     step_many: (_VECTOR, _ROWS, _ROWS, _VECTOR, _VECTOR, _ROWS, _ROWS, _VECTOR),
     jacobians: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
 }
+"""Types of the arguments of each entry point."""
 _COMPILING = threading.Lock()
 
 
@@ -305,6 +312,6 @@ def ready(function: Any) -> Any:
     """
     with _COMPILING:
         if not function.signatures:
-            function.compile(_SIGNATURES[function])
+            function.compile(SIGNATURES[function])
             function.disable_compile()
     return function
