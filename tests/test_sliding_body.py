@@ -305,6 +305,22 @@ def test_patches_of_a_host_on_a_support_that_turns():
     )
 
 
+def test_a_patch_that_follows_its_load():
+    """The shape is that of the load of each body, as in a step of the patch with a host."""
+    finger = pf.SoftFinger(c=0.01, n=1 / 3, k=2.0)
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 7, pressure=finger), pf.LuGre())
+    body = pf.SlidingBody(MASS, INERTIA, model)
+    loads = np.array([0.5, 0.0, 0.9])
+    twist = np.array([0.03, -0.01, 8.0])
+    end = body.step(body.rest(), twist, loads, 1e-3)
+    response = np.diag(1e-3 / np.array([MASS, MASS, INERTIA]))
+    host = coupling.HostStep(twist[None], loads[:, None], np.zeros((1, 3)), response)
+    wanted = body.patches.step(body.rest(), host, 1e-3)
+    np.testing.assert_array_equal(end.state, wanted.state)
+    np.testing.assert_array_equal(end.wrench, wanted.wrench[:, 0])
+    assert end.wrench[2, 2] < 1.8 * 1.2 * end.wrench[0, 2] < 0.0 == end.wrench[1, 2]
+
+
 def test_only_motion_against_the_support_counts():
     """A belt under a body at rest is a body that slides on rest, seen from the belt."""
     body = four_feet([0.3, 0.0, -1.0, 2.0])
