@@ -248,6 +248,18 @@ def jacobians(
 
 
 @jit
+def in_order(
+    state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray
+) -> bool:
+    """Return True if all numbers are in range, and no load or step is negative; all arrays are flat."""
+    valid = _in_order(state, state.shape[0]) and _in_order(twist, twist.shape[0])
+    for row in (load, dt):
+        for i in range(row.shape[0]):
+            valid = valid and row[i] >= 0.0 and xp.in_range(row[i])
+    return valid
+
+
+@jit
 def rates_many(
     function: Place,
     records: np.ndarray,
@@ -299,6 +311,7 @@ SIGNATURES: dict[Any, tuple] = {
     step_one: (_VECTOR, _VECTOR, *(_NUMBER,) * 5, _VECTOR),
     step_many: (_VECTOR, _ROWS, _ROWS, _VECTOR, _VECTOR, _ROWS, _ROWS, _VECTOR),
     jacobians: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
+    in_order: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
 }
 """Types of the arguments of each entry point."""
 _COMPILING = threading.Lock()

@@ -86,6 +86,8 @@ class CompiledModel:
     """Common compliance of a pad about the origin `[3, 3]` (see `coupled.face`)."""
     lag = 0.0
     """Lag of a pad with a common compliance [s]."""
+    rollouts: Any = None
+    """The model as the loops of rollouts see it, once `derivatives` has packed it."""
 
     def __init__(
         self,
