@@ -374,7 +374,7 @@ REST = four_feet().rest()
         ({"dt": np.ones(2), "angle": np.ones(3)}, "must broadcast"),
         ({"dt": True}, "dt must be an array of numbers and no truth value"),
         ({"dt": 10**400}, "dt must be finite"),
-        ({"wrench": (1e300, 0.0, 0.0)}, "wrench must be at most"),
+        ({"wrench": (1e60, 0.0, 0.0), "dt": 1e-20}, "wrench must be at most"),
         ({"wrench": (1e50, 0.0, 0.0), "dt": 1.0}, "twist, wrench and dt must give"),
         ({"state": np.zeros(3)}, "state must have shape"),
         ({"state": np.full(REST.shape, np.nan)}, "state must be finite"),
