@@ -1,5 +1,7 @@
 """A body on patches as the simplest thing to step."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -119,6 +121,34 @@ def test_batches():
         5,
         3,
     )
+
+
+@pytest.mark.parametrize("many", [False, True], ids=["one patch", "two patches"])
+def test_inputs_of_every_kind_give_the_same_step(many):
+    """Plain numbers go straight to compiled code, all others through the checks."""
+    models = [model_of(), model_of(1e5)] if many else model_of()
+    body = pf.SlidingBody(MASS, 1e-4, models, [(0.02, 0.0), (0.0, 0.03)][: 1 + many])
+    twist = (0.03125, -0.25, 2.0)
+    push = (1.0, 0.5, 0.0)
+    load = [1.0, 2.0] if many else 2.0
+    start = body.step(body.rest(), twist, load, 1e-3, push).state
+    given = [start, twist, load, 0.0625, push, 0.0]
+    wanted = body.step(*given)
+    strided = np.stack([start, start], axis=-1)[:, 0]
+    frozen = start.copy()
+    frozen.flags.writeable = False
+    for place, other in (
+        *((0, each) for each in (strided, frozen, start.tolist())),
+        *((1, each) for each in (list(twist), np.array(twist), np.float32(twist))),
+        *((2, each) for each in (np.array(load), np.int64(load), np.float32(load))),
+        *((3, each) for each in (np.array(0.0625), np.float32(0.0625))),
+        *((4, each) for each in (np.array(push), [1, 0.5, 0])),
+        *((5, each) for each in (0, np.float64(0.0), np.zeros(()))),
+    ):
+        found = body.step(*given[:place], other, *given[place + 1 :])
+        assert all(map(np.array_equal, found, wanted)), (place, other)
+    copied = pickle.loads(pickle.dumps(body))
+    assert copied == body and all(map(np.array_equal, copied.step(*given), wanted))
 
 
 @pytest.mark.parametrize("sigma_0, sigma_1", [(1e6, 800.0), (1e7, 10.0), (1e3, 800.0)])
@@ -275,6 +305,22 @@ def test_patches_of_a_host_on_a_support_that_turns():
     )
 
 
+def test_a_patch_that_follows_its_load():
+    """The shape is that of the load of each body, as in a step of the patch with a host."""
+    finger = pf.SoftFinger(c=0.01, n=1 / 3, k=2.0)
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 7, pressure=finger), pf.LuGre())
+    body = pf.SlidingBody(MASS, INERTIA, model)
+    loads = np.array([0.5, 0.0, 0.9])
+    twist = np.array([0.03, -0.01, 8.0])
+    end = body.step(body.rest(), twist, loads, 1e-3)
+    response = np.diag(1e-3 / np.array([MASS, MASS, INERTIA]))
+    host = coupling.HostStep(twist[None], loads[:, None], np.zeros((1, 3)), response)
+    wanted = body.patches.step(body.rest(), host, 1e-3)
+    np.testing.assert_array_equal(end.state, wanted.state)
+    np.testing.assert_array_equal(end.wrench, wanted.wrench[:, 0])
+    assert end.wrench[2, 2] < 1.8 * 1.2 * end.wrench[0, 2] < 0.0 == end.wrench[1, 2]
+
+
 def test_only_motion_against_the_support_counts():
     """A belt under a body at rest is a body that slides on rest, seen from the belt."""
     body = four_feet([0.3, 0.0, -1.0, 2.0])
@@ -311,6 +357,9 @@ def test_bad_bodies(change, words):
         )
 
 
+REST = four_feet().rest()
+
+
 @pytest.mark.parametrize(
     "change, words",
     [
@@ -323,7 +372,12 @@ def test_bad_bodies(change, words):
         ),
         ({"dt": -1e-3}, "dt must be >= 0"),
         ({"dt": np.ones(2), "angle": np.ones(3)}, "must broadcast"),
+        ({"dt": True}, "dt must be an array of numbers and no truth value"),
+        ({"dt": 10**400}, "dt must be finite"),
+        ({"wrench": (1e60, 0.0, 0.0), "dt": 1e-20}, "wrench must be at most"),
+        ({"wrench": (1e50, 0.0, 0.0), "dt": 1.0}, "twist, wrench and dt must give"),
         ({"state": np.zeros(3)}, "state must have shape"),
+        ({"state": np.full(REST.shape, np.nan)}, "state must be finite"),
         ({"support_velocity": (0.0, 0.0)}, "support_velocity must have shape"),
         ({"support_velocity": (0.0, 0.0, np.inf)}, "support_velocity must be finite"),
     ],

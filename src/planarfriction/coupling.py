@@ -37,7 +37,7 @@ ITERATIONS = 50
 PASSES = 10
 """Rounds in which the shapes of patches follow their loads."""
 
-_WORTH_A_THREAD = 200
+WORTH_A_THREAD = 200
 """Patches below which starting a thread costs more than it saves."""
 
 _INPUTS = (
@@ -277,7 +277,8 @@ class CoupledPatches(ByValue):
         loads = problems[:, parts["free_load"]].copy()
         for i in range(PASSES + 1):
             rows = problems[unsettled]
-            kept = self._write_following(rows, loads)
+            records = rows.view(np.int64)[:, parts["records"]]
+            kept = self._write_following(records, loads)
             if i == PASSES:
                 rows[:, parts["most"]] = 0
             taken = self._once(rows)
@@ -298,7 +299,7 @@ class CoupledPatches(ByValue):
     def _once(self, problems: np.ndarray) -> np.ndarray:
         """Solve all problems with the shapes that they hold."""
         row = self._packed.patches.words
-        most = len(problems) * len(self.models) // _WORTH_A_THREAD
+        most = len(problems) * len(self.models) // WORTH_A_THREAD
         share(
             len(problems),
             most,
@@ -307,10 +308,9 @@ class CoupledPatches(ByValue):
         return problems[:, self._parts["iterations"].start].astype(int)
 
     def _write_following(
-        self, problems: np.ndarray, loads: np.ndarray
+        self, records: np.ndarray, loads: np.ndarray
     ) -> list[PackedModel]:
-        """Write the records of patches whose shapes follow their loads `[E, k]`; returns what has to be kept."""
-        records = problems.view(np.int64)[:, self._parts["records"]]
+        """Write the records `[E, k]` of patches whose shapes follow their loads; returns what has to be kept."""
         kept = []
         for p in self._packed.following:
             chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -11,10 +13,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import geometry
+from planarfriction._engine.compiler.threads import share
+from planarfriction._engine.coupled.bodies import (
+    ANGLE,
+    CARRIED,
+    DT,
+    LOADS,
+    MORE,
+    WRENCH,
+    step_bodies,
+)
+from planarfriction._engine.coupled.steps import PLAIN, REFUSED
+from planarfriction._engine.records.patches import PackedBody, packed_body
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Kept, by_parts, checked
-from planarfriction.coupling import CoupledPatches, HostStep
+from planarfriction.coupling import WORTH_A_THREAD, CoupledPatches
 from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.formulas import LARGEST
 from planarfriction.models import FrictionModel
 
 
@@ -98,51 +113,137 @@ class SlidingBody(ByValue):
         SolverError if a body did not converge (see `CoupledPatches.step`): its `step` has all bodies, those in
         `converged` with their result, the others with the best that was found.
         """
-        given = {"twist": twist, "wrench": wrench, "dt": dt, "angle": angle}
-        twist, wrench, dt, angle = (
-            validation.finite_numbers(name, value) for name, value in given.items()
+        if support_velocity is None:
+            done = self._quick(state, twist, normal_force, dt, wrench, angle)
+            if done is not None:
+                return done
+        batch, states, given = self._checked(
+            state, twist, normal_force, dt, wrench, angle, support_velocity
         )
-        twist = validation.vectors("twist", twist, 3)
-        wrench = validation.vectors("wrench", wrench, 3)
-        load = self._loads(normal_force)
-        batches = {
-            "twist": twist[..., 0],
-            "wrench": wrench[..., 0],
+        n = states.shape[-1]
+        ends = self._ends(states, given).reshape(*batch, n + MORE)
+        step = BodyStep(
+            *(
+                np.ascontiguousarray(ends[..., first:last])
+                for first, last in ((0, n), (n, n + 3), (n + 3, n + 6))
+            )
+        )
+        converged = ends[..., -1] > 0.0
+        if not converged.all():
+            count = f"{np.count_nonzero(~converged)} of {converged.size} bodies"
+            most = f"off by {ends[..., -2].max():.1e} m/s at dt up to {given[:, DT].max():.3g} s"
+            message = f"the step of a body did not converge ({count}, {most})"
+            raise SolverError(message, step=step, converged=converged)
+        return step
+
+    def _quick(
+        self, state: Any, twist: Any, load: Any, dt: Any, wrench: Any, angle: Any
+    ) -> BodyStep | None:
+        """Step one body by compiled code, which checks its numbers, or return None: for other inputs than plain ones,
+        for those out of order, and where the step does not converge."""
+        packed = self._packed
+        twist = _items(twist)
+        wrench = _items(wrench)
+        load = (load,) if packed.alone else _items(load)
+        given = *twist, *wrench, 0.0, 0.0, 0.0, dt, angle, *load
+        if (
+            not packed.fixed
+            or type(state) is not np.ndarray
+            or not len(twist) == len(wrench) == 3
+            or not PLAIN.issuperset(map(type, given))
+        ):
+            return None
+        n = packed.states
+        end = np.empty(n + MORE)
+        scratch = np.empty(packed.scratch)
+        try:
+            numbers = np.array(given, float)
+            if (
+                step_bodies(packed.words, state, numbers, packed.records, scratch, end)
+                < 1
+            ):
+                return None
+        except REFUSED:
+            return None
+        return BodyStep(end[:n], end[n : n + 3], end[n + 3 : n + 6])
+
+    def _checked(
+        self,
+        state: ArrayLike,
+        twist: ArrayLike,
+        normal_force: ArrayLike,
+        dt: ArrayLike,
+        wrench: ArrayLike,
+        angle: ArrayLike,
+        support_velocity: ArrayLike | None,
+    ) -> tuple[tuple[int, ...], np.ndarray, np.ndarray]:
+        """Check the inputs of a step; return their batch axes, and rows of states and of the rest for each body."""
+        sizes = {"state": self._packed.states, "twist": 3, "wrench": 3}
+        numbers = {
+            "twist": twist,
+            "wrench": wrench,
             "dt": dt,
             "angle": angle,
+            "state": state,
         }
-        carried = 0.0
         if support_velocity is not None:
-            support = validation.finite_numbers("support_velocity", support_velocity)
-            support = validation.vectors("support_velocity", support, 3)
-            batches["support_velocity"] = support[..., 0]
-            carried = geometry.chord(support, dt)
-        validation.broadcast(**batches, normal_force=load[..., 0])
-        to_patches = (
-            geometry.rotate(self._to_patches, angle[..., None])
-            if angle.any()
-            else self._to_patches
-        )
-        response = dt[..., None] * self._per_mass
-        pushed = twist - carried + response * wrench
-        free = np.einsum("...ij,...j->...i", to_patches, pushed)
-        free = free.reshape(*free.shape[:-1], len(self.patches.models), 3)
-        coupled = np.einsum("...im,...m,...jm->...ij", to_patches, response, to_patches)
-        end = self.patches.step(
-            state, HostStep(free, load, np.zeros(free.shape[-2:]), coupled), dt
-        )
-        friction = np.einsum(
-            "...i,...im->...m",
-            end.wrench.reshape(*end.wrench.shape[:-2], len(self._to_patches)),
-            to_patches,
-        )
-        step = BodyStep(end.state, pushed + response * friction + carried, friction)
-        if not end.converged.all():
-            count = f"{np.count_nonzero(~end.converged)} of {end.converged.size} bodies"
-            most = f"off by {end.residual.max():.1e} m/s at dt up to {dt.max():.3g} s"
-            message = f"the step of a body did not converge ({count}, {most})"
-            raise SolverError(message, step=step, converged=end.converged)
-        return step
+            sizes["support_velocity"] = 3
+            numbers["support_velocity"] = support_velocity
+        arrays = {
+            name: validation.finite_numbers(name, value)
+            for name, value in numbers.items()
+        }
+        axes = {
+            name: validation.vectors(name, each, sizes[name])[..., 0]
+            if name in sizes
+            else each
+            for name, each in arrays.items()
+        }
+        load = self._loads(normal_force)
+        batch = validation.broadcast(**axes, normal_force=load[..., 0])
+        if (axes["dt"] < 0.0).any():
+            raise InvalidValueError("dt", "be >= 0", float(axes["dt"].min()))
+        n = self._packed.states
+        width = LOADS + load.shape[-1]
+        count = math.prod(batch)
+        most = validation.MOST_NUMBERS // (n + MORE + width)
+        if count > most:
+            rule = f"hold at most {most} of these bodies"
+            raise InvalidValueError("batch axes", rule, list(batch))
+        given = np.zeros((*batch, width))
+        given[..., :WRENCH] = arrays["twist"]
+        given[..., WRENCH:CARRIED] = arrays["wrench"]
+        if support_velocity is not None:
+            given[..., CARRIED:DT] = geometry.chord(
+                arrays["support_velocity"], arrays["dt"]
+            )
+        given[..., DT] = arrays["dt"]
+        given[..., ANGLE] = arrays["angle"]
+        given[..., LOADS:] = load
+        states = np.empty((*batch, n))
+        states[:] = arrays["state"]
+        return batch, states.reshape(count, n), given.reshape(count, width)
+
+    def _ends(self, states: np.ndarray, given: np.ndarray) -> np.ndarray:
+        """Step bodies of checked inputs, on threads: the rows that `step_bodies` writes."""
+        packed = self._packed
+        count = len(given)
+        records = np.tile(packed.records, (count, 1))
+        kept = self.patches._write_following(records, given[:, LOADS:])
+        ends = np.empty((count, packed.states + MORE))
+
+        def work(first: int, last: int) -> None:
+            rows = (each[first:last].ravel() for each in (states, given, records))
+            scratch = np.empty(packed.scratch)
+            done = step_bodies(packed.words, *rows, scratch, ends[first:last].ravel())
+            if done < 0:
+                rule = f"give twists of patches up to {LARGEST:g}"
+                largest = f"dt up to {given[:, DT].max():g}"
+                raise InvalidValueError("twist, wrench and dt", rule, largest)
+
+        share(count, records.size // WORTH_A_THREAD, work)
+        del kept
+        return ends
 
     def largest_step(self, normal_force: ArrayLike) -> Any:
         """Return the time step [s] below which a loop around `step` of the models alone is stable, `[...]`.
@@ -182,6 +283,24 @@ class SlidingBody(ByValue):
         return load
 
     @functools.cached_property
+    def _packed(self) -> PackedBody:
+        packed = self.patches._packed
+        blank = self.patches._blank_problem([False] * len(packed.records))
+        return packed_body(
+            packed,
+            blank,
+            self._per_mass,
+            self._to_patches,
+            isinstance(self.models, FrictionModel),
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for a copy or another process, without addresses, which hold in this process alone."""
+        return {
+            each.name: getattr(self, each.name) for each in dataclasses.fields(self)
+        }
+
+    @functools.cached_property
     def _per_mass(self) -> np.ndarray:
         return 1.0 / np.array([self.mass, self.mass, self.inertia])
 
@@ -190,3 +309,10 @@ class SlidingBody(ByValue):
         """Return the rows that give the twists of the patches from that of the body, in its axes, `[3k, 3]`."""
         rows = geometry.twist_at(np.eye(3)[:, None], self.positions)
         return geometry.rotate(rows, -self.angles).transpose(1, 2, 0).reshape(-1, 3)
+
+
+def _items(value: Any) -> Sequence[Any]:
+    """Return the items of a list, a tuple or a vector, none of anything else."""
+    if type(value) is np.ndarray:
+        return value.tolist() if value.ndim == 1 else ()
+    return value if type(value) in (tuple, list) else ()

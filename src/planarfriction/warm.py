@@ -18,6 +18,7 @@ from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metric
 from planarfriction.scenes import SolverOptions, in_hand, simulate
+from planarfriction.sliding_body import SlidingBody
 
 _INSTANT = SolverOptions(t_end=1e-3)
 """Options of runs: compiling does not depend on how far they go."""
@@ -136,6 +137,8 @@ def _couple(kinds: list[Any]) -> None:
         moments=np.zeros((k, 2)),
     )
     patches.step(patches.rest(), host, 1e-4)
+    body = SlidingBody(1.0, 1.0, kinds)
+    body.step(body.rest(), (0.0, 0.0, 0.0), np.ones(k), 1e-4)
 
 
 def _host() -> None:

@@ -1,6 +1,8 @@
 """Derivatives of steps and rollouts: closed forms, kinks, differences, and backwards against forwards."""
 
 import functools
+import pickle
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -51,6 +53,30 @@ def drive(model, seed=0, steps=T):
 
 
 # ---------------------------------------------------------------------- the rollout
+
+
+@pytest.mark.parametrize("kind", ["distributed", "ellipsoid"])
+def test_inputs_of_every_kind_give_the_same_rollout(kind):
+    """One contact of plain arrays is stepped without the checks of all others."""
+    model = pickle.loads(pickle.dumps(model_of(kind)))  # not packed yet
+    state, twists, loads = drive(model_of("ellipsoid"))
+    state = np.full(model.state_shape, 1e-7) if kind == "distributed" else state
+    with ThreadPoolExecutor(4) as pool:
+        found = list(
+            pool.map(
+                lambda given: derivatives.rollout(model, *given),
+                [
+                    (state, twists, loads, DT),
+                    (state, twists, loads, np.full(T, DT)),
+                    (state.tolist(), twists.tolist(), loads.tolist(), np.array(DT)),
+                    (state, np.asfortranarray(twists), np.repeat(loads, 2)[::2], DT),
+                ],
+            )
+        )
+    assert all(each == found[0] for each in found)
+    (many,) = derivatives.rollout(model, state, twists[None], loads, DT).wrenches
+    np.testing.assert_array_equal(many, found[0].wrenches)
+    assert found[0].wrenches.shape == (T, 3) and found[0].wrenches.all()
 
 
 def test_parameters_take_the_place_of_the_models_own():

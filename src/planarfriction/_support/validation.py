@@ -350,7 +350,11 @@ def non_negative_array(
 
 
 def _check_finite(name: str, values: np.ndarray, largest: float) -> None:
-    if not np.abs(values).max(initial=0.0) <= min(largest, _FINITE):
+    limit = min(largest, LARGEST)
+    # the sum of squares, which is found faster, bounds them all
+    if not np.vdot(values, values) <= limit * limit and not np.abs(values).max(
+        initial=0.0
+    ) <= min(largest, _FINITE):
         _check_each(name, values, np.isfinite(values), "be finite")
         _check_each(
             name, values, np.abs(values) <= largest, f"be at most {largest:g} in size"

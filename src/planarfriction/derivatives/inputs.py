@@ -10,12 +10,15 @@ import numpy as np
 
 from planarfriction._engine.cells.rollouts import Inputs, ShapesByLoad
 from planarfriction._engine.compiler import threads
+from planarfriction._engine.coupled.steps import PLAIN, in_order, ready
 from planarfriction._support import validation
 from planarfriction.derivatives.parameters import PackedRollout, pack
 from planarfriction.errors import InvalidValueError
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
+
+_FLOAT = np.dtype(float)
 
 LIGHTEST = 1e-9
 """Load [N] whose shape stands for the shape of a load that fades in, for the slope at no load."""
@@ -114,6 +117,10 @@ def checked(
 ) -> RolloutInputs:
     """Check the inputs of a rollout; `more` are batch axes of other arrays that belong to it."""
     packed = pack(model, parameters)
+    if packed.rows.ndim == 1 and not (packed.batch or more):
+        quick = _of_one(packed, state, twist, normal_force, dt)
+        if quick is not None:
+            return quick
     inner = packed.inner
     state = np.zeros(inner) if state is None else validation.numbers("state", state)
     if state.shape[-len(inner) :] != inner:
@@ -161,11 +168,56 @@ def checked(
     )
 
 
+def _of_one(
+    packed: PackedRollout, state: Any, twist: Any, normal_force: Any, dt: Any
+) -> RolloutInputs | None:
+    """Return the inputs of one contact, which compiled code checks, or None for inputs not plain or not in order."""
+    if type(twist) is not np.ndarray:
+        return None
+    steps = len(twist)
+    state = np.zeros(packed.inner) if state is None else state
+    load = _each(normal_force, steps)
+    dt = _each(dt, steps)
+    if not (
+        _is_plain(twist, (steps, 3))
+        and _is_plain(state, packed.inner)
+        and _is_plain(load, (steps,))
+        and _is_plain(dt, (steps,))
+        and ready(in_order)(state.ravel(), twist.ravel(), load, dt)
+    ):
+        return None
+    rows = packed.rows[None]
+    state = state.reshape(1, -1)
+    turned = packed.turned(twist[None])
+    return RolloutInputs(packed, rows, state, turned, load[None], dt, ())
+
+
+def _each(value: Any, steps: int) -> Any:
+    """Return a plain number as one for each step, anything else as it is."""
+    if type(value) not in PLAIN:
+        return value
+    filled = np.empty(steps)
+    filled.fill(value)
+    return filled
+
+
+def _is_plain(value: Any, shape: tuple[int, ...]) -> bool:
+    """Return True for an array of doubles that compiled loops take as it is."""
+    return (
+        type(value) is np.ndarray
+        and value.shape == shape
+        and value.dtype == _FLOAT
+        and value.flags.carray
+    )
+
+
 def rows_of(
     name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]
 ) -> np.ndarray:
     """Return `value` `[..., *inner]` as `[B, *inner]`, or as one row where the contacts share it."""
     value = validation.finite_numbers(name, value)
+    if _is_plain(value, inner):
+        return value[None]
     if value.size != np.prod(inner) or value.shape[value.ndim - len(inner) :] != inner:
         try:
             value = np.broadcast_to(value, (*batch, *inner))
@@ -180,6 +232,8 @@ def rows_of(
 
 def sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
     """Sum a gradient over the axes along which its input was broadcast."""
+    if gradient.shape == shape:
+        return gradient
     extra = tuple(range(gradient.ndim - len(shape)))
     gradient = gradient.sum(axis=extra) if extra else gradient
     kept = tuple(i for i, n in enumerate(shape) if n == 1 and gradient.shape[i] != 1)

@@ -173,8 +173,15 @@ def _refusal(model: Any) -> tuple[str, str, Any] | None:
 
 
 def _packed(model: Any) -> PackedRollout:
+    """Return a model as compiled loops see it, packed once: models do not change."""
     family = _family(model)
     model = model.reduction
+    if model.compiled.rollouts is None:
+        model.compiled.rollouts = _packed_anew(family, model)
+    return model.compiled.rollouts
+
+
+def _packed_anew(family: RolloutFunctions, model: Any) -> PackedRollout:
     refusal = _refusal(model)
     if refusal is not None:
         raise InvalidValueError(*refusal)

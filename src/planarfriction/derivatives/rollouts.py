@@ -197,7 +197,7 @@ def rollout_vjp(
     turned = packed.turned
     cotangents = turned(rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch))
     on_the_way = _on_the_way(inputs, states)
-    z_bar = np.zeros_like(inputs.state)
+    z_bar = np.zeros((count, size))
     if state_bar is not None:
         z_bar[:] = rows_of("state_bar", state_bar, inner, inputs.batch).reshape(
             -1, size

@@ -248,6 +248,18 @@ def jacobians(
 
 
 @jit
+def in_order(
+    state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray
+) -> bool:
+    """Return True if all numbers are in range, and no load or step is negative; all arrays are flat."""
+    valid = _in_order(state, state.shape[0]) and _in_order(twist, twist.shape[0])
+    for row in (load, dt):
+        for i in range(row.shape[0]):
+            valid = valid and row[i] >= 0.0 and xp.in_range(row[i])
+    return valid
+
+
+@jit
 def rates_many(
     function: Place,
     records: np.ndarray,
@@ -286,14 +298,22 @@ def linearise_many(
 UNFIT = (TypeError, ValueError, NumbaError)
 """Exceptions that the entry points raise for arguments of other types."""
 
+REFUSED = (*UNFIT, OverflowError)
+"""Exceptions that these and NumPy raise for numbers that are none, or too large."""
+
+PLAIN = frozenset((float, int, np.float64))
+"""Types of numbers that need no check before compiled code checks their values."""
+
 _NUMBER = types.float64
 _VECTOR = types.float64[::1]
 _ROWS = types.float64[:, ::1]
-_SIGNATURES: dict[Any, tuple] = {
+SIGNATURES: dict[Any, tuple] = {
     step_one: (_VECTOR, _VECTOR, *(_NUMBER,) * 5, _VECTOR),
     step_many: (_VECTOR, _ROWS, _ROWS, _VECTOR, _VECTOR, _ROWS, _ROWS, _VECTOR),
     jacobians: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
+    in_order: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
 }
+"""Types of the arguments of each entry point."""
 _COMPILING = threading.Lock()
 
 
@@ -305,6 +325,6 @@ def ready(function: Any) -> Any:
     """
     with _COMPILING:
         if not function.signatures:
-            function.compile(_SIGNATURES[function])
+            function.compile(SIGNATURES[function])
             function.disable_compile()
     return function

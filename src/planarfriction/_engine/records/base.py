@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction._engine.coupled.steps import (
+    PLAIN,
+    REFUSED,
     SCRATCH,
     UNFIT,
     jacobians,
@@ -32,8 +34,6 @@ _FLOAT = np.dtype(float)
 _EMPTY = np.empty
 _MAKE = np.array
 _TRUTH = frozenset((bool, np.bool_))
-_PLAIN = frozenset((float, int, np.float64))
-_REFUSED = (*UNFIT, OverflowError)
 
 
 @by_parts
@@ -86,6 +86,8 @@ class CompiledModel:
     """Common compliance of a pad about the origin `[3, 3]` (see `coupled.face`)."""
     lag = 0.0
     """Lag of a pad with a common compliance [s]."""
+    rollouts: Any = None
+    """The model as the loops of rollouts see it, once `derivatives` has packed it."""
 
     def __init__(
         self,
@@ -228,11 +230,11 @@ class CompiledModel:
             return None
         try:
             if type(normal_force) is not _ARRAY:
-                if type(normal_force) not in _PLAIN:
+                if type(normal_force) not in PLAIN:
                     return None
                 normal_force = _MAKE((normal_force,), float)
             if type(dt) is not _ARRAY:
-                if type(dt) not in _PLAIN:
+                if type(dt) not in PLAIN:
                     return None
                 dt = _MAKE((dt,), float)
             rows = state if state.ndim == 2 else state.reshape(count, self._size)
@@ -242,7 +244,7 @@ class CompiledModel:
                 table, rows, twist, normal_force, dt, new, wrench, _EMPTY(SCRATCH)
             ):
                 return None
-        except _REFUSED:
+        except REFUSED:
             return None
         return new if state.ndim == 2 else new.reshape(state.shape), wrench
 
@@ -261,7 +263,7 @@ class CompiledModel:
         ):
             return None
         inputs = *twist, normal_force, dt
-        if not _PLAIN.issuperset(map(type, inputs)):
+        if not PLAIN.issuperset(map(type, inputs)):
             return None
         result = _EMPTY(self._per_contact + self._scratch)
         try:
@@ -272,7 +274,7 @@ class CompiledModel:
                 result,
             ):
                 return None
-        except _REFUSED:
+        except REFUSED:
             return None
         return StepJacobians(
             *[result[place].reshape(shape) for place, shape in self._derivatives]

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction._engine.compiler.calls import address_of
 from planarfriction._engine.compiler.memory import Layout, StructBuffer, places_of
+from planarfriction._engine.coupled.bodies import RigidPatches, step_bodies
 from planarfriction._engine.coupled.coupling import solve
 from planarfriction._engine.coupled.coupling_rows import Followers, Patches, layout
+from planarfriction._engine.coupled.steps import ready
 from planarfriction._engine.records.base import CompiledModel
 from planarfriction._engine.records.packed import PackedModel
 
@@ -75,3 +77,48 @@ def packed_patches(
     )
     following = [p for p, each in enumerate(fixed) if each is None]
     return PackedPatches(StructBuffer(patches), rows, records, sizes, following, fixed)
+
+
+class PackedBody(NamedTuple):
+    """A rigid body on patches as `coupled.bodies.step_bodies` sees it."""
+
+    words: np.ndarray
+    """Words of its `RigidPatches`."""
+    states: int
+    """Number of states of its patches."""
+    scratch: int
+    """Words of the row of a problem."""
+    records: np.ndarray
+    """Addresses of the patches' records, as in `PackedPatches`."""
+    fixed: bool
+    """True if no patch follows its load."""
+    alone: bool
+    """True of one patch, whose load is a number."""
+    kept: Any
+    """Objects behind the addresses, which have to be kept alive."""
+
+
+def packed_body(
+    packed: PackedPatches,
+    blank: np.ndarray,
+    per_mass: np.ndarray,
+    to_patches: np.ndarray,
+    alone: bool,
+) -> PackedBody:
+    """Pack a body by the inverses of mass, mass and inertia, and the rows that give the twists of its patches.
+
+    `blank` is a problem without inputs; `alone` as in `PackedBody`.
+    """
+    ready(step_bodies)
+    to_patches = np.ascontiguousarray(to_patches)
+    of_patches: Any = packed.patches.words
+    body = StructBuffer(RigidPatches(of_patches, blank, per_mass, to_patches))
+    return PackedBody(
+        words=body.words,
+        states=packed.patches.record.states,
+        scratch=packed.layout.size,
+        records=packed.records,
+        fixed=not packed.following,
+        alone=alone,
+        kept=(body, packed),
+    )
