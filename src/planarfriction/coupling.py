@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ from planarfriction._engine.compiler.threads import share
 from planarfriction._engine.coupled import coupling as kernels
 from planarfriction._engine.records.packed import PackedModel
 from planarfriction._engine.records.patches import PackedPatches, packed_patches
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
@@ -83,6 +84,11 @@ class HostStep(NamedTuple):
     moments: Any = None
     """Moments (m_x, m_y) of the normal forces for the guess, about the patches' origins, `[..., k, 2]` [N m]: pressures
     follow them (see `ContactPatch.weights`) and are held for the step; None if they do not follow."""
+    loads: Any = None
+    """Loads of the cells of each patch for the guess, a sequence of k entries as in `FrictionModel.step`, or None for
+    patches whose pressure is their own; they add up to `normal_force`, which is not read then."""
+    cover: Any = None
+    """Pressed shares of the cells of each patch, as `loads`."""
 
 
 @by_parts
@@ -198,7 +204,7 @@ class CoupledPatches(ByValue):
             if iterations is None
             else validation.count("iterations", iterations, 0, 10**9)
         )
-        given = dict(zip(_INPUTS, (state, dt, *host), strict=True))
+        given = dict(zip(_INPUTS, (state, dt, *host[: len(_INPUTS) - 2]), strict=True))
         for name in ("load_response", "moments"):
             if given[name] is None:
                 del given[name]
@@ -207,21 +213,62 @@ class CoupledPatches(ByValue):
         arrays = {
             name: validation.numbers(name, value) for name, value in given.items()
         }
-        problems, batch = self._problems(arrays)
+        pressings = self._pressings(host.loads, host.cover)
+        if pressings and host.moments is not None:
+            rule = "be None beside loads of cells"
+            raise InvalidValueError("moments", rule, host.moments)
+        problems, batch = self._problems(arrays, pressings)
         parts = self._parts
+        into = problems[:, parts["state"]], problems[:, parts["free_load"]]
+        held = self._press(*into, batch, pressings)
         problems[:, parts["tolerance"]] = tolerance
         problems[:, parts["most"]] = most
         problems[:, parts["again"]] = float(iterations is None)
         problems[:, parts["wrench"]] = problems[:, parts["guess"]]
-        counts = self._solve(problems)
+        counts = self._solve(problems, held)
         if (counts < 0).any():
             _refuse(arrays)
         return self._result(problems, counts, batch)
 
     # ------------------------------------------------------------------ rows
 
+    def _pressings(self, loads: Any, cover: Any) -> dict[int, Pressing]:
+        """Return the pressures of patches whose loads are given, by their number."""
+        given = {}
+        for name, each in (("loads", loads), ("cover", cover)):
+            if each is None:
+                given[name] = [None] * len(self.models)
+            elif isinstance(each, tuple | list) and len(each) == len(self.models):
+                given[name] = each
+            else:
+                rule = (
+                    f"be a list of {len(self.models)}, for each patch an array or None"
+                )
+                raise InvalidValueError(name, rule, type(each).__name__)
+        return {
+            p: model._pressing(load, part)
+            for p, (model, load, part) in enumerate(
+                zip(self.models, given["loads"], given["cover"], strict=True)
+            )
+            if load is not None or part is not None
+        }
+
+    def _press(
+        self, states: np.ndarray, loads: np.ndarray, batch: tuple[int, ...], pressings: dict[int, Pressing]
+    ) -> dict[int, PackedModel]:  # fmt: skip
+        """Write given loads `[E, k]`, and the states `[E, states]` that they leave; return what patches are then."""
+        held = {}
+        for p, pressing in pressings.items():
+            each = pressing.spread(batch)
+            model = self.models[p].compiled
+            own = slice(*self._bounds[p : p + 2])
+            states[:, own] = model.left(np.ascontiguousarray(states[:, own]), each)
+            loads[:, p] = each.load
+            held[p] = model.under(each)
+        return held
+
     def _problems(
-        self, arrays: dict[str, np.ndarray]
+        self, arrays: dict[str, np.ndarray], pressings: dict[int, Pressing]
     ) -> tuple[np.ndarray, tuple[int, ...]]:
         """Return a row for each environment, with the inputs written, and the batch axes."""
         k = len(self.models)
@@ -239,6 +286,8 @@ class CoupledPatches(ByValue):
                     name, f"have shape [{wanted}]", f"shape {list(array.shape)}"
                 )
             axes[name] = array.shape[:cut]
+        for p, pressing in pressings.items():
+            axes[f"loads of patch {p}"] = pressing.load.shape
         batch = axes["state"]
         if any(each != batch for each in axes.values()):
             batch = validation.common_shape("batch axes", axes.values())
@@ -265,12 +314,15 @@ class CoupledPatches(ByValue):
                     "moments", rule, f"model {p}: {type(self.models[p]).__name__}"
                 )
 
-    def _solve(self, problems: np.ndarray) -> np.ndarray:
+    def _solve(self, problems: np.ndarray, held: dict[int, PackedModel]) -> np.ndarray:
         """Solve all problems; the iterations that each took, negative for invalid ones."""
         packed = self._packed
         parts = self._parts
-        problems.view(np.int64)[:, parts["records"]] = packed.records
-        if not packed.following:
+        places = problems.view(np.int64)[:, parts["records"]]
+        places[:] = packed.records
+        for p, each in held.items():
+            places[:, p] = places_of(each.records)
+        if held.keys() >= set(packed.following):
             return self._once(problems)
         total = np.zeros(len(problems), int)
         unsettled = np.arange(len(problems))
@@ -278,7 +330,7 @@ class CoupledPatches(ByValue):
         for i in range(PASSES + 1):
             rows = problems[unsettled]
             records = rows.view(np.int64)[:, parts["records"]]
-            kept = self._write_following(records, loads)
+            kept = self._write_following(records, loads, held)
             if i == PASSES:
                 rows[:, parts["most"]] = 0
             taken = self._once(rows)
@@ -308,11 +360,16 @@ class CoupledPatches(ByValue):
         return problems[:, self._parts["iterations"].start].astype(int)
 
     def _write_following(
-        self, records: np.ndarray, loads: np.ndarray
+        self, records: np.ndarray, loads: np.ndarray, held: Container[int] = ()
     ) -> list[PackedModel]:
-        """Write the records `[E, k]` of patches whose shapes follow their loads; returns what has to be kept."""
+        """Write the records `[E, k]` of patches whose shapes follow their loads, but for those that are held.
+
+        Returns what has to be kept.
+        """
         kept = []
         for p in self._packed.following:
+            if p in held:
+                continue
             chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))
             records[:, p] = 0
             if chosen.size:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import geometry
+from planarfriction._engine.compiler.memory import places_of
 from planarfriction._engine.compiler.threads import share
 from planarfriction._engine.coupled.bodies import (
     ANGLE,
@@ -24,7 +25,9 @@ from planarfriction._engine.coupled.bodies import (
     step_bodies,
 )
 from planarfriction._engine.coupled.steps import PLAIN, REFUSED
+from planarfriction._engine.records.packed import PackedModel
 from planarfriction._engine.records.patches import PackedBody, packed_body
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction._support.equality import ByValue, Kept, by_parts, checked
 from planarfriction.coupling import WORTH_A_THREAD, CoupledPatches
@@ -93,11 +96,14 @@ class SlidingBody(ByValue):
         self,
         state: ArrayLike,
         twist: ArrayLike,
-        normal_force: ArrayLike,
+        normal_force: ArrayLike | None,
         dt: ArrayLike,
         wrench: ArrayLike = (0.0, 0.0, 0.0),
         angle: ArrayLike = 0.0,
         support_velocity: ArrayLike | None = None,
+        *,
+        loads: Any = None,
+        cover: Any = None,
     ) -> BodyStep:
         """Advance by `dt` [s] under an applied `wrench` `[..., 3]` [N, N, N m]; stable at any `dt`.
 
@@ -109,19 +115,28 @@ class SlidingBody(ByValue):
         start of the step; None if it stands still. A body that is held keeps its place on it, at any spin, if the
         caller moves it by `dt V'`: patches slide relative to `geometry.chord(support_velocity, dt)`.
 
+        `loads` and `cover` of the cells are those of `FrictionModel.step`, for a list of models a list of them, with
+        None for patches whose pressure is their own. The `normal_force` of patches with loads is not read, and None if
+        all have them.
+
         Raises InvalidValueError for shapes that do not fit, numbers that are not finite, and a load or time below zero;
         SolverError if a body did not converge (see `CoupledPatches.step`): its `step` has all bodies, those in
         `converged` with their result, the others with the best that was found.
         """
-        if support_velocity is None:
+        if support_velocity is None and loads is None and cover is None:
             done = self._quick(state, twist, normal_force, dt, wrench, angle)
             if done is not None:
                 return done
+        if isinstance(self.models, FrictionModel):
+            loads, cover = (None if each is None else [each] for each in (loads, cover))
+        pressings = self.patches._pressings(loads, cover)
+        load = self._loads(normal_force, pressings)
         batch, states, given = self._checked(
-            state, twist, normal_force, dt, wrench, angle, support_velocity
+            state, twist, load, dt, wrench, angle, support_velocity, pressings
         )
+        held = self.patches._press(states, given[:, LOADS:], batch, pressings)
         n = states.shape[-1]
-        ends = self._ends(states, given).reshape(*batch, n + MORE)
+        ends = self._ends(states, given, held).reshape(*batch, n + MORE)
         step = BodyStep(
             *(
                 np.ascontiguousarray(ends[..., first:last])
@@ -171,11 +186,12 @@ class SlidingBody(ByValue):
         self,
         state: ArrayLike,
         twist: ArrayLike,
-        normal_force: ArrayLike,
+        load: np.ndarray,
         dt: ArrayLike,
         wrench: ArrayLike,
         angle: ArrayLike,
         support_velocity: ArrayLike | None,
+        pressings: dict[int, Pressing],
     ) -> tuple[tuple[int, ...], np.ndarray, np.ndarray]:
         """Check the inputs of a step; return their batch axes, and rows of states and of the rest for each body."""
         sizes = {"state": self._packed.states, "twist": 3, "wrench": 3}
@@ -199,7 +215,8 @@ class SlidingBody(ByValue):
             else each
             for name, each in arrays.items()
         }
-        load = self._loads(normal_force)
+        for p, pressing in pressings.items():
+            axes[f"loads of patch {p}"] = pressing.load
         batch = validation.broadcast(**axes, normal_force=load[..., 0])
         if (axes["dt"] < 0.0).any():
             raise InvalidValueError("dt", "be >= 0", float(axes["dt"].min()))
@@ -224,12 +241,16 @@ class SlidingBody(ByValue):
         states[:] = arrays["state"]
         return batch, states.reshape(count, n), given.reshape(count, width)
 
-    def _ends(self, states: np.ndarray, given: np.ndarray) -> np.ndarray:
+    def _ends(
+        self, states: np.ndarray, given: np.ndarray, held: dict[int, PackedModel]
+    ) -> np.ndarray:
         """Step bodies of checked inputs, on threads: the rows that `step_bodies` writes."""
         packed = self._packed
         count = len(given)
         records = np.tile(packed.records, (count, 1))
-        kept = self.patches._write_following(records, given[:, LOADS:])
+        for p, each in held.items():
+            records[:, p] = places_of(each.records)
+        kept = self.patches._write_following(records, given[:, LOADS:], held)
         ends = np.empty((count, packed.states + MORE))
 
         def work(first: int, last: int) -> None:
@@ -272,8 +293,16 @@ class SlidingBody(ByValue):
         with np.errstate(divide="ignore"):
             return 4.0 / (c + np.sqrt(c * c + 4.0 * k))
 
-    def _loads(self, normal_force: ArrayLike) -> np.ndarray:
-        """Return the loads of the patches `[..., k]`."""
+    def _loads(
+        self, normal_force: ArrayLike | None, given: Container[int] = ()
+    ) -> np.ndarray:
+        """Return the loads of the patches `[..., k]`; None for those whose loads are `given` otherwise."""
+        count = len(self.patches.models)
+        if normal_force is None and all(p in given for p in range(count)):
+            return np.zeros(count)
+        if 0 in given and isinstance(self.models, FrictionModel):
+            rule = "be None beside loads of cells"
+            raise InvalidValueError("normal_force", rule, normal_force)
         load = validation.non_negative_numbers("normal_force", normal_force)
         if isinstance(self.models, FrictionModel):
             return load[..., None]

@@ -1,9 +1,12 @@
 """Loads of cells that are given anew at each step: against all cells, closed forms and the energy of bristles."""
 
+import functools
+
 import numpy as np
 import pytest
 
 import planarfriction as pf
+from planarfriction.coupling import CoupledPatches, HostStep
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=1.0, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
@@ -144,23 +147,37 @@ def pressures(kind, x, y, t):
     return press, (press > 0.0) + 0.0
 
 
-def errors(kind, pace, side=48, count=400):
-    """Return the largest errors of force and torque of 24 discs, in the friction and the torque of the whole square."""
+EDGE = "plate leaves over an edge"
+CASES = {
+    (EDGE, "stick-slip"): (0.012, 0.022),
+    (EDGE, "sliding"): (0.006, 0.012),
+    ("part lifts under a moment", "stick-slip"): (0.015, 0.025),
+    ("a round spot rolls across", "stick-slip"): (0.010, 0.014),
+    ("a round spot rolls across", "sliding"): (0.040, 0.026),
+}
+"""Largest errors of force and torque of 24 discs, in the friction and the torque of the whole square."""
+
+
+@functools.cache
+def errors(side=48, count=400):
+    """Return errors of force and torque in all cases, one contact each, side by side."""
     square = pf.ContactPatch.rectangle(SIDE, cells=side)
     x, y = square.positions.T / (0.5 * SIDE)
     t = np.arange(count) / count
-    loads, cover = pressures(kind, x, y, t)
-    loads = loads / loads.sum(-1, keepdims=True)
-    loads = loads * (1.0 + 0.3 * np.sin(10.0 * np.pi * t))[:, None]
+    every = [pressures(kind, x, y, t) for kind, _ in CASES]
+    loads, cover = (np.stack(each, 1) for each in zip(*every, strict=True))
+    rocks = 1.0 + 0.3 * np.sin(10.0 * np.pi * t)
+    loads = loads * (rocks[:, None] / loads.sum(-1))[..., None]
+    steps = np.stack([along(count, pace) for _, pace in CASES], 1)
     wrenches = []
     for model in (
         pf.DistributedModel(square.discs(), LAW, pad=LAYER),
         pf.ReducedModel(square, LAW, pad=LAYER),
     ):
-        state = model.rest()
+        state = model.rest(len(CASES))
         last = 0
         found = []
-        for j, step in enumerate(along(count, pace)):
+        for j, step in enumerate(steps):
             state, wrench = model.step(
                 state, step / 1e-3, None, 1e-3,
                 loads=(loads[last], loads[j]), cover=(cover[last], cover[j]),
@@ -170,23 +187,14 @@ def errors(kind, pace, side=48, count=400):
         wrenches.append(found)
     off = abs(np.subtract(*wrenches)).max(axis=0)
     arm = np.hypot(*square.positions.T).mean()
-    return max(off[:2]), off[2] / arm
+    sizes = [(max(fx, fy), torque / arm) for fx, fy, torque in off]
+    return dict(zip(CASES, sizes, strict=True))
 
 
-EDGE = "plate leaves over an edge"
-CASES = [
-    (EDGE, "stick-slip", 0.012, 0.022),
-    (EDGE, "sliding", 0.006, 0.012),
-    ("part lifts under a moment", "stick-slip", 0.015, 0.025),
-    ("a round spot rolls across", "stick-slip", 0.010, 0.014),
-    ("a round spot rolls across", "sliding", 0.040, 0.026),
-]
-
-
-@pytest.mark.parametrize(("kind", "pace", "force", "torque"), CASES)
-def test_discs_bear_pressures_as_all_cells_do(kind, pace, force, torque):
-    """A thin layer under a square, load +-30 %: 24 discs against 48 x 48 cells, in the friction of the whole."""
-    assert np.all(np.array(errors(kind, pace)) < [force, torque])
+@pytest.mark.parametrize("case", CASES)
+def test_discs_bear_pressures_as_all_cells_do(case):
+    """A thin layer under a square, load +-30 %: 24 discs against 48 x 48 cells."""
+    assert np.all(np.array(errors()[case]) < CASES[case])
 
 
 @pytest.mark.parametrize("name", ["cells", "discs of a layer", "common compliance"])
@@ -229,3 +237,40 @@ def test_loads_that_make_no_sense_are_refused():
     one = pf.ReducedModelPublished(GRADED, DAMPED)
     with refused("loads.*without cells"):
         one.step(one.rest(), [0.0, 0.0, 0.0], None, 1e-3, loads=loads)
+
+
+@pytest.mark.parametrize("name", ["discs", "discs of a layer", "common compliance"])
+def test_bodies_and_coupled_patches_step_as_the_model_at_their_new_twist(name):
+    model = MODELS[name]
+    state, twist, loads = drawn(model, 3, np.random.default_rng(6))
+    loads = loads / loads.sum(-1, keepdims=True)
+    given = {"loads": (np.roll(loads, 1, axis=0), loads)}
+    mass = np.array([0.1, 0.1, 1e-5])
+    body = pf.SlidingBody(mass[0], mass[2], model)
+    flat = 0.1 * state.reshape(3, -1)
+    end = body.step(flat, twist, None, 1e-3, **given)
+    new, wrench = model.step(0.1 * state, end.twist, None, 1e-3, **given)
+    np.testing.assert_allclose(end.wrench, wrench, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(
+        mass * (end.twist - twist), 1e-3 * end.wrench, atol=1e-10
+    )
+    # Beside a patch with a pressure of its own, which does not touch it.
+    patches = CoupledPatches([model, model])
+    host = HostStep(
+        np.stack([twist, twist], 1),
+        np.ones((3, 2)),
+        np.zeros((3, 2, 3)),
+        np.diag(np.tile(1e-3 / mass, 2)),
+        loads=[given["loads"], None],
+    )
+    found = patches.step(np.concatenate([flat, flat], -1), host, 1e-3)
+    assert found.converged.all()
+    np.testing.assert_allclose(found.wrench[:, 0], end.wrench, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(found.normal_force[:, 0], loads.sum(-1), rtol=1e-14)
+    np.testing.assert_allclose(
+        patches.states(found.state)[0], new, atol=1e-6 * abs(new).max()
+    )
+    with refused("normal_force.*None beside loads"):
+        body.step(flat, twist, 1.0, 1e-3, **given)
+    with refused("loads.*list of 2"):
+        patches.step(patches.rest(3), host._replace(loads=loads), 1e-3)

@@ -85,7 +85,7 @@ class CompiledDistributed(CompiledModel):
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""
         if isinstance(centre, Pressing):
-            yield slice(None), self._under(centre), None
+            yield slice(None), self.under(centre), None
             return
         contact = self.fixed if centre is None else None
         if contact is None:
@@ -98,7 +98,7 @@ class CompiledDistributed(CompiledModel):
             contact = self._packed(moved)
         yield slice(None), contact, None
 
-    def _under(self, given: Pressing) -> PackedModel:
+    def under(self, given: Pressing) -> PackedModel:
         """Pack the cells under given loads, with numbers of their own if they move or their stiffness changes."""
         packed = self._packed(given.weights)
         (weights, numbers) = packed.keepalive
@@ -121,7 +121,7 @@ class CompiledDistributed(CompiledModel):
         rows = rows_of(record, len(weights), **columns)
         return packed._replace(records=rows, keepalive=(weights, numbers))
 
-    def _left(self, state: np.ndarray, given: Any) -> np.ndarray:
+    def left(self, state: np.ndarray, given: Any) -> np.ndarray:
         """Return the state that a new pressure leaves of one before."""
         if not isinstance(given, Pressing) or given.kept is None:
             return state
@@ -139,7 +139,7 @@ class CompiledDistributed(CompiledModel):
         centre: np.ndarray | Pressing | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """See `CompiledModel`."""
-        return super().step(self._left(state, centre), twist, load, dt, centre)
+        return super().step(self.left(state, centre), twist, load, dt, centre)
 
     def step_jacobians(
         self,
@@ -150,7 +150,7 @@ class CompiledDistributed(CompiledModel):
         centre: np.ndarray | Pressing | None = None,
     ) -> StepJacobians:
         """See `CompiledModel`; by the state before it was left."""
-        state = self._left(state, centre)
+        state = self.left(state, centre)
         slopes = super().step_jacobians(state, twist, load, dt, centre)
         if not isinstance(centre, Pressing) or centre.kept is None:
             return slopes

@@ -51,7 +51,7 @@ class CompiledSoft(CompiledDistributed):
         centre: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """See `CompiledModel`: the host of a prescribed twist does not yield."""
-        state = self._left(state, centre)
+        state = self.left(state, centre)
         layout = self._patch.layout
         parts = layout.slices
         rows = np.zeros((load.size, layout.size))
