@@ -196,6 +196,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Contact": {"pressure": "fixed", "height": 0.0, "edge": False},
     "SlidingBody": {"models": DISCS, "positions": (0.0, 0.0), "angles": 0.0},
     "SlidingBody.step": {
+        "loads": None,
+        "cover": None,
         "state": Fresh(lambda: np.zeros(np.prod(DISCS.state_shape))),
         "twist": (0.01, 0.0, 0.1),
         "normal_force": 1.0,
@@ -288,7 +290,10 @@ SPECIAL: dict[str, dict[str, Any]] = {
         )
     },
     **{
-        f"{model}.{name}": {"state": Fresh(lambda shape=shape: np.zeros(shape))}
+        f"{model}.{name}": {
+            "state": Fresh(lambda shape=shape: np.zeros(shape)),
+            **({"loads": None, "cover": None} if "step" in name else {}),
+        }
         for model, shape in (
             ("DistributedModel", (2, PATCH.cells)),
             ("ReducedModel", DISCS.state_shape),
@@ -296,9 +301,20 @@ SPECIAL: dict[str, dict[str, Any]] = {
         for name in ("rate", "wrench", "step", "jacobians", "step_jacobians")
     },
     **{
+        f"ReducedModelPublished.{name}": {"loads": None, "cover": None}
+        for name in ("step", "step_jacobians")
+    },
+    **{
         f"{law}.{name}": {"state": Fresh(lambda: np.zeros(3)), "velocity": TWISTS[9]}
         for law in ("LuGre", "Dahl", "CoulombStribeck")
         for name in ("rate", "force")
+    },
+    "DistributedModel.step": {
+        "state": Fresh(lambda: np.zeros((2, PATCH.cells))),
+        "normal_force": None,
+        "moments": None,
+        "loads": np.ones(PATCH.cells),
+        "cover": np.full(PATCH.cells, 0.5),
     },
     "LimitSurfaceQuartic": {"surface": None},
     "LimitSurfaceQuartic.fit": {

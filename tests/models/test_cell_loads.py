@@ -120,6 +120,22 @@ def test_no_pressure_makes_energy(name):
     assert members is None or len(members.begins) == model.state_shape[-1]
 
 
+def test_a_disc_is_that_of_the_part_that_is_pressed():
+    """One disc of a rectangle whose half is pressed slides as one of the half does."""
+    whole, half = (
+        pf.ContactPatch.from_pressure(np.ones((15, n)), SIDE / 24) for n in (24, 12)
+    )
+    left = (whole.positions[:, 0] < 0.0) * 2.5 / 180
+    twist = np.array([0.03, -0.01, 4.0])
+    one = pf.ReducedModel(whole, DAMPED, cells=1)
+    beside = pf.ReducedModel(half, DAMPED, cells=1)
+    wrench = one.step(one.rest(), twist, None, 1.0, loads=left)[1]
+    middle = pf.geometry.twist_at(twist, [-0.25 * SIDE, 0.0])
+    wanted = beside.step(beside.rest(), middle, 2.5, 1.0)[1]
+    wanted = pf.geometry.wrench_at(wanted, [0.25 * SIDE, 0.0])
+    np.testing.assert_allclose(wrench, wanted, rtol=1e-10)
+
+
 def along(count, pace):
     """Return the steps `[count, 3]` of a path in stick-slip, or of one that slides."""
     t = np.arange(count + 1) / count
@@ -208,13 +224,16 @@ def test_derivatives_are_those_of_the_step(name):
     change = 1e-5 * state * rng.normal(size=state.shape)
     turn = 1e-6 * rng.normal(size=3) * twist
     ends = [
-        model.step(state + k * change, twist + k * turn, None, 1e-3, **given)[1]
+        model.step(state + k * change, twist + k * turn, None, 1e-3, **given)
         for k in (1.0, -1.0)
     ]
-    wanted = 0.5 * (ends[0] - ends[1])
+    new, wrench = (0.5 * (one - other) for one, other in zip(*ends, strict=True))
     axes = "di,i->d" if state.ndim == 1 else "dan,an->d"
     got = np.einsum(axes, slopes.wrench_state, change) + slopes.wrench_twist @ turn
-    np.testing.assert_allclose(got, wanted, atol=1e-6 * abs(wanted).max())
+    np.testing.assert_allclose(got, wrench, atol=1e-6 * abs(wrench).max())
+    axes = "ij,j->i" if state.ndim == 1 else "abn,bn->an"
+    got = np.einsum(axes, slopes.state_state, change) + slopes.state_twist @ turn
+    np.testing.assert_allclose(got, new, atol=1e-6 * abs(new).max())
 
 
 def test_loads_that_make_no_sense_are_refused():

@@ -168,8 +168,8 @@ def in_mjx(
 
     first = scenes[0]
     steps = [scene.m.opt.timestep for scene in scenes]
-    first.m.opt.iterations = 6
-    first.m.opt.ls_iterations = 8
+    first.m.opt.iterations = 2
+    first.m.opt.ls_iterations = 4
     friction = Friction(first.m, first.patches)
     mx = mjx.put_model(first.m)
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.cells.gathering import gather
 from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
@@ -24,18 +25,41 @@ from planarfriction.patch.discs import Membership
 class Cells(NamedTuple):
     """Cells of a patch, and the discs that stand for them."""
 
+    members: Membership
+    """Cells of each disc, or of each cell itself."""
+    stiffness: np.ndarray
+    """Stiffness of the cells on their pad `[N]`, but for a factor; empty without a pad."""
+    numbers: np.ndarray
+    """Shares of the load, lever coordinates x and y from `middle` and the second moment about it, of the cells `[4, N]`;
+    `[4, 0]` if discs do not move."""
+    middle: np.ndarray
+    """Middle of the cells `[2]` [m], so that little is lost where they lie far from the origin."""
     count: int
     """Number N of cells."""
-    stiffness: np.ndarray | None = None
-    """Stiffness of the cells on their pad `[N]`, but for a factor; None without a pad."""
-    members: Membership | None = None
-    """Discs of the cells; None where each cell is one of its own, which does not move."""
-    places: np.ndarray | None = None
-    """Lever coordinates of the cells `[N, 2]` [m]."""
-    squares: np.ndarray | None = None
-    """Second moments of the cells about themselves `[N]` [m2]."""
-    shares: np.ndarray | None = None
-    """Shares of the load of the patch `[N]`, by which discs have their centres."""
+
+    @classmethod
+    def alone(cls, count: int, stiffness: np.ndarray | None = None) -> Cells:
+        """Return cells each of which is a bristle of its own, which does not move."""
+        every = np.arange(count)
+        return cls.of(Membership(every, np.ones(count), every), stiffness)
+
+    @classmethod
+    def of(
+        cls,
+        members: Membership,
+        stiffness: np.ndarray | None,
+        discs: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
+    ) -> Cells:
+        """Return cells in discs; `discs` are their shares, places `[N, 2]` and own second moments, if these move."""
+        count = int(members.cells.max()) + 1
+        stiffness = np.zeros(0) if stiffness is None else np.ascontiguousarray(stiffness)
+        if discs is None:
+            return cls(members, stiffness, np.zeros((4, 0)), np.zeros(2), count)
+        shares, places, squares = discs
+        middle = places.mean(axis=0)
+        x, y = (places - middle).T
+        numbers = np.array([shares, x, y, x * x + y * y + squares])
+        return cls(members, stiffness, numbers, middle, count)
 
     def under(self, loads: Any, cover: Any = None) -> Pressing:
         """Return the discs under `loads` `[..., N]` [N], now or (before, now), with the pressed shares of cells.
@@ -54,47 +78,42 @@ class Cells(NamedTuple):
             covered_before = covered if earlier is None else (earlier > 0.0) + 0.0
         shapes = now.shape, covered.shape, covered_before.shape
         batch = validation.common_shape("loads", shapes, "broadcast with cover")
-        now, covered, covered_before = (
-            np.broadcast_to(each, batch) for each in (now, covered, covered_before)
-        )
-        if ((covered == 0.0) & (now > 0.0)).any():
+        given = [
+            np.ascontiguousarray(np.broadcast_to(each, batch)).reshape(-1, self.count)
+            for each in (now, covered, covered_before)
+        ]
+        if ((given[1] == 0.0) & (given[0] > 0.0)).any():
             raise InvalidValueError("cover", "be > 0 where a cell bears load", 0.0)
-        load = now.sum(-1)
-        per_load = 1.0 / np.where(load > 0.0, load, 1.0)[..., None]
-        places = radii = stiffer = kept = None
-        if self.places is not None:
-            places, radii = self._gathered(covered)
-        if self.stiffness is not None:
-            whole = self._sums(self.stiffness)
-            pressed = self._sums(self.stiffness * covered)
-            stays = self._sums(self.stiffness * np.minimum(covered, covered_before))
-            stiffer = pressed / whole
-            kept = np.divide(
-                stays, pressed, out=np.zeros_like(stays), where=pressed > 0.0
-            )
-        return Pressing(load, self._sums(now) * per_load, places, radii, stiffer, kept)
+        return self._gathered(*given, batch[:-1])
 
-    def _sums(self, values: np.ndarray) -> np.ndarray:
-        return values + 0.0 if self.members is None else self.members.sums(values)
+    def _gathered(
+        self, now: np.ndarray, cover: np.ndarray, before: np.ndarray, batch: tuple[int, ...]
+    ) -> Pressing:  # fmt: skip
+        cells, parted, begins = self.members
+        n = len(begins)
+        weights = np.empty((len(now), n))
+        pads = np.empty((len(now), 2, n if self.stiffness.size else 0))
+        moved = np.empty((len(now), 3, n if self.numbers.size else 0))
+        gather(
+            now, cover, before, cells, parted, np.append(begins, len(cells)), self.stiffness, self.numbers,
+            self._whole, weights, pads, moved,
+        )  # fmt: skip
+        moves = moved.size > 0
+        return Pressing(
+            now.sum(-1).reshape(batch),
+            weights.reshape(*batch, n),
+            (moved[:, :2] + self.middle[:, None]).reshape(*batch, 2, n) if moves else None,
+            moved[:, 2].reshape(*batch, n) if moves else None,
+            pads[:, 0].reshape(*batch, n) if pads.size else None,
+            pads[:, 1].reshape(*batch, n) if pads.size else None,
+        )
 
-    def _gathered(self, cover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return centres and radii of the pressed parts of the discs; those of all cells where nothing is pressed."""
-        borne = self.shares * cover  # pyright: ignore[reportOptionalOperand]
-        total = self._sums(borne)
-        bare = total <= 0.0
-        total = np.where(bare, self._sums(np.ones(self.count)), total)
-
-        def mean(values: np.ndarray) -> np.ndarray:
-            return (
-                np.where(bare, self._sums(values), self._sums(borne * values)) / total
-            )
-
-        # About the middle, so that little is lost where the patch lies far from the origin.
-        middle = self.places.mean(axis=0)  # pyright: ignore[reportOptionalMemberAccess]
-        x, y = (self.places - middle).T
-        centre = np.stack([mean(x), mean(y)], -1)
-        second = mean(x * x + y * y + self.squares) - (centre**2).sum(-1)
-        return centre + middle, np.sqrt(2.0 * np.maximum(second, 0.0))
+    @property
+    def _whole(self) -> np.ndarray:
+        """Discs of all of their cells alike `[3, n]`."""
+        alike = self.members.sums(np.ones(self.count))
+        x, y, square = (self.members.sums(each) / alike for each in self.numbers[1:])
+        return np.array([x, y, np.sqrt(2.0 * np.maximum(square - x * x - y * y, 0.0))])
 
 
 def _pair(name: str, value: Any, count: int) -> tuple[np.ndarray | None, np.ndarray]:
