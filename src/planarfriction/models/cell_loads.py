@@ -30,10 +30,12 @@ class Cells(NamedTuple):
     stiffness: np.ndarray
     """Stiffness of the cells on their pad `[N]`, but for a factor; empty without a pad."""
     numbers: np.ndarray
-    """Shares of the load, lever coordinates x and y from `middle` and the second moment about it, of the cells `[4, N]`;
+    """Shares of the load, lever coordinates x and y from `middle`, and second moments about it, of the cells `[4, N]`;
     `[4, 0]` if discs do not move."""
     middle: np.ndarray
     """Middle of the cells `[2]` [m], so that little is lost where they lie far from the origin."""
+    whole: np.ndarray
+    """Places from `middle` and radii of discs of all of their cells alike `[3, n]`; `[3, 0]` if they do not move."""
     count: int
     """Number N of cells."""
 
@@ -52,14 +54,20 @@ class Cells(NamedTuple):
     ) -> Cells:
         """Return cells in discs; `discs` are their shares, places `[N, 2]` and own second moments, if these move."""
         count = int(members.cells.max()) + 1
-        stiffness = np.zeros(0) if stiffness is None else np.ascontiguousarray(stiffness)
+        stiffness = (
+            np.zeros(0) if stiffness is None else np.ascontiguousarray(stiffness)
+        )
         if discs is None:
-            return cls(members, stiffness, np.zeros((4, 0)), np.zeros(2), count)
+            none = np.zeros((4, 0))
+            return cls(members, stiffness, none, np.zeros(2), none[1:], count)
         shares, places, squares = discs
         middle = places.mean(axis=0)
         x, y = (places - middle).T
         numbers = np.array([shares, x, y, x * x + y * y + squares])
-        return cls(members, stiffness, numbers, middle, count)
+        x, y, square = members.sums(numbers[1:]) / members.sums(np.ones(count))
+        radii = np.sqrt(2.0 * np.maximum(square - x * x - y * y, 0.0))
+        whole = np.array([x, y, radii])
+        return cls(members, stiffness, numbers, middle, whole, count)
 
     def under(self, loads: Any, cover: Any = None) -> Pressing:
         """Return the discs under `loads` `[..., N]` [N], now or (before, now), with the pressed shares of cells.
@@ -96,24 +104,19 @@ class Cells(NamedTuple):
         moved = np.empty((len(now), 3, n if self.numbers.size else 0))
         gather(
             now, cover, before, cells, parted, np.append(begins, len(cells)), self.stiffness, self.numbers,
-            self._whole, weights, pads, moved,
+            self.whole, weights, pads, moved,
         )  # fmt: skip
         moves = moved.size > 0
         return Pressing(
             now.sum(-1).reshape(batch),
             weights.reshape(*batch, n),
-            (moved[:, :2] + self.middle[:, None]).reshape(*batch, 2, n) if moves else None,
+            (moved[:, :2] + self.middle[:, None]).reshape(*batch, 2, n)
+            if moves
+            else None,
             moved[:, 2].reshape(*batch, n) if moves else None,
             pads[:, 0].reshape(*batch, n) if pads.size else None,
             pads[:, 1].reshape(*batch, n) if pads.size else None,
         )
-
-    @property
-    def _whole(self) -> np.ndarray:
-        """Discs of all of their cells alike `[3, n]`."""
-        alike = self.members.sums(np.ones(self.count))
-        x, y, square = (self.members.sums(each) / alike for each in self.numbers[1:])
-        return np.array([x, y, np.sqrt(2.0 * np.maximum(square - x * x - y * y, 0.0))])
 
 
 def _pair(name: str, value: Any, count: int) -> tuple[np.ndarray | None, np.ndarray]:

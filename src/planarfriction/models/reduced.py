@@ -97,12 +97,13 @@ class ReducedModel(FrictionModel):
         else:
             members = clusters_of(patch, self.pad.shares(patch), n)
         stiffness = None if self.pad is None else self.pad.pieces(patch, self.law)
-        if members is None or is_rate_law(self.law):
-            return Cells(patch.cells, stiffness, members)
+        if members is None:
+            return Cells.alone(patch.cells, stiffness)
+        if is_rate_law(self.law):
+            return Cells.of(members, stiffness)
         places = np.stack(patch.lever_coordinates(*patch.positions.T), -1)
         squares = 0.5 * own_discs(patch).lever_radii ** 2
-        shares = mean_weights(patch)
-        return Cells(patch.cells, stiffness, members, places, squares, shares)
+        return Cells.of(members, stiffness, (mean_weights(patch), places, squares))
 
     def _pressing(self, loads: Any, cover: Any) -> Pressing:
         """Return the discs under loads of the cells, or of the discs."""
@@ -110,7 +111,7 @@ class ReducedModel(FrictionModel):
         shape = np.shape(loads[-1] if isinstance(loads, tuple) else loads)
         if shape[-1:] == (count,) != (self.patch.cells,):
             alike = None if self.pad is None else np.ones(count)
-            return Cells(count, alike).under(loads, cover)
+            return Cells.alone(count, alike).under(loads, cover)
         return self._cells.under(loads, cover)
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:

@@ -18,7 +18,7 @@ def gather(
     stiffness: np.ndarray, numbers: np.ndarray, whole: np.ndarray, weights: np.ndarray, pads: np.ndarray,
     moved: np.ndarray,
 ) -> None:  # fmt: skip
-    """Write the shares of the load `[B, n]`, the stiffness and what is kept of it `[B, 2, n]`, and the discs `[B, 3, n]`.
+    """Write shares of the load `[B, n]`, the stiffness and what is kept of it `[B, 2, n]`, and discs `[B, 3, n]`.
 
     Loads and pressed shares, now and before, are `[B, N]` of N cells; disc k has the memberships from `begins[k]` to
     `begins[k + 1]` `[n + 1]`, each a part of a cell `[M]`. `stiffness` `[N]` is that of the cells, none where empty.

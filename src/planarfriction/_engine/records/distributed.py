@@ -106,7 +106,7 @@ class CompiledDistributed(CompiledModel):
             return packed
         numbers = np.tile(numbers, (len(weights), 1, 1))
         if given.places is not None:
-            x, y = np.moveaxis(given.places, -1, 0)
+            x, y = np.moveaxis(given.places, -2, 0)
             first = 3 if self.patch.anisotropic else 0
             numbers[:, first] = -y if first else x
             numbers[:, first + 1] = x if first else y

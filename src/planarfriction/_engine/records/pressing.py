@@ -15,7 +15,7 @@ class Pressing(NamedTuple):
     weights: np.ndarray
     """Shares of them that each bears `[..., n]`."""
     places: np.ndarray | None = None
-    """Centres of discs in lever coordinates `[..., n, 2]` [m]; None if they stay."""
+    """Centres of discs in lever coordinates `[..., 2, n]` [m]; None if they stay."""
     radii: np.ndarray | None = None
     """Radii of discs in lever coordinates `[..., n]` [m]."""
     stiffer: np.ndarray | None = None
