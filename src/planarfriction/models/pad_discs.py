@@ -3,17 +3,21 @@
 The discs of a cluster of pieces have its load, with the centre and the second moment of that, and its stiffness. Under
 a shift or a spin that grows from rest, all that a disc stands for slips at once, while its pieces slip one after the
 other; so the logarithms of the stiffnesses (one for discs that are images of each other) and of the common compliance
-are fitted, by least squares, to the wrenches of all pieces at the ends of straight paths.
+are fitted, by least squares, to the wrenches of all pieces at the ends of straight paths. A fit is kept on disk.
 """
 
 from __future__ import annotations
 
 import functools
 import warnings
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.compiler import SOURCES, kept_numbers
+from planarfriction._engine.compiler.messages import show, watched
+from planarfriction._engine.compiler.sources import digest_of
 from planarfriction.laws import FrictionLaw, LuGre
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.pads import Pad, Pieces
@@ -44,6 +48,8 @@ FARTHEST = 2.5
 
 EVALUATIONS = 12
 """Steps of the fit at most."""
+
+_LINE = "planarfriction fits the discs of a pad, once"
 
 ALIKE = 1e-6
 """Relative difference of sizes, loads, stiffnesses and distances from the middle of discs that are images."""
@@ -136,8 +142,6 @@ def _fit(whole: DistributedModel, few: ContactPatch, stiffness: np.ndarray) -> P
     middle = patch.centre_of_pressure()
     arm = float(patch.weights() @ np.hypot(*(patch.positions - middle).T))
     unit = np.array([1.0, 1.0, arm])
-    paths = _paths(whole, frame, unit)
-    wanted = _ends(whole, frame, paths)
     kinds = _kinds(few, stiffness, middle)
     count = kinds.max() + 1
 
@@ -149,17 +153,48 @@ def _fit(whole: DistributedModel, few: ContactPatch, stiffness: np.ndarray) -> P
         common = frame.common * np.exp(x[count:])
         return Pieces(each, back * common @ back.T, whole.pad.lag)  # pyright: ignore
 
-    def misfit(x: np.ndarray) -> np.ndarray:
-        model = DistributedModel(few, whole.law, pad=pieces(x))
-        errors = (_ends(model, frame, paths) - wanted) / unit
-        return np.concatenate([errors.ravel(), HELD * x])
+    def logarithms() -> np.ndarray:
+        paths = _paths(whole, frame, unit)
+        start = np.zeros(count + (0 if frame.common is None else 3))
+        most = EVALUATIONS * (len(start) + 1) + 1
+        tried = 0
 
-    start = np.zeros(count + (0 if frame.common is None else 3))
-    bounds = (-FARTHEST, FARTHEST)
-    fit = least_squares(
-        misfit, start, diff_step=1e-2, max_nfev=EVALUATIONS, bounds=bounds
+        def ends(model: DistributedModel) -> np.ndarray:
+            nonlocal tried
+            tried += 1
+            if watched():
+                show(f"{_LINE}: {100 * tried // most} % at most")
+            return _ends(model, frame, paths)
+
+        wanted = ends(whole)
+
+        def misfit(x: np.ndarray) -> np.ndarray:
+            model = DistributedModel(few, whole.law, pad=pieces(x))
+            return np.concatenate([((ends(model) - wanted) / unit).ravel(), HELD * x])
+
+        bounds = (-FARTHEST, FARTHEST)
+        fit = least_squares(
+            misfit, start, diff_step=1e-2, max_nfev=EVALUATIONS, bounds=bounds
+        )
+        if watched():
+            show("")
+        return fit.x
+
+    return pieces(
+        kept_numbers("discs", _origin(whole, few, stiffness), logarithms, SOURCES)
     )
-    return pieces(fit.x)
+
+
+def _origin(whole: DistributedModel, few: ContactPatch, stiffness: np.ndarray) -> bytes:
+    """Return all that a fit is made from, this file and the pieces and the discs of a pad."""
+    patch = whole.patch
+    pad: Any = whole.pad
+    arrays = (
+        patch.positions, patch.weights(), patch.levers(), pad.pieces(patch, whole.law), pad.compliance(patch),
+        few.positions, few.radii, few.weights(), stiffness,
+    )  # fmt: skip
+    parts = [b"" if each is None else each.tobytes() for each in arrays]
+    return repr((digest_of(Path(__file__)), pad.lag, parts)).encode()
 
 
 def _paths(whole: DistributedModel, frame: _Frame, unit: np.ndarray) -> np.ndarray:
