@@ -95,7 +95,7 @@ def test_who_watches_sees_how_far_it_is(folder, monkeypatch, capsys):
     lines = capsys.readouterr().err.split("\r")
     assert lines[-1].isspace() and len(lines) > 5
     shares = [int(line.split(":")[1].split()[0]) for line in lines[1:-1]]
-    assert shares == sorted(shares) and 0 <= shares[0] and shares[-1] <= 100
+    assert shares == sorted(shares) and shares[0] >= 0 and shares[-1] <= 100
     forget()
     stiffness()
     assert not capsys.readouterr().err
