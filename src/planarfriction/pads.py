@@ -60,7 +60,8 @@ class Pad(ByValue):
     def layer(shear_modulus: float, thickness: float) -> Pad:
         """Return a thin layer bonded to a rigid back: `K_i = G/h` times the area of a piece.
 
-        `shear_modulus` [Pa], `thickness` [m], which must be less than the size of the patch.
+        `shear_modulus` [Pa], `thickness` [m], which must be less than the size of the patch. Points have the area that
+        `ContactPatch.points` is given, or a nominal one of 1 mm^2.
 
         Raises InvalidValueError unless both are > 0.
         """
