@@ -316,7 +316,9 @@ class CoupledPatches(ByValue):
             chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))
             records[:, p] = 0
             if chosen.size:
-                packed = self.models[p].compiled.with_all_states(loads[chosen, p])
+                packed = self.models[p].compiled.bristles.with_all_states(
+                    loads[chosen, p]
+                )
                 records[chosen, p] = places_of(packed.records)
                 kept.append(packed)
         return kept

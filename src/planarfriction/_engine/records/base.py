@@ -25,6 +25,7 @@ from planarfriction._engine.coupled.steps import (
 from planarfriction._engine.protocol import StepFunctions
 from planarfriction._engine.records.packed import PackedModel, driven, rates
 from planarfriction._support.equality import by_parts
+from planarfriction.errors import SolverError
 from planarfriction.geometry import twist_at, wrench_at
 
 _ARRAY = np.ndarray
@@ -86,6 +87,8 @@ class CompiledModel:
     """Common compliance of a pad about the origin `[3, 3]` (see `coupled.face`)."""
     lag = 0.0
     """Lag of a pad with a common compliance [s]."""
+    behind = 0
+    """Numbers behind a wrench that steps need as scratch."""
 
     def __init__(
         self,
@@ -126,6 +129,11 @@ class CompiledModel:
         """Places and shapes of `StepJacobians` in the numbers that `coupled.steps.jacobians` writes for a contact."""
         self._per_contact = ends[-1]
         self._scratch = 7 * n + self._square + 12
+
+    @property
+    def bristles(self) -> CompiledModel:
+        """Machine form of the bristles alone, at the twist of the face of a pad."""
+        return self
 
     # ------------------------------------------------------------------ at given loads
 
@@ -202,7 +210,7 @@ class CompiledModel:
                 or bool is type(dt)
             ):
                 return None
-            result = _EMPTY(self._result)
+            result = _EMPTY(self._result + self.behind)
             if self._flat:
                 if step_one(table, state, vx, vy, omega, normal_force, dt, result):
                     return result[self._new], result[self._wrench]
@@ -238,8 +246,9 @@ class CompiledModel:
             rows = state if state.ndim == 2 else state.reshape(count, self._size)
             new = _EMPTY((count, self._size))
             wrench = _EMPTY((count, 3))
+            scratch = _EMPTY(SCRATCH + self.behind)
             if not step_many(
-                table, rows, twist, normal_force, dt, new, wrench, _EMPTY(SCRATCH)
+                table, rows, twist, normal_force, dt, new, wrench, scratch
             ):
                 return None
         except _REFUSED:
@@ -321,9 +330,12 @@ class CompiledModel:
             pull = np.empty_like(v[rows])
             table = self.step_table(contact)
             seen = _seen(v[rows], offset)
-            ready(step_many)(
-                table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(SCRATCH)
+            scratch = np.empty(SCRATCH + self.behind)
+            done = ready(step_many)(
+                table, z[rows], seen, f[rows], h[rows], end, pull, scratch
             )
+            if not done:
+                raise SolverError("the twist of a pad's face was not found")
             new[rows], wrench[rows] = end, _pull(pull, offset)
         return new.reshape(state.shape), wrench.reshape(twist.shape)
 
