@@ -3,7 +3,7 @@
 The discs of a cluster of pieces have its load, with the centre and the second moment of that, and its stiffness. Under
 a shift or a spin that grows from rest, all that a disc stands for slips at once, while its pieces slip one after the
 other; so the logarithms of the stiffnesses (one for discs that are images of each other) and of the common compliance
-are fitted, by least squares, to the wrenches of all pieces at the ends of straight paths. A fit is kept on disk.
+are fitted, by least squares, to the wrenches of all pieces at the ends of some paths. A fit is kept on disk.
 """
 
 from __future__ import annotations
@@ -32,10 +32,13 @@ SPINS = 0.05, 0.15, 0.3, 0.5, 0.8, 1.5
 """Angles of paths of rotation, alike."""
 
 TOGETHER = (0.3, 0.0, 0.3), (0.5, 0.3, 0.5), (0.3, 0.0, 0.8)
-"""Paths along which a patch is shifted and turned."""
+"""Straight paths along which a patch is shifted and turned."""
 
-STEPS = 40
-"""Steps of a path."""
+BENT = ((0.0, 0.0, 1.0), (0.8, 0.0, 0.0)), ((0.0, 0.0, 1.0), (0.0, 0.8, 0.0))
+"""Paths along which it is turned first, then shifted: without them, what a turn leaves behind is up to a half off."""
+
+STEPS = 20
+"""Steps of each half of a path."""
 
 FULL = 1.5
 """Displacement at which a Hertz contact slips as a whole, over that of the stuck one under the same force."""
@@ -112,7 +115,7 @@ class _Frame(NamedTuple):
 
     def twists(self, seen: np.ndarray) -> np.ndarray:
         """Return the twists about the origin `[..., 3]` of those in these axes."""
-        return seen @ np.linalg.inv(self.turn).T
+        return np.ascontiguousarray(seen @ np.linalg.inv(self.turn).T)
 
     def wrenches(self, given: np.ndarray) -> np.ndarray:
         """Return the wrenches in these axes `[..., 3]` of those about the origin."""
@@ -198,7 +201,7 @@ def _origin(whole: DistributedModel, few: ContactPatch, stiffness: np.ndarray) -
 
 
 def _paths(whole: DistributedModel, frame: _Frame, unit: np.ndarray) -> np.ndarray:
-    """Return straight paths `[P, 3]` in principal axes, under a load of 1 N."""
+    """Return the two parts of paths `[2, P, 3]` in principal axes, under a load of 1 N."""
     patch = whole.patch
     pieces = whole.pad.pieces(patch, whole.law)  # pyright: ignore
     seen = patch.levers() @ np.linalg.inv(frame.turn)
@@ -207,16 +210,17 @@ def _paths(whole: DistributedModel, frame: _Frame, unit: np.ndarray) -> np.ndarr
         soft = soft + frame.common
     single = [SHIFTS, SHIFTS, SPINS]
     along = [length * row for row, all_of in zip(np.eye(3), single, strict=True) for length in all_of]  # fmt: skip
-    return FULL * unit * soft * np.array([*along, *TOGETHER])
+    straight = 0.5 * np.array([*along, *TOGETHER])
+    parts = np.array([*zip(straight, straight, strict=True), *BENT])
+    return FULL * unit * soft * parts.swapaxes(0, 1)
 
 
 def _ends(model: DistributedModel, frame: _Frame, paths: np.ndarray) -> np.ndarray:
-    """Return the wrenches `[P, 3]` of friction at the ends of paths from rest, in principal axes."""
-    twists = frame.twists(paths)
-    state = model.rest(len(paths))
-    wrench = np.zeros(twists.shape)
-    for _ in range(STEPS):
-        state, wrench = model.step(state, twists, 1.0, 1.0 / STEPS)
+    """Return the wrenches `[P, 3]` of friction at the ends of paths `[2, P, 3]` from rest, in principal axes."""
+    state = model.rest(paths.shape[1])
+    for twists in frame.twists(paths):
+        for _ in range(STEPS):
+            state, wrench = model.step(state, twists, 1.0, 1.0 / STEPS)
     return frame.wrenches(wrench)
 
 
