@@ -137,7 +137,7 @@ class Pad(ByValue):
 
 
 def refuse_damping(sigma_1: float, compliance: np.ndarray | None) -> None:
-    """Raise InvalidValueError for damping of bristles on a pad with a common compliance."""
+    """Check that bristles on a pad with a common compliance have no damping. Raises InvalidValueError if they have."""
     if sigma_1 > 0.0 and compliance is not None:
         rule = "be 0 for a pad with a common compliance, whose lag damps"
         raise InvalidValueError("sigma_1", rule, sigma_1)
