@@ -129,8 +129,9 @@ def rollout(
     Each step is a `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
     one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` (see
     `parameter_names`) replace the model's own; the limit surface stays as it is, in scaled coordinates.
-    Models run in compiled code, batches on all processors; cells with a `RateLaw` step in Python, as
-    does `ReducedModelPublished` where its shape follows the load.
+    Models run in compiled code, batches on all processors; cells with a `RateLaw` step in Python, as do pads with a
+    common compliance, with their derivatives, and `ReducedModelPublished` where its shape follows the load. Pads with a
+    common compliance take no `parameters`.
 
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
     them.
