@@ -119,6 +119,54 @@ def test_a_held_body_keeps_its_force_under_a_load_that_oscillates():
         assert swing < 1e-11 if reference else swing > 1e-7
 
 
+RADIUS, SHEAR_MODULUS = 0.01, 1e6
+HERTZ = ContactPatch.disc(
+    RADIUS, 21, pressure=lambda x, y: max(1.0 - (x * x + y * y) / RADIUS**2, 0.0) ** 0.5
+)
+
+
+def _held_at_last(pull, least):
+    """Return the shifts [m] of a half-space and of a layer of 1 mm whose load is 1 N and falls to `least` at times.
+
+    Those under the least load: what slipped then does not come back (Cattaneo 1938; a layer: `F = 1.5 x - x^3/2`).
+    """
+    share = pull / least
+    half_space = 3.0 * (2.0 - 0.42) * least / (16.0 * SHEAR_MODULUS * RADIUS)
+    (x,) = (r.real for r in np.roots([-0.5, 0.0, 1.5, -share]) if 0.0 <= r.real <= 1.0)
+    layer = 1.5 * least * 1e-3 / (SHEAR_MODULUS * np.pi * RADIUS**2)
+    return half_space * (1.0 - (1.0 - share) ** (2.0 / 3.0)), layer * x
+
+
+@pytest.mark.parametrize(
+    ("pad", "which"),
+    [
+        (Pad.half_space(SHEAR_MODULUS, 0.42), 0),
+        (Pad.layer(SHEAR_MODULUS, 1e-3), 1),
+        (Pad.measured(1e5, 0.4), None),
+    ],
+)
+def test_a_pull_under_a_load_that_oscillates_comes_to_rest(pad, which):
+    law = LuGre(mu_c=1.0, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+    patches = CoupledPatches([DistributedModel(HERTZ, law, pad=pad)])
+    dt = 5e-3
+    response = np.diag([dt / 0.1, dt / 0.1, dt / 1e-5])  # of 0.1 kg, 1e-5 kg m^2
+    pull = np.array([[0.6, 0.0, 0.0]])
+    z = patches.rest()
+    twist = np.zeros((1, 3))
+    wrench = np.zeros((1, 3))
+    place = [0.0]
+    for time in dt * np.arange(1, 1201):
+        load = np.array([1.0 + 0.3 * np.sin(4.0 * np.pi * time)])
+        free = twist + (min(1.0, time / 0.2) * pull + wrench) @ response
+        z, wrench, twist, *_ = patches.step(
+            z, HostStep(free, load, wrench, response), dt
+        )
+        place.append(place[-1] + dt * twist[0, 0])
+    assert np.ptp(place[800:]) < 1e-15
+    if which is not None:
+        assert place[-1] == pytest.approx(_held_at_last(0.6, 0.7)[which], rel=0.015)
+
+
 def test_pressures_follow_moments():
     """The wrenches are those of the models' steps under the same moments."""
     patches = _patches(1.0, pad=Pad.measured(1e6, 0.6))

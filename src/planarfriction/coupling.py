@@ -264,7 +264,7 @@ class CoupledPatches(ByValue):
             own = slice(*self._bounds[p : p + 2])
             states[:, own] = model.left(np.ascontiguousarray(states[:, own]), each)
             loads[:, p] = each.load
-            held[p] = model.under(each)
+            held[p] = model.bristles.under(each)
         return held
 
     def _problems(
@@ -373,7 +373,9 @@ class CoupledPatches(ByValue):
             chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))
             records[:, p] = 0
             if chosen.size:
-                packed = self.models[p].compiled.with_all_states(loads[chosen, p])
+                packed = self.models[p].compiled.bristles.with_all_states(
+                    loads[chosen, p]
+                )
                 records[chosen, p] = places_of(packed.records)
                 kept.append(packed)
         return kept

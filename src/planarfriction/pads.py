@@ -60,7 +60,8 @@ class Pad(ByValue):
     def layer(shear_modulus: float, thickness: float) -> Pad:
         """Return a thin layer bonded to a rigid back: `K_i = G/h` times the area of a piece.
 
-        `shear_modulus` [Pa], `thickness` [m], which must be less than the size of the patch.
+        `shear_modulus` [Pa], `thickness` [m], which must be less than the size of the patch. Points have the area that
+        `ContactPatch.points` is given, or a nominal one of 1 mm^2.
 
         Raises InvalidValueError unless both are > 0.
         """
@@ -115,9 +116,7 @@ class Pad(ByValue):
         if patch.anisotropic and not self.springs_of_law:
             rule = "have no friction metric for a pad with a stiffness of its own"
             raise InvalidValueError("patch", rule, "a metric")
-        if law.numbers.sigma_1 > 0.0 and self.compliance(patch) is not None:
-            rule = "be 0 for a pad with a common compliance, whose lag damps"
-            raise InvalidValueError("sigma_1", rule, law.numbers.sigma_1)
+        refuse_damping(law.numbers.sigma_1, self.compliance(patch))
 
     def pieces(self, patch: ContactPatch, law: FrictionLaw) -> np.ndarray:
         """Return the stiffness of the pieces of the pad `[N]` [N/m]."""
@@ -135,6 +134,13 @@ class Pad(ByValue):
         if patch.depends_on_load:
             rule = "have a shape that does not depend on the load, for this pad"
             raise InvalidValueError("patch", rule, patch.name or "one that does")
+
+
+def refuse_damping(sigma_1: float, compliance: np.ndarray | None) -> None:
+    """Check that bristles on a pad with a common compliance have no damping. Raises InvalidValueError if they have."""
+    if sigma_1 > 0.0 and compliance is not None:
+        rule = "be 0 for a pad with a common compliance, whose lag damps"
+        raise InvalidValueError("sigma_1", rule, sigma_1)
 
 
 @dataclass(frozen=True, eq=False)

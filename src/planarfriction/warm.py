@@ -13,7 +13,7 @@ import numpy as np
 
 from planarfriction import coupling, derivatives, joints, limit_surface, models
 from planarfriction._engine.compiler import parallel, threads
-from planarfriction._engine.compiler.messages import expect_compilation, watched
+from planarfriction._engine.compiler.messages import expect_compilation, show, watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, friction_metric
@@ -22,9 +22,6 @@ from planarfriction.sliding_body import SlidingBody
 
 _INSTANT = SolverOptions(t_end=1e-3)
 """Options of runs: compiling does not depend on how far they go."""
-
-_WIDTH = 60
-"""Columns of the line that names what is compiled."""
 
 
 def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float]:
@@ -38,7 +35,7 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
     """
     shown = progress is None and watched()
     expect_compilation()
-    told = _show if shown else progress or (lambda words: None)
+    told = progress or (lambda words: show(f"compiling: {words}") if shown else None)
     parts = _parts()
     times = {}
     code = "from planarfriction import warm; warm.serve()"
@@ -52,12 +49,8 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
                 work()
             times[words] = crew.seconds.get(job, time.perf_counter() - begin)
     if shown:
-        print(
-            f"\rcompiled {len(times)} parts in {sum(times.values()):.1f} s".ljust(
-                _WIDTH
-            ),
-            file=sys.stderr,
-        )
+        show(f"compiled {len(times)} parts in {sum(times.values()):.1f} s")
+        print(file=sys.stderr)
     return times
 
 
@@ -65,11 +58,6 @@ def serve() -> None:
     """Compile parts for another process."""
     parts = list(_parts().values())
     parallel.serve(lambda job: parts[job]())
-
-
-def _show(words: str) -> None:
-    """Write over the line before."""
-    print(f"\rcompiling: {words}".ljust(_WIDTH), end="", file=sys.stderr, flush=True)
 
 
 def _parts() -> dict[str, Callable[[], Any]]:

@@ -43,6 +43,12 @@ KINDS = {
     "published": pf.ReducedModelPublished,
     "cells that follow": pf.ReducedModel,
     "cells over an edge": pf.DistributedModel,
+    "at a load": pf.ReducedModel,
+}
+PADS = {
+    "at a load": pf.Pad.at_load(3.0),
+    "layer": pf.Pad.layer(2e5, 2e-3),
+    "with a common part": pf.Pad.measured(3e5, 0.4),
 }
 
 
@@ -52,7 +58,8 @@ def _patch(scale):
 
 def _made(kind, law=LAW, scale=1.0, centre=(0.0, 0.0)):
     follows = "follows" if "follow" in kind or "edge" in kind else "fixed"
-    model = KINDS[kind](_patch(scale), law)
+    pad = {"pad": PADS[kind]} if kind in PADS else {}
+    model = KINDS.get(kind, pf.DistributedModel)(_patch(scale), law, **pad)
     spec = mujoco.MjSpec.from_string(
         BOX.format(support=EDGE if "edge" in kind else PLANE, x=centre[0], y=centre[1])
     )
@@ -100,6 +107,27 @@ def test_a_copy_with_other_parameters_steps_as_a_model_made_with_them(kind):
             friction.frame(one, 0)[0], made.frame(other, 0)[0], atol=1e-5
         )
     assert abs(one.qpos - _slid(friction, friction.m).qpos).max() > 1e-3
+
+
+@pytest.mark.parametrize("kind", ["layer", "with a common part"])
+def test_the_stiffness_of_a_pad_is_its_own(kind):
+    """In a copy with another sigma_0 a box is held alike; `Pad.at_load` above follows."""
+    friction = _made(kind, dataclasses.replace(LAW, sigma_1=0.0))
+    (m,) = friction.copies({"sigma_0": [8e4]})
+    ends = []
+    for each in (friction.m, m):
+        each.opt.gravity[0] = 1.0
+        d = mujoco.MjData(each)
+        for _ in range(40):
+            friction.step(d)
+        ends.append(d.qpos)
+    assert ends[0][0] > 1e-6
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0.0, atol=1e-10)
+
+
+def test_damping_of_bristles_on_a_common_part_is_refused():
+    friction = _made("with a common part", dataclasses.replace(LAW, sigma_1=0.0))
+    _refuses(friction, "sigma_1", 1.0, "sigma_1 must be 0 for a pad with a common")
 
 
 def test_rollouts_of_many_models_on_threads_have_friction_of_their_own():
@@ -153,7 +181,10 @@ def test_parameters_may_change_between_steps():
     ],
 )
 def test_numbers_out_of_range_are_refused_and_have_no_friction(name, value, rule):
-    friction = _made("reduced")
+    _refuses(_made("reduced"), name, value, rule)
+
+
+def _refuses(friction, name, value, rule):
     with refused(rule):
         friction.copies({name: [value]})
     m = copy.copy(friction.m)

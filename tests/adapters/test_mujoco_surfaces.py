@@ -1,5 +1,6 @@
 """Surfaces that move, stick or roll inside MuJoCo, and models that are prepared without changing their contacts."""
 
+import dataclasses
 import gc
 import math
 
@@ -67,16 +68,29 @@ def test_tracks_drive_a_box_and_a_turntable_turns_it():
 # ---------------------------------------------------------------------- what rolls
 
 
+def _on_a_common_part(patch, law):
+    """Model whose face bends as well, as much as the bristles of the law under 1 N do."""
+    law = dataclasses.replace(law, sigma_1=0.0)
+    return pf.DistributedModel(patch, law, pad=pf.Pad.measured(1e3, 0.5))
+
+
 @pytest.mark.parametrize(
-    "model", [pf.ReducedModel, pf.DistributedModel, pf.ReducedModelPublished]
+    "model",
+    [
+        pf.ReducedModel,
+        pf.DistributedModel,
+        pf.ReducedModelPublished,
+        _on_a_common_part,
+    ],
 )
 def test_a_ball_rolls_down_at_a_constant_acceleration(model):
-    """5/7 g sin(angle), less what the depth of the contact takes; the site's x axis reverses every half turn."""
+    """5/7 g sin(angle), less what the depth of the contact takes; the site's x axis, beside the plane of the motion,
+    swings to the other side every half turn."""
     law = pf.LuGre(mu_c=0.5, sigma_0=1e3, sigma_1=60.0, sigma_2=0.0, elasto_plastic=0.9)
     angle = math.radians(10.0)
     speeds = []
     text = """<geom name="floor" type="plane" size="50 5 1"/><body pos="0 0 0.05"><freejoint/>
-    <geom name="ball" type="sphere" size="0.05" mass="0.1"/><site name="ball"/></body>"""
+    <geom name="ball" type="sphere" size="0.05" mass="0.1"/><site name="ball" euler="0 0 8"/></body>"""
     m, d, friction = made(
         text, [PatchContact(model(SMALL, law), "ball", ("ball", "floor"))], 2e-3
     )

@@ -15,7 +15,7 @@ from planarfriction.derivatives import (
     rollout_jvp,
     rollout_vjp,
 )
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.laws import Dahl, LuGre
 from planarfriction.models import DistributedModel, ReducedModel
 from planarfriction.pads import Pad
@@ -544,6 +544,34 @@ def test_derivatives_of_a_step_behind_a_common_compliance_are_differences(name, 
         (slopes.wrench_load, wanted[n:, -1]),
     ):
         np.testing.assert_allclose(got, want, rtol=0.0, atol=1e-6 * np.abs(want).max())
+
+
+@pytest.fixture
+def made_worse():
+    """A model in whose steps Broyden's method has no slope to begin with, and the numbers of its machine form."""
+    model = ReducedModel(SQUARE, QUASISTATIC, cells=9, pad=PADS["measured"])
+    (contact,) = [each for _, each, _ in model.compiled.pressed(np.ones(1))]
+    (stuck, _) = [each for each in contact.keepalive if each.shape == (3, 3)]
+    stuck[:] = math.nan
+    return model
+
+
+def test_where_broyden_finds_no_face_the_search_does(made_worse):
+    model = ReducedModel(SQUARE, QUASISTATIC, cells=9, pad=PADS["measured"])
+    state = model.rest()
+    for twist in _twists(8, 20):
+        wanted = model.step(state, 30.0 * twist, 3.0, 1e-2)
+        for got, want in zip(
+            made_worse.step(state, 30.0 * twist, 3.0, 1e-2), wanted, strict=True
+        ):
+            np.testing.assert_allclose(got, want, atol=1e-12 * np.abs(want).max())
+        state = wanted[0]
+
+
+def test_a_face_that_nothing_finds_is_an_error(made_worse):
+    made_worse.compiled._alone.patches.record.compliance[:] = math.nan
+    with pytest.raises(SolverError, match="twist of a pad's face"):
+        made_worse.step(made_worse.rest(), [1e-3, 0.0, 0.0], 1.0, 1e-3)
 
 
 def test_a_pad_does_not_see_where_its_frame_is():

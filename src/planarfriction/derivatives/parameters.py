@@ -174,34 +174,40 @@ def _refusal(model: Any) -> tuple[str, str, Any] | None:
 
 def _packed(model: Any) -> PackedRollout:
     """Return a model as compiled loops see it, packed once: models do not change."""
-    family = _family(model)
+    _family(model)  # knows some alone
     model = model.reduction
     if model.compiled.rollouts is None:
-        model.compiled.rollouts = _packed_anew(family, model)
+        model.compiled.rollouts = _packed_anew(model)
     return model.compiled.rollouts
 
 
-def _packed_anew(family: RolloutFunctions, model: Any) -> PackedRollout:
+def _packed_anew(model: Any) -> PackedRollout:
     refusal = _refusal(model)
     if refusal is not None:
         raise InvalidValueError(*refusal)
     law = model.law.numbers
     if isinstance(model, DistributedModel):
         refuse_common(model, "rollouts")
-        at_loads = model.compiled.at_loads
-        shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
-        return PackedRollout(
-            family,
-            np.array(law),
-            shapes,
-            inner=model.state_shape,
-            springs=model.compiled.springs,
-        )
+        return bristles_of(model)
     shape = model.shape_at(1.0)
     surface = shape.surface.numbers
     axes = None if (shape.root == np.eye(2)).all() else shape.axes
     return _on_surface(
         np.array([*law, *shape.numbers]), surface.kind, surface.size, surface.data, axes
+    )
+
+
+def bristles_of(model: DistributedModel) -> PackedRollout:
+    """Return a `DistributedModel` at the twist of the face of its pad as compiled loops see it."""
+    cells = model.compiled.bristles
+    at_loads = cells.at_loads
+    shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
+    return PackedRollout(
+        _family(model),
+        np.array(model.law.numbers),
+        shapes,
+        inner=cells.state_shape,
+        springs=cells.springs,
     )
 
 

@@ -17,6 +17,7 @@ from planarfriction._engine.cells.rollouts import (
 from planarfriction._engine.compiler import threads
 from planarfriction._support import validation
 from planarfriction._support.equality import by_parts
+from planarfriction.derivatives import faces
 from planarfriction.derivatives.inputs import (
     RolloutInputs,
     checked,
@@ -25,7 +26,12 @@ from planarfriction.derivatives.inputs import (
     share,
     sum_to,
 )
-from planarfriction.derivatives.parameters import PackedRollout, is_compiled, pack
+from planarfriction.derivatives.parameters import (
+    PackedRollout,
+    is_compiled,
+    pack,
+    parameter_names,
+)
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.models import FrictionModel
@@ -123,8 +129,9 @@ def rollout(
     Each step is a `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
     one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` (see
     `parameter_names`) replace the model's own; the limit surface stays as it is, in scaled coordinates.
-    Models run in compiled code, batches on all processors; cells with a `RateLaw` step in Python, as
-    does `ReducedModelPublished` where its shape follows the load.
+    Models run in compiled code, batches on all processors; cells with a `RateLaw` step in Python, as do pads with a
+    common compliance, with their derivatives, and `ReducedModelPublished` where its shape follows the load. Pads with a
+    common compliance take no `parameters`.
 
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
     them.
@@ -133,7 +140,7 @@ def rollout(
         raise InvalidValueError(
             "model", f"be a friction model ({MODELS.classes()})", type(model).__name__
         )
-    if (
+    if faces.hangs(model, parameters) or (
         parameters is None
         and isinstance(model, FrictionModel)
         and not is_compiled(model)
@@ -157,6 +164,9 @@ def rollout_states(
 
     Raises InvalidValueError as `rollout` does.
     """
+    if faces.hangs(model, parameters):
+        path = faces.path_of(model, state, twist, normal_force, dt)
+        return RolloutStates(path.state, path.wrenches, path.states)
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, states = _roll(inputs, len(inputs.dt))
     return RolloutStates(
@@ -188,6 +198,12 @@ def rollout_vjp(
 
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled rollout.
     """
+    if faces.hangs(model, parameters):
+        path = faces.path_of(model, state, twist, normal_force, dt)
+        found = faces.vjp(path, wrenches_bar, state_bar, rollout_vjp)
+        start = model.rest() if state is None else state
+        shapes = *map(np.shape, (start, twist, normal_force)), found[-1].shape[-1:]
+        return RolloutVJP(*map(sum_to, shapes, found))
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     (count, size) = inputs.state.shape
     steps = len(inputs.dt)
@@ -265,6 +281,16 @@ def rollout_jacobian(
     Raises InvalidValueError for inputs of wrong shapes, for negative values where they are not possible, and for names
     that are not parameters of the law.
     """
+    if faces.hangs(model, parameters):
+        known = parameter_names(model)
+        some = known if names is None else validation.choices("names", names, known)
+        units = np.eye(len(known))[[known.index(name) for name in some]]
+        path = faces.path_of(model, state, twist, normal_force, dt)
+        shape = len(units), *[1] * (path.load.ndim - 1), len(known)
+        tangent = RolloutTangent(parameters=units.reshape(shape))
+        found = rollout_jvp(model, state, twist, normal_force, dt, tangent)
+        slopes = np.moveaxis(found.wrenches_dot, 0, -1)
+        return RolloutJacobian(path.state, path.wrenches, slopes)
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     family = inputs.model.family
     turned = inputs.model.turned
@@ -303,6 +329,16 @@ def rollout_jvp(
 
     Raises `InvalidValueError` as `rollout_vjp` does.
     """
+    if faces.hangs(model, parameters):
+        tangent = RolloutTangent() if tangent is None else tangent
+        validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
+        more = [
+            np.shape(each)[: max(np.ndim(each) - count, 0)]
+            for each, count in zip(tangent, (1, 2, 1, 1), strict=True)
+        ]
+        path = faces.path_of(model, state, twist, normal_force, dt, more)
+        changes = faces.jvp(path, tangent, rollout_jvp)
+        return RolloutJVP(path.state, path.wrenches, *changes)
     packed = pack(model, parameters)
     family = packed.family
     turned = packed.turned

@@ -99,6 +99,7 @@ class DistributedModel(FrictionModel):
 
         Raises InvalidValueError as `step` does.
         """
+        refuse_common(self, "derivatives of rates")
         state, twist, load, _ = self._inputs(state, twist, normal_force)
         lever = self.compiled.lever
         share = (load[..., None] * self.patch.weights(load))[..., None, None, :]
@@ -110,7 +111,6 @@ class DistributedModel(FrictionModel):
         wrench_load = self.compiled.evaluate(state, twist, load)[1]
         # Rates and tractions of a pad are functions of `z/f`.
         if self.pad is not None:
-            refuse_common(self, "derivatives of rates")
             per = -1.0 / np.where(load > 0.0, load, np.inf)
             rate_load = np.einsum("...,...abn,...bn->...an", per, rate_state, state)
             wrench_load = wrench_load + np.einsum(

@@ -3,17 +3,21 @@
 The discs of a cluster of pieces have its load, with the centre and the second moment of that, and its stiffness. Under
 a shift or a spin that grows from rest, all that a disc stands for slips at once, while its pieces slip one after the
 other; so the logarithms of the stiffnesses (one for discs that are images of each other) and of the common compliance
-are fitted, by least squares, to the wrenches of all pieces at the ends of straight paths.
+are fitted, by least squares, to the wrenches of all pieces at the ends of some paths. A fit is kept on disk.
 """
 
 from __future__ import annotations
 
 import functools
 import warnings
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.compiler import SOURCES, kept_numbers
+from planarfriction._engine.compiler.messages import show, watched
+from planarfriction._engine.compiler.sources import digest_of
 from planarfriction.laws import FrictionLaw, LuGre
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.pads import Pad, Pieces
@@ -28,10 +32,13 @@ SPINS = 0.05, 0.15, 0.3, 0.5, 0.8, 1.5
 """Angles of paths of rotation, alike."""
 
 TOGETHER = (0.3, 0.0, 0.3), (0.5, 0.3, 0.5), (0.3, 0.0, 0.8)
-"""Paths along which a patch is shifted and turned."""
+"""Straight paths along which a patch is shifted and turned."""
 
-STEPS = 40
-"""Steps of a path."""
+BENT = ((0.0, 0.0, 1.0), (0.8, 0.0, 0.0)), ((0.0, 0.0, 1.0), (0.0, 0.8, 0.0))
+"""Paths along which it is turned first, then shifted: without them, what a turn leaves behind is up to a half off."""
+
+STEPS = 20
+"""Steps of each half of a path."""
 
 FULL = 1.5
 """Displacement at which a Hertz contact slips as a whole, over that of the stuck one under the same force."""
@@ -44,6 +51,8 @@ FARTHEST = 2.5
 
 EVALUATIONS = 12
 """Steps of the fit at most."""
+
+_LINE = "planarfriction fits the discs of a pad, once"
 
 ALIKE = 1e-6
 """Relative difference of sizes, loads, stiffnesses and distances from the middle of discs that are images."""
@@ -106,7 +115,7 @@ class _Frame(NamedTuple):
 
     def twists(self, seen: np.ndarray) -> np.ndarray:
         """Return the twists about the origin `[..., 3]` of those in these axes."""
-        return seen @ np.linalg.inv(self.turn).T
+        return np.ascontiguousarray(seen @ np.linalg.inv(self.turn).T)
 
     def wrenches(self, given: np.ndarray) -> np.ndarray:
         """Return the wrenches in these axes `[..., 3]` of those about the origin."""
@@ -136,8 +145,6 @@ def _fit(whole: DistributedModel, few: ContactPatch, stiffness: np.ndarray) -> P
     middle = patch.centre_of_pressure()
     arm = float(patch.weights() @ np.hypot(*(patch.positions - middle).T))
     unit = np.array([1.0, 1.0, arm])
-    paths = _paths(whole, frame, unit)
-    wanted = _ends(whole, frame, paths)
     kinds = _kinds(few, stiffness, middle)
     count = kinds.max() + 1
 
@@ -149,21 +156,52 @@ def _fit(whole: DistributedModel, few: ContactPatch, stiffness: np.ndarray) -> P
         common = frame.common * np.exp(x[count:])
         return Pieces(each, back * common @ back.T, whole.pad.lag)  # pyright: ignore
 
-    def misfit(x: np.ndarray) -> np.ndarray:
-        model = DistributedModel(few, whole.law, pad=pieces(x))
-        errors = (_ends(model, frame, paths) - wanted) / unit
-        return np.concatenate([errors.ravel(), HELD * x])
+    def logarithms() -> np.ndarray:
+        paths = _paths(whole, frame, unit)
+        start = np.zeros(count + (0 if frame.common is None else 3))
+        most = EVALUATIONS * (len(start) + 1) + 1
+        tried = 0
 
-    start = np.zeros(count + (0 if frame.common is None else 3))
-    bounds = (-FARTHEST, FARTHEST)
-    fit = least_squares(
-        misfit, start, diff_step=1e-2, max_nfev=EVALUATIONS, bounds=bounds
+        def ends(model: DistributedModel) -> np.ndarray:
+            nonlocal tried
+            tried += 1
+            if watched():
+                show(f"{_LINE}: {100 * tried // most} % at most")
+            return _ends(model, frame, paths)
+
+        wanted = ends(whole)
+
+        def misfit(x: np.ndarray) -> np.ndarray:
+            model = DistributedModel(few, whole.law, pad=pieces(x))
+            return np.concatenate([((ends(model) - wanted) / unit).ravel(), HELD * x])
+
+        bounds = (-FARTHEST, FARTHEST)
+        fit = least_squares(
+            misfit, start, diff_step=1e-2, max_nfev=EVALUATIONS, bounds=bounds
+        )
+        if watched():
+            show("")
+        return fit.x
+
+    return pieces(
+        kept_numbers("discs", _origin(whole, few, stiffness), logarithms, SOURCES)
     )
-    return pieces(fit.x)
+
+
+def _origin(whole: DistributedModel, few: ContactPatch, stiffness: np.ndarray) -> bytes:
+    """Return all that a fit is made from, this file and the pieces and the discs of a pad."""
+    patch = whole.patch
+    pad: Any = whole.pad
+    arrays = (
+        patch.positions, patch.weights(), patch.levers(), pad.pieces(patch, whole.law), pad.compliance(patch),
+        few.positions, few.radii, few.weights(), stiffness,
+    )  # fmt: skip
+    parts = [b"" if each is None else each.tobytes() for each in arrays]
+    return repr((digest_of(Path(__file__)), pad.lag, parts)).encode()
 
 
 def _paths(whole: DistributedModel, frame: _Frame, unit: np.ndarray) -> np.ndarray:
-    """Return straight paths `[P, 3]` in principal axes, under a load of 1 N."""
+    """Return the two parts of paths `[2, P, 3]` in principal axes, under a load of 1 N."""
     patch = whole.patch
     pieces = whole.pad.pieces(patch, whole.law)  # pyright: ignore
     seen = patch.levers() @ np.linalg.inv(frame.turn)
@@ -172,16 +210,17 @@ def _paths(whole: DistributedModel, frame: _Frame, unit: np.ndarray) -> np.ndarr
         soft = soft + frame.common
     single = [SHIFTS, SHIFTS, SPINS]
     along = [length * row for row, all_of in zip(np.eye(3), single, strict=True) for length in all_of]  # fmt: skip
-    return FULL * unit * soft * np.array([*along, *TOGETHER])
+    straight = 0.5 * np.array([*along, *TOGETHER])
+    parts = np.array([*zip(straight, straight, strict=True), *BENT])
+    return FULL * unit * soft * parts.swapaxes(0, 1)
 
 
 def _ends(model: DistributedModel, frame: _Frame, paths: np.ndarray) -> np.ndarray:
-    """Return the wrenches `[P, 3]` of friction at the ends of paths from rest, in principal axes."""
-    twists = frame.twists(paths)
-    state = model.rest(len(paths))
-    wrench = np.zeros(twists.shape)
-    for _ in range(STEPS):
-        state, wrench = model.step(state, twists, 1.0, 1.0 / STEPS)
+    """Return the wrenches `[P, 3]` of friction at the ends of paths `[2, P, 3]` from rest, in principal axes."""
+    state = model.rest(paths.shape[1])
+    for twists in frame.twists(paths):
+        for _ in range(STEPS):
+            state, wrench = model.step(state, twists, 1.0, 1.0 / STEPS)
     return frame.wrenches(wrench)
 
 

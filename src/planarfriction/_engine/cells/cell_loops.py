@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from planarfriction._engine.bristles import asymmetric_cells, discs, elastic, points
 from planarfriction._engine.bristles.asymmetric_cells import Leaning
 from planarfriction._engine.bristles.elastic import Elastic
@@ -40,6 +42,7 @@ class Element(NamedTuple):
     backward: tuple[int, int] = 6, 6
     rate: tuple[int, int] = 5, 0
     slopes: tuple[int, int] = 4, 2
+    step_slopes: tuple[int, int] = 4, 8
 
 
 POINT = Element("points", 2, points.evaluate, points.step, slopes=(2, 0))
@@ -240,6 +243,34 @@ def step_passes(kind: CellKind) -> Passes:
         sources,
         list(stores.values()),
         element.forward,
+    )
+
+
+def step_slope_passes(kind: CellKind) -> Passes:
+    """Write the step of cells in `CellRows`, their wrench, and its slopes by the twist, nine numbers."""
+    element = kind.element
+    lever = kind.lever
+    written = derive(element.step, ("z", "u"), kind.lengths)
+    none = (0.0,) * element.size
+    units = np.eye(element.size).tolist()
+
+    def slopes(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        (new, traction), tape = twin(written.forth)(s.law, s.z, s.u, s.dt)
+        rows = [twin(written.back)(tape, (none, tuple(unit)))[1] for unit in units]
+        by_velocity = tuple(each for row in rows for each in row)
+        pull = twin(lever.wrench)(s.cell, traction)
+        by_twist = twin(lever.around)(s.cell, by_velocity)
+        return new, tuple(s.weight * each for each in (*pull, *by_twist))
+
+    stores = _rows("new", "out", element.size)
+    sources = _in_rows(kind) | stores
+    return passes(
+        f"slopes of steps of {element.name}",
+        traced(slopes),
+        sources,
+        list(stores.values()),
+        element.step_slopes,
     )
 
 

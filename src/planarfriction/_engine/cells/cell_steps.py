@@ -21,23 +21,26 @@ from planarfriction._engine.cells.cell_loops import (
     rate_passes,
     slope_passes,
     step_passes,
+    step_slope_passes,
 )
 from planarfriction._engine.cells.cells import CellsContact
+from planarfriction._engine.codegen.definitions import bind
 from planarfriction._engine.codegen.vectors import (
     Vector,
     clear,
     copy,
     plus,
     put,
+    put_all,
     three,
 )
-from planarfriction._engine.compiler import kernel
+from planarfriction._engine.compiler import entry, kernel
 from planarfriction._engine.compiler.memory import Doubles, Place, at
 from planarfriction._engine.protocol import (
+    SLOPES,
     ModelFunctions,
     StepFunctions,
     functions_of,
-    step_functions,
 )
 
 RESULTS = LANES * 4 * DISC.size**2
@@ -112,9 +115,13 @@ def _through(
     cell_rows: Any,
     run: Any,
     copied: int,
+    none: Vector,
 ) -> Vector:
-    """Run passes over all cells, which write `copied` rows to `out`, or any number if it is 0; return their sums."""
-    total = (0.0, 0.0, 0.0)
+    """Run passes over all cells, which write `copied` rows to `out`, or any number if it is 0; return their sums.
+
+    `none` are as many zeros.
+    """
+    total = none
     block = scratch(BLOCK)
     n = record.count
     (_, lanes) = divided(record.count)
@@ -134,7 +141,11 @@ def evaluate(
 ) -> None:  # fmt: skip
     """Write `z'`, and `W`; behind V is the load of a `pad`."""
     shared = (0.0, v[3] if pad else 0.0)
-    put(w, _through(read(contact), z, three(v), shared, zdot, cell_rows, rate, copied))
+    none = (0.0, 0.0, 0.0)
+    found = _through(
+        read(contact), z, three(v), shared, zdot, cell_rows, rate, copied, none
+    )
+    put(w, found)
 
 
 def linearise(
@@ -159,14 +170,14 @@ def linearise(
 
 def step(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, cell_rows: Any, advance: Any,
-    copied: int, pad: bool, read: Any,
+    copied: int, pad: bool, read: Any, none: Vector,
 ) -> None:  # fmt: skip
-    """Advance the bristles by `dt` at a held twist, and write the wrench at the end; behind V is a load."""
+    """Advance the bristles by `dt` at a held twist, and write the sums over cells, wrench first; behind V is a load."""
     shared = (dt, v[3] if pad else 0.0)
-    put(
-        out,
-        _through(read(contact), z, three(v), shared, new, cell_rows, advance, copied),
+    found = _through(
+        read(contact), z, three(v), shared, new, cell_rows, advance, copied, none
     )
+    put_all(out, found)
 
 
 @functools.cache
@@ -210,8 +221,19 @@ def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
 
 def steps_of(kind: CellKind, read: Any) -> StepFunctions:
     """Return the steps of contacts of a kind of cells whose records `read` reads."""
-    slopes = general_cells.slopes_of(kind.element.step, kind.element.size, kind.lengths)
-    loops = {"advance": step_passes(kind).run, "linearise": slopes}
-    return step_functions(
-        kind.name, (step, general_cells.slopes), **_model_of(kind, read), **loops
+    model = _model_of(kind, read)
+    element = kind.element
+    wrench = {"advance": step_passes(kind).run, "none": (0.0,) * 3}
+    slopes = {"advance": step_slope_passes(kind).run, "none": (0.0,) * SLOPES}
+    linearise = general_cells.slopes_of(element.step, element.size, kind.lengths)
+    return StepFunctions(
+        bind(step, f"{kind.name}_step", entry, **model, **wrench),
+        bind(step, f"{kind.name}_slopes", entry, **model, **slopes),
+        bind(
+            general_cells.jacobian,
+            f"{kind.name}_jacobian",
+            entry,
+            **model,
+            linearise=linearise,
+        ),
     )

@@ -345,11 +345,11 @@ def _put_cell(
     scatter(out, 6 * d * n + i, n, linear.new_z)
 
 
-def slopes(
+def jacobian(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
-    linearise: Any, read: Any, pad: bool, whole: bool,
+    linearise: Any, read: Any, pad: bool,
 ) -> None:  # fmt: skip
-    """Step with the slopes of the wrench, or with all derivatives."""
+    """Step with all derivatives."""
     record = read(contact)
     twist = three(v)
     load = v[3] if pad else 0.0
@@ -369,10 +369,9 @@ def slopes(
         by_twist = plus(
             by_twist, record.weights[i], lever.around(cell, linear.traction_u)
         )
-        if whole:
-            _put_cell(
-                lever, bristle, cell, record.weights[i], linear, i, n, at(out, SLOPES)
-            )
+        _put_cell(
+            lever, bristle, cell, record.weights[i], linear, i, n, at(out, SLOPES)
+        )
     put(out, total)
     put_all(at(out, 3), by_twist)
 

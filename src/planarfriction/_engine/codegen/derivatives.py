@@ -384,5 +384,7 @@ def _body(
 
 def _run(where: str, source: str) -> dict[str, Any]:
     return run_source(
-        where, source, {"xp": compiled_math, "math": math, "inf": math.inf}
+        where,
+        source,
+        {"xp": compiled_math, "math": math, "inf": math.inf, "nan": math.nan},
     )

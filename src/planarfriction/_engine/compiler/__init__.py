@@ -33,6 +33,13 @@ missing: Any = part(
 )
 """Function that tells if something has yet to be compiled that can be kept on disk."""
 
+kept_numbers: Any = part(
+    "planarfriction._engine.compiler.machine_code",
+    "kept_numbers",
+    lambda name, origin, make, sources: make(),
+)
+"""Function that keeps numbers which take long to make on disk."""
+
 FOLDERS = (
     "_engine/compiler",
     "_engine/codegen",

@@ -15,10 +15,11 @@ import pickle
 import shutil
 import warnings
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numba.core import config
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
@@ -139,35 +140,21 @@ class MachineCode(NullCache):
         target_context.refresh()
         arguments, _ = normalize_signature(sig)
         name, origin = self._file(arguments, target_context.codegen())
-        for path in (folder / name for folder in folders(self._sources)):
-            try:
-                return _unpacked(path.read_bytes(), origin, arguments, target_context)
-            except (FileNotFoundError, NotADirectoryError):
-                continue
-            except Exception:  # whatever a damaged file does, compiling is the remedy
-                with contextlib.suppress(OSError):
-                    path.unlink()
-        return None
+        return _read(
+            self._sources,
+            name,
+            origin,
+            lambda content: _unpacked(content, arguments, target_context),
+        )
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
         """Write the machine code for a signature to the first folder that takes it."""
-        if (
-            data.library.has_dynamic_globals
-            or data.lifted
-            or not self._sources.unchanged()
-        ):
+        if data.library.has_dynamic_globals or data.lifted:
             return
         name, origin = self._file(normalize_signature(sig)[0], data.codegen)
-        content = dumps(data._reduce())
-        for folder in folders(self._sources):
-            try:
-                _make(folder)
-                with replacing(folder / name) as file:
-                    file.write(_seal(origin, content) + content)
-                return
-            except OSError as error:
-                reason = str(error)
-        self._tell(reason)
+        reason = _write(self._sources, name, origin, dumps(data._reduce()))
+        if reason is not None:
+            self._tell(reason)
 
     @classmethod
     def _tell(cls, reason: str) -> None:
@@ -204,17 +191,59 @@ def whole(file: Path) -> bool:
     return read[:_SEAL].endswith(_checksum(read[_SEAL:]))
 
 
-def _unpacked(
-    file: bytes, origin: bytes, arguments: tuple, target_context: Any
-) -> CompileResult:
-    seal = file[:_SEAL]
-    content = file[_SEAL:]
-    if seal != _seal(origin, content):
-        raise ValueError("damaged, or made from other sources")
+def _unpacked(content: bytes, arguments: tuple, target_context: Any) -> CompileResult:
     compiled = CompileResult._rebuild(target_context, *pickle.loads(content))
     if compiled.signature.args != arguments:
         raise ValueError("of other types that go by the same names")
     return compiled
+
+
+def kept_numbers(
+    name: str, origin: bytes, make: Callable[[], np.ndarray], sources: Sources
+) -> np.ndarray:
+    """Return numbers that are read from disk, or made and kept there beside the machine code.
+
+    `origin` is all that they are made from; the file is called by `name`.
+    """
+    file = f"{name}-{hashlib.sha256(origin).hexdigest()[:16]}.numbers"
+    found = _read(sources, file, origin, np.frombuffer)
+    if found is None:
+        found = make()
+        _write(sources, file, origin, found.tobytes())
+    return found
+
+
+def _read(sources: Sources, name: str, origin: bytes, unpacked: Any) -> Any:
+    """Return what is in a file; None if it is missing, of another origin or damaged."""
+    for path in (folder / name for folder in folders(sources)):
+        try:
+            file = path.read_bytes()
+            content = file[_SEAL:]
+            if file[:_SEAL] != _seal(origin, content):
+                raise ValueError("damaged, or made from other sources")
+            return unpacked(content)
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except Exception:  # whatever a damaged file does, making it anew is the remedy
+            with contextlib.suppress(OSError):
+                path.unlink()
+    return None
+
+
+def _write(sources: Sources, name: str, origin: bytes, content: bytes) -> str | None:
+    """Write a file to the first folder that takes it; return the reason if none does."""
+    if not sources.unchanged():
+        return None
+    reason = None
+    for folder in folders(sources):
+        try:
+            _make(folder)
+            with replacing(folder / name) as file:
+                file.write(_seal(origin, content) + content)
+            return None
+        except OSError as error:
+            reason = str(error)
+    return reason
 
 
 def _make(folder: Path) -> None:

@@ -13,6 +13,9 @@ register: Any = part("numba.core.event", "register", lambda kind, listener: None
 
 _LINE = "planarfriction compiles its loops, once after installation (planarfriction.warm_up() does all of it ahead)"
 
+WIDTH = 60
+"""Columns of a line that is written over."""
+
 
 def watched() -> bool:
     """Return True if somebody is watching this process: at a terminal, or in a notebook."""
@@ -20,6 +23,11 @@ def watched() -> bool:
     return alone and (
         "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
     )
+
+
+def show(words: str) -> None:
+    """Write over the line before, for whoever watches."""
+    print(f"\r{words}".ljust(WIDTH), end="", file=sys.stderr, flush=True)
 
 
 class _Said(Listener):

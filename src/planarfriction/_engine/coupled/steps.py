@@ -120,7 +120,7 @@ def step_one(
     put(twist, (vx, vy, omega))
     twist[3] = load
     _step(table, 0, pointer(z), twist, dt, out, wrench, at(out, n + 7))
-    return True
+    return xp.in_range(wrench[0])
 
 
 @jit
@@ -154,7 +154,8 @@ def step_many(
         dt_b = dt[b if steps > 1 else 0]
         into = at(ends, n * b), at(wrenches, 3 * b)
         _step(table, b, at(states, n * b), seen, dt_b, *into, at(seen, 4))
-    return True
+        valid = valid and xp.in_range(wrenches[3 * b])
+    return valid
 
 
 @kernel

@@ -88,6 +88,8 @@ class CompiledModel:
     """Lag of a pad with a common compliance [s]."""
     rollouts: Any = None
     """The model as the loops of rollouts see it, once `derivatives` has packed it."""
+    behind = 0
+    """Numbers behind a wrench that steps need as scratch."""
 
     def __init__(
         self,
@@ -128,6 +130,11 @@ class CompiledModel:
         """Places and shapes of `StepJacobians` in the numbers that `coupled.steps.jacobians` writes for a contact."""
         self._per_contact = ends[-1]
         self._scratch = 7 * n + self._square + 12
+
+    @property
+    def bristles(self) -> CompiledModel:
+        """Machine form of the bristles alone, at the twist of the face of a pad."""
+        return self
 
     # ------------------------------------------------------------------ at given loads
 
@@ -204,7 +211,7 @@ class CompiledModel:
                 or bool is type(dt)
             ):
                 return None
-            result = _EMPTY(self._result)
+            result = _EMPTY(self._result + self.behind)
             if self._flat:
                 if step_one(table, state, vx, vy, omega, normal_force, dt, result):
                     return result[self._new], result[self._wrench]
@@ -240,8 +247,9 @@ class CompiledModel:
             rows = state if state.ndim == 2 else state.reshape(count, self._size)
             new = _EMPTY((count, self._size))
             wrench = _EMPTY((count, 3))
+            scratch = _EMPTY(SCRATCH + self.behind)
             if not step_many(
-                table, rows, twist, normal_force, dt, new, wrench, _EMPTY(SCRATCH)
+                table, rows, twist, normal_force, dt, new, wrench, scratch
             ):
                 return None
         except REFUSED:
@@ -323,9 +331,8 @@ class CompiledModel:
             pull = np.empty_like(v[rows])
             table = self.step_table(contact)
             seen = _seen(v[rows], offset)
-            ready(step_many)(
-                table, z[rows], seen, f[rows], h[rows], end, pull, np.empty(SCRATCH)
-            )
+            scratch = np.empty(SCRATCH + self.behind)
+            ready(step_many)(table, z[rows], seen, f[rows], h[rows], end, pull, scratch)
             new[rows], wrench[rows] = end, _pull(pull, offset)
         return new.reshape(state.shape), wrench.reshape(twist.shape)
 

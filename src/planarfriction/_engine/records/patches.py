@@ -39,14 +39,15 @@ def packed_patches(
     models: Sequence[CompiledModel], levers: Sequence[float]
 ) -> PackedPatches:
     """Pack patches whose lever arms [m] turn spins into speeds."""
-    fixed = [each.fixed for each in models]
+    inner = [each.bristles for each in models]
+    fixed = [each.fixed for each in inner]
     records = np.array(
         [0 if each is None else places_of(each.records)[0] for each in fixed], np.int64
     )
     sizes = np.array(
         [0 if each is None else each.records.shape[1] for each in fixed], np.int64
     )
-    places, words = zip(*(each.points() for each in models), strict=True)
+    places, words = zip(*(each.points() for each in inner), strict=True)
     x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
     followers = Followers(
         x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64)
@@ -61,9 +62,9 @@ def packed_patches(
         count=len(models),
         states=int(bounds[-1]),
         solve=address_of(solve),
-        steps=np.array([address_of(each.functions.step) for each in models], np.int64),
+        steps=np.array([address_of(each.functions.step) for each in inner], np.int64),
         slopes=np.array(
-            [address_of(each.functions.slopes) for each in models], np.int64
+            [address_of(each.functions.slopes) for each in inner], np.int64
         ),
         firsts=bounds.astype(np.int64),
         radius=np.array(levers),

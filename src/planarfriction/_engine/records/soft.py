@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction._engine.compiler.memory import places_of
-from planarfriction._engine.coupled.coupling import solve_batch
+from planarfriction._engine.compiler.memory import places_of, rows_of
+from planarfriction._engine.coupled.face_steps import Hanging, step
+from planarfriction._engine.protocol import StepFunctions
 from planarfriction._engine.records.base import StepJacobians
 from planarfriction._engine.records.distributed import CompiledDistributed
+from planarfriction._engine.records.packed import PackedModel
 from planarfriction._engine.records.patches import PackedPatches, packed_patches
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction.errors import InvalidValueError, SolverError
-
-MOST = 100
-"""Iterations of the search for the twist of a face, at most."""
 
 
 class CompiledSoft(CompiledDistributed):
@@ -28,47 +28,59 @@ class CompiledSoft(CompiledDistributed):
         self._prepare((bristles + 3,), (bristles + 3, bristles + 3))
         self.compliance = pad.compliance(patch)
         self.lag = pad.lag
-        self._lever_arm = lever
         self._pieces = CompiledDistributed(law, patch, pad)
+        self._lever_arm = lever
+        self.functions = StepFunctions(step, None, None)
 
     @functools.cached_property
-    def _patch(self) -> PackedPatches:
+    def _alone(self) -> PackedPatches:
         return packed_patches([self], [self._lever_arm])
 
-    def step_one(self, *inputs: Any) -> None:
-        """Leave all steps to `step`."""
-        return None
+    @functools.cached_property
+    def behind(self) -> int:
+        """See `CompiledModel`: room for the row of a problem in contact space."""
+        return self._alone.layout.size
 
-    step_batch = step_one
-    jacobians_one = step_one
+    @property
+    def bristles(self) -> CompiledDistributed:
+        """See `CompiledModel`."""
+        return self._pieces
 
-    def step(
-        self,
-        state: np.ndarray,
-        twist: np.ndarray,
-        load: np.ndarray,
-        dt: np.ndarray,
-        centre: np.ndarray | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `CompiledModel`: the host of a prescribed twist does not yield."""
-        state = self.left(state, centre)
-        layout = self._patch.layout
-        parts = layout.slices
-        rows = np.zeros((load.size, layout.size))
-        rows[:, parts["state"]] = state.reshape(load.size, -1)
-        rows[:, parts["free_twist"]] = twist.reshape(-1, 3)
-        rows[:, parts["free_load"]] = load.reshape(-1, 1)
-        rows[:, parts["dt"]] = dt.reshape(-1, 1)
-        rows[:, parts["most"]] = MOST
-        rows[:, parts["again"]] = 1.0
-        ((_, contact, _),) = self.pressed(load, centre)
-        records = rows.view(np.int64)[:, parts["records"]]
-        records[:, 0] = places_of(contact.records)
-        solve_batch(self._patch.patches.words, rows, 0, len(rows))
-        if not rows[:, parts["converged"]].all():
+    def _packed(
+        self, weights: np.ndarray, chosen: np.ndarray | None = None
+    ) -> PackedModel:
+        """Pack the pieces, and the face that they hang on."""
+        return self._hung(self._pieces._packed(weights, chosen))
+
+    def under(self, given: Pressing) -> PackedModel:
+        """See `CompiledDistributed`."""
+        return self._hung(self._pieces.under(given))
+
+    def _hung(self, pieces: PackedModel) -> PackedModel:
+        law = self.law.numbers
+        levers = self.patch.levers()
+        shares = self.patch.areas / self.patch.areas.sum()
+        by = "n,nda,ndb->ab"
+        stuck = np.einsum(by, law.sigma_0 * self.stiff, levers, levers)
+        viscous = law.sigma_2 * np.einsum(by, shares, levers, levers)
+        alone = self._alone.patches
+        face = Hanging(0, alone.address, self.behind, law.mu_s, stuck, viscous)
+        records = rows_of(face, len(pieces.records), pieces=places_of(pieces.records))
+        kept = (*pieces.keepalive, pieces.records, stuck, viscous, alone.words)
+        return pieces._replace(
+            records=records, states=pieces.states + 3, keepalive=kept
+        )
+
+    def step(self, *inputs: Any) -> tuple[np.ndarray, np.ndarray]:
+        """See `CompiledModel`. Raises SolverError if the twist of a face was not found."""
+        new, wrench = super().step(*inputs)
+        if not np.isfinite(wrench).all():
             raise SolverError("the twist of a pad's face was not found")
-        new = rows[:, parts["new"]].reshape(state.shape)
-        return new, rows[:, parts["wrench"]].reshape(twist.shape)
+        return new, wrench
+
+    def jacobians_one(self, *inputs: Any) -> None:
+        """Leave all derivatives to `step_jacobians`."""
+        return None
 
     def evaluate(
         self,

@@ -22,6 +22,7 @@ from planarfriction._engine.coupled import coupling as kernels
 from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout, same
 from planarfriction.adapters.mujoco.loops import step as loops
+from planarfriction.adapters.mujoco.loops.models import HANGS, STIFF
 from planarfriction.adapters.mujoco.loops.records import Host, scratch_layout
 from planarfriction.adapters.mujoco.patches import (
     PatchContact,
@@ -37,6 +38,8 @@ from planarfriction.coupling import CoupledPatches
 from planarfriction.environments import check
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.laws.base import is_rate_law
+from planarfriction.models.base import FrictionModel
+from planarfriction.pads import refuse_damping
 
 
 class Report(NamedTuple):
@@ -85,7 +88,13 @@ class Friction:
         check_options(m, "Euler", "implicit", "implicitfast")
         for placed in self.placed:
             placed.check(m)
-        check(self.parameters(m))
+        self._check_parameters(m)
+
+    def _check_parameters(self, m: Any) -> None:
+        parameters = self.parameters(m)
+        check(parameters)
+        for patch, sigma_1 in zip(self.patches, parameters["sigma_1"], strict=True):
+            refuse_damping(sigma_1, patch.model.compiled.compliance)
 
     # ------------------------------------------------------------------ friction of each environment
 
@@ -125,7 +134,7 @@ class Friction:
             for m, row in zip(models, rows, strict=True):
                 self.parameters(m)[name][:] = row
         for m in models:
-            check(self.parameters(m))
+            self._check_parameters(m)
         return models
 
     # ------------------------------------------------------------------ what the data hold
@@ -318,9 +327,7 @@ class Friction:
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
         extents = np.array([each.extent() for each in self.placed])
-        laws = np.array(
-            [not is_rate_law(patch.model.law) for patch in self.patches], np.int64
-        )
+        laws = np.array([_sort_of_law(patch.model) for patch in self.patches], np.int64)
         self._kept = problem, columns, free, packed, extents, laws
         places = {
             name: place_of(columns) + 8 * k * i for i, name in enumerate(_COLUMNS)
@@ -352,6 +359,14 @@ _COLUMNS = (
 """Attributes of `Placed` that compiled steps read, and fields of `Host` with their addresses."""
 
 _ALONE = "mj_step has none by itself; call friction.step(d) instead, or mj_step within friction.install()"
+
+
+def _sort_of_law(model: FrictionModel) -> int:
+    """Return the sort of a patch in `Host.laws`."""
+    pad = model.reduction.pad
+    if pad is None or pad.springs_of_law:
+        return int(not is_rate_law(model.law))
+    return STIFF if model.compiled.compliance is None else HANGS
 
 
 def _say_unused(used: list[bool]) -> None:

@@ -24,6 +24,12 @@ COUNT = len(PARAMETERS)
 _PLACES = tuple(
     LawNumbers._fields.index(name) for name in PARAMETERS if name in LawNumbers._fields
 )
+STIFF = 2
+"""Sort of a patch (see `Host.laws`) on a pad with a stiffness of its own: sigma_0 of its record belongs to that."""
+
+HANGS = 3
+"""Sort of one on a pad with a common compliance as well, whose sigma_1 is 0."""
+
 _SIGMA_0 = PARAMETERS.index("sigma_0")
 _SIGMA_1 = PARAMETERS.index("sigma_1")
 _SIGMA_2 = PARAMETERS.index("sigma_2")
@@ -56,6 +62,7 @@ def are_in_range(own, m):
             valid and q[_SIGMA_0] > 0.0 and q[_SIGMA_1] >= 0.0 and q[_SIGMA_2] >= 0.0
         )
         valid = valid and q[_MU_C] > 0.0 and q[_MU_S] >= q[_MU_C] and q[_V_S] > 0.0
+        valid = valid and (q[_SIGMA_1] == 0.0 or integers(own.laws)[p] != HANGS)
         valid = valid and q[_RATIO] >= 0.0 and q[_RATIO] < 1.0 and q[_SCALE] > 0.0
     return valid
 
@@ -86,7 +93,8 @@ def write_laws(own, m, patches, problem, place):
         law = doubles(place)
         q = parameters_of(own, m, p)
         for i in range(len(_PLACES)):
-            law[_PLACES[i]] = q[i]
+            if i != _SIGMA_0 or integers(own.laws)[p] < STIFF:
+                law[_PLACES[i]] = q[i]
         problem.records[p] = place
         place = at(place, words)
 

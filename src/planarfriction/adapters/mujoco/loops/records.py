@@ -247,7 +247,8 @@ class Host(NamedTuple):
     parameters: int
     """Place of the parameters of the patches in the numerics of a model, behind the digest of the patches."""
     laws: int
-    """Address of flags: 1 where the law of a patch has the numbers of `LawNumbers`, int [k]."""
+    """Address of sorts of patches: 0 where a law does not have the numbers of `LawNumbers`, 2 or 3 of pads (see
+    `models`), else 1, int [k]."""
     record_words: int
     """Address of the words of the record of each patch, int [count]."""
     free_count: int
