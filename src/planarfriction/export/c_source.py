@@ -164,8 +164,17 @@ def used_by(block: Block) -> set[str]:
 CELLS = 56
 """Largest number of cells of a block, those of the default model: 2 kB of stack, with their new states."""
 
-PASSES = 4
-"""Passes over a block: from three on they take the same time, half of that of one."""
+TAPED = 4
+"""Largest number of cells of a block whose derivatives are taken: passes hand on all that was computed."""
+
+OPERATIONS = 28
+"""Operations of a pass: the chain of one cell is so short that a processor has several cells in hand."""
+
+LANES = 8
+"""Numbers of the widest vectors."""
+
+MOST_MORE = 7
+"""Cells for each of those that are added to fill the last vector, at least."""
 
 SHORT = 2
 """Sums and products that each pass does itself instead of keeping their result, which would take stack."""
@@ -174,26 +183,50 @@ SHORT = 2
 class CPasses(NamedTuple):
     """Source of the step of a block of cells."""
 
+    count: int
+    """Number of cells."""
     cells: int
+    """Number of cells of a block; if it is the only one, there may be more than `count`."""
     blocks: int
+    results: int
+    """Number of results of a cell, but for its new states."""
     rows: int
     """Numbers of each cell that one pass leaves to the next."""
     shared: str
     """Lines of what all cells have in common."""
     each: list[str]
-    """Lines of each pass, of cell `k` in row `i` of the block; the last leaves the wrench in `row[0]` to `row[2]`.
+    """Lines of each pass, of cell `k` in row `i` of the block; the last leaves the results in the first rows.
 
     The place of a new state holds what passes hand on, until the last one writes the state there.
     """
 
+    @property
+    def width(self) -> int:
+        """Number of cells of which states and tables have numbers."""
+        return max(self.cells, self.count)
+
 
 def passes_of(
-    writer: Writer, block: Block, count: int, places: Sequence[str], share: str
+    writer: Writer,
+    block: Block,
+    count: int,
+    states: int,
+    most: int = CELLS,
+    *,
+    fill: bool = False,
+    new: bool = True,
 ) -> CPasses | None:
-    """Split the step of a cell, whose new state goes to `places`; None for one that has branches.
+    """Split a function of a cell with so many states, the `new` ones first among its results; None if it has branches.
 
-    `share` is its share of the load.
+    Blocks have `most` cells; if all are one block, others may `fill` its last vector.
     """
+    blocks = -(-count // most)
+    cells = -(-count // blocks)
+    more = -cells % LANES
+    if (fill or blocks > 1) and MOST_MORE * more <= cells:
+        cells += more
+    width = max(cells, count)
+    places = [f"next[k + {i * width}]" for i in range(states if new else 0)]
     if any(isinstance(each, Branch) for each in block.operations):
         return None
     used = used_by(block)
@@ -208,7 +241,7 @@ def passes_of(
     own = [each for each in operations if each.name not in common]
     again = _again(own)
     own = [each for each in own if each not in again]
-    ends = [0, *_cuts(own, block), len(own)]
+    ends = [0, *_cuts(own, block, count), len(own)]
     kept = [_handed(own, block, end) for end in ends]
     shared = [writer.line(each) for each in operations if each.name in common]
     room = [f"row[{row}][i]" for row in range(len(own))]
@@ -245,13 +278,16 @@ def passes_of(
                 for place, result in zip(places, results, strict=False)
             ]
             lines += [
-                f"    row[{j}][i] = {share} * {result};"
+                f"    row[{j}][i] = {result};"
                 for j, result in enumerate(results[len(places) :])
             ]
-        texts.append("\n".join(f"        {line}" for line in lines))
+        text = "\n".join(f"        {line}" for line in lines)
+        for i in reversed(range(1, states)):  # states of other cells follow
+            text = text.replace(f"z[k + {i * count}]", f"z[k + {i * width}]")
+        texts.append(text)
     rows = 1 + max(int(row) for row in re.findall(r"row\[(\d+)\]", "".join(texts)))
-    blocks = -(-count // CELLS)
-    return CPasses(-(-count // blocks), blocks, rows, "\n".join(shared), texts)
+    results = len(block.results) - len(places)
+    return CPasses(count, cells, blocks, results, rows, "\n".join(shared), texts)
 
 
 def _again(own: list[Operation]) -> list[Operation]:
@@ -284,10 +320,11 @@ def _handed(own: list[Operation], block: Block, end: int) -> list[str]:
     )
 
 
-def _cuts(own: list[Operation], block: Block) -> list[int]:
+def _cuts(own: list[Operation], block: Block, count: int) -> list[int]:
     """Return places where few numbers are handed on, and nothing but real ones, about evenly spread."""
     kinds = {each.name: each.kind for each in own}
-    spread = len(own) // (3 * PASSES)
+    passes = min(max(round(len(own) / OPERATIONS), 1), count)
+    spread = len(own) // (3 * passes)
 
     def cost(end: int) -> float:
         names = _handed(own, block, end)
@@ -297,7 +334,7 @@ def _cuts(own: list[Operation], block: Block) -> list[int]:
             else float("inf")
         )
 
-    middles = (share * len(own) // PASSES for share in range(1, PASSES))
+    middles = (share * len(own) // passes for share in range(1, passes))
     return [
         min(range(middle - spread, middle + spread + 1), key=cost) for middle in middles
     ]

@@ -18,6 +18,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.export.body import body_of
 from planarfriction.export.c_source import (
     SQRT,
+    TAPED,
     Writer,
     comment,
     of_compiled,
@@ -234,9 +235,6 @@ def _texts(
         if table in always or f"{table}[" in read
     }
     tables |= {} if slip is None else slip.tables
-    tables = {
-        table: _table(writer, table, numbers) for table, numbers in tables.items()
-    }
     step = functions["step"].splitlines()
     vector = Writer(precision, own=precision == "double")
     share = (
@@ -244,13 +242,28 @@ def _texts(
         if pieces.rungs
         else "share[k]"
     )
-    passes = passes_of(vector, pieces.step, pieces.count, _places(pieces), "shares[k]")
+    # The step of a pad reads the shares of its cells, and these alone.
+    sizes = pieces.count, pieces.states
+    passes = passes_of(vector, pieces.step, *sizes, fill=not pieces.pad)
+    turns = pieces.turns and passes_of(vector, pieces.turns(), *sizes, TAPED, new=False)
+    if passes:
+        more = passes.width - pieces.count
+        tables |= {
+            table: np.pad(each, (0, more), mode="edge")
+            for table, each in tables.items()
+            if table in pieces.tables and table not in ("share", "rungs")
+        }
+    tables = {
+        table: _table(writer, table, numbers) for table, numbers in tables.items()
+    }
     bodies = {
         "exp": of_compiled(compiled_math.exp),
         "sin": of_compiled(compiled_math.sin),
         "sqrt": SQRT,
     }
-    stepping = "".join([passes.shared, *passes.each]) if passes else ""
+    stepping = "".join(
+        "".join([each.shared, *each.each]) for each in (passes, turns) if each
+    )
     own = {
         each: "\n".join(lines)
         for each, lines in bodies.items()
@@ -284,6 +297,7 @@ def _texts(
             "one": writer.constant(1.0),
             "slip": slip and slip.words,
             "passes": passes,
+            "turns": turns,
             "body": body_of(model, precision, given["patches"]),
             "share": share,
             "own": own,

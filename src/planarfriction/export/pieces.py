@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from types import CellType, FunctionType, SimpleNamespace
@@ -112,6 +113,8 @@ class Pieces(NamedTuple):
     """Trace new states, wrench and derivatives: rows of the wrench, then of states.
 
     Derivatives are by states, twist, parameters and, of a pad, by the load of the cell, which is `carried`."""
+    turns: Callable[[], Block] | None = None
+    """Trace the wrench per unit load and, row by row, its derivatives by the twist; not of pads."""
     rungs: int = 0
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
     pad: bool = False
@@ -288,17 +291,22 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         )
         return lever.wrench(own, twin(plain)(found, z, u, 0.0)[1])
 
-    def slopes(trace: Trace) -> Any:
+    def slopes(trace: Trace, turns: bool = False) -> Any:
         own, found, u = given(trace, "carried")
         written = derive(cell, by, {"z": size, "u": size})
         forth = twin(written.forth)
         back = twin(written.back)
         none = (0.0,) * size
-        dt = Number(trace, "dt")
-        (new, traction), tape = forth(found, _state(trace, size, n), u, dt)
+        inputs = found, _state(trace, size, n), u, Number(trace, "dt")
+        (new, traction), tape = forth(*inputs)
         bars = [
             back(tape, (none, lever.seen(own, unit))) for unit in np.eye(3).tolist()
         ]
+        if turns:
+            return tuple(
+                lever.wrench(own, each)
+                for each in (traction, *(bar[1] for bar in bars))
+            )
         bars += [back(tape, (tuple(unit), none)) for unit in np.eye(size).tolist()]
         kept = [cells_rollout.PARAMETERS.index(name) for name in parameters]
         kept += [-1] * kind.pad
@@ -314,8 +322,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         strict=False,
     )
     tables = dict(places)
-    if kind.pad:
-        tables["stiff"] = model.compiled.stiff
+    tables |= {"stiff": model.compiled.stiff} if kind.pad else {}
     tables = {
         name: np.pad(each, (0, more), mode="edge") for name, each in tables.items()
     }
@@ -334,6 +341,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         parameters,
         traced(steady),
         lambda: traced(slopes),
+        None if kind.pad else lambda: traced(functools.partial(slopes, turns=True)),
         rungs,
         kind.pad,
     )

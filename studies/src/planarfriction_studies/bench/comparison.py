@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from planarfriction._support.reading import read_text
+from planarfriction.cli.doctor import processor
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.extend import processors
 from planarfriction_studies.bench.measurement import Measurement
@@ -97,6 +98,14 @@ def free_share() -> float:
         for _ in range(processors())
     ]
     return min(float(each.communicate()[0]) for each in loops)
+
+
+def machine() -> str:
+    """Return the instruction set that compiled loops use, and a warning if other programs use this machine."""
+    words = f"compiled loops use {processor()[1][1]}"
+    if (share := free_share()) < LEAST_SHARE:
+        words += f"; other programs leave {share:.0%} of a processor: ratios of rows on threads are rough"
+    return words
 
 
 def check_idle() -> None:

@@ -19,8 +19,8 @@ from planarfriction_studies.bench.measurement import (
     Measurement,
     disc,
     law,
+    least,
     line,
-    median,
     mixed_twists,
 )
 
@@ -200,11 +200,12 @@ def _loop(
     model: Any, made: ctypes.CDLL, state: np.ndarray, wrench: np.ndarray
 ) -> Measurement:
     twists = mixed_twists(20_000)
-    ours = median(
-        lambda: made.loop(len(twists), *_pointers(state, twists, wrench)), 9
-    ) / len(twists)
-    theirs = median(lambda: rollout(model, None, twists, 1.0, 1e-4), 9) / len(twists)
-    return line(ours * 1e6, "us", "the same step in a rollout", theirs * 1e6)
+    ours, theirs = least(
+        lambda: made.loop(len(twists), *_pointers(state, twists, wrench)),
+        lambda: rollout(model, None, twists, 1.0, 1e-4),
+    )
+    per = 1e6 / len(twists)
+    return line(ours * per, "us", "the same step in a rollout", theirs * per)
 
 
 def _body(
@@ -212,17 +213,12 @@ def _body(
 ) -> Measurement:
     twists = mixed_twists(20_000)
     pushes = np.outer(np.sin(np.linspace(0.0, 60.0, 20_000)), [1.2, 0.0, 1e-3])
-    ours, theirs = (
-        median(
-            lambda run=run, given=given: run(
-                len(given), *_pointers(state, given, wrench)
-            ),
-            9,
-        )
-        / len(given)
-        for run, given in ((made.body_loop, pushes), (made.loop, twists))
+    ours, theirs = least(
+        lambda: made.body_loop(len(pushes), *_pointers(state, pushes, wrench)),
+        lambda: made.loop(len(twists), *_pointers(state, twists, wrench)),
     )
-    return line(ours * 1e6, "us", "one step in C", theirs * 1e6)
+    per = 1e6 / len(twists)
+    return line(ours * per, "us", "one step in C", theirs * per)
 
 
 def _percentile(

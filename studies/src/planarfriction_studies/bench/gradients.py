@@ -17,6 +17,7 @@ from planarfriction_studies.bench.measurement import (
     Measurement,
     disc,
     law,
+    least,
     line,
     median,
     mixed_twists,
@@ -38,29 +39,36 @@ SIGNALS = {"fingers.normal_force": KNOTS}
 def reduced(full: bool) -> Measurement:
     """Measure a rollout with its gradient, as `gradient.published`."""
     models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
-    ours, theirs = (_value_and_gradient(model, (STEPS,), 15) for model in models)
+    ours, theirs = least(*(_both(model, (STEPS,)) for model in models))
     return line(ours, "s", AGAINST_PUBLISHED, theirs)
 
 
-def _value_and_gradient(
-    model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int
-) -> float:
-    """Measure half the squared wrenches of rollouts with their gradient to all inputs [s]; steps are the last axis."""
+def short(full: bool) -> Measurement:
+    """Measure a rollout of 20 steps with its gradient, beside the rollout alone."""
+    model = ReducedModel(disc(), law())
+    ours, theirs = least(_both(model, (20,)), _value(model, (20,)), inner=300)
+    return line(ours * 1e6, "us", "the same rollout alone", theirs * 1e6)
+
+
+def _both(
+    model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...]
+) -> Callable[[], None]:
+    """Return half the squared wrenches of rollouts with their gradient to all inputs; steps are the last axis."""
     inputs = model.rest(), *_inputs(shape)
 
     def value_and_gradient() -> None:
         _, wrenches, states = derivatives.rollout_states(model, *inputs)
         derivatives.rollout_vjp(model, *inputs, wrenches, states=states)
 
-    return median(value_and_gradient, repeats)
+    return value_and_gradient
 
 
-def _alone(
-    model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int
-) -> float:
-    """Measure the time of the rollouts alone [s]."""
+def _value(
+    model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...]
+) -> Callable[[], Any]:
+    """Return the rollouts alone."""
     inputs = model.rest(), *_inputs(shape)
-    return median(lambda: derivatives.rollout(model, *inputs), repeats)
+    return lambda: derivatives.rollout(model, *inputs)
 
 
 def _inputs(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
@@ -71,14 +79,14 @@ def _inputs(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
 def published(full: bool) -> Measurement:
     """Measure half the squared wrenches of a rollout, with their gradient to parameters, twists, loads and state."""
     model = ReducedModelPublished(disc(), law())
-    value = _value_and_gradient(model, (STEPS,), 15)
+    (value,) = least(_both(model, (STEPS,)), repeats=15)
     try:
         return line(
             value, "s", "PyTorch, eager, the same rollout", _eager_gradient(model, full)
         )
     except ImportError:
         inputs = len(derivatives.PARAMETERS) + 3 + 4 * STEPS
-        once = _alone(model, (STEPS,), 15)
+        (once,) = least(_value(model, (STEPS,)), repeats=15)
         words = f"central differences, 2 x {inputs} rollouts of {once * 1e3:.2g} ms (PyTorch is not installed)"
         return line(value, "s", words, 2 * inputs * once)
 
@@ -124,7 +132,7 @@ def reduced_batch_alone(full: bool) -> Measurement:
     shape = 1000, 250
     models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
     ours, theirs = (
-        1e-6 * math.prod(shape) / _alone(model, shape, 5) for model in models
+        1e-6 * math.prod(shape) / median(_value(model, shape), 5) for model in models
     )
     return line(
         ours, "million contact-steps/s", AGAINST_PUBLISHED, theirs, ours / theirs
@@ -137,7 +145,9 @@ def _batch(
     """Return millions of contact-steps per second of a thousand rollouts with their gradient, and of these alone."""
     shape = 1000, count
     steps = 1e-6 * math.prod(shape)
-    return steps / _value_and_gradient(model, shape, 5), steps / _alone(model, shape, 5)
+    return steps / median(_both(model, shape), 5), steps / median(
+        _value(model, shape), 5
+    )
 
 
 def scene_to_friction(full: bool) -> Measurement:

@@ -21,12 +21,12 @@ class Measurement:
     name: str
     """Name of the benchmark."""
     value: float | None
-    """Median."""
+    """Median; of what runs on one thread the least processor time, on which other programs tell least."""
     unit: str
     baseline: str
     """Baseline that the value is compared with, in words."""
     baseline_value: float | None
-    """Median of the baseline, same unit."""
+    """The same of the baseline, in the same unit."""
     ratio: float | None
     """Ratio of baseline over value, above 1 where the baseline is dearer, unless `baseline` says otherwise."""
     ratios: tuple[float, ...] = ()
@@ -61,6 +61,23 @@ def median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:
             action()
         times.append((time.perf_counter() - begin) / inner)
     return statistics.median(times)
+
+
+def least(*actions: Callable[[], Any], repeats: int = 9, inner: int = 1) -> list[float]:
+    """Measure the least processor time of each action [s], in turns of `inner` calls, after one more call of each."""
+    for action in actions:
+        action()
+    times = [
+        [_of_processor(action, inner) for action in actions] for _ in range(repeats)
+    ]
+    return [min(column) for column in zip(*times, strict=True)]
+
+
+def _of_processor(action: Callable[[], Any], inner: int) -> float:
+    begin = time.process_time()
+    for _ in range(inner):
+        action()
+    return (time.process_time() - begin) / inner
 
 
 def once(action: Callable[[], Any]) -> float:

@@ -1,6 +1,7 @@
 """The benchmarks by name, and what runs them.
 
-Machines are shared and noisy: every value is a median, and `ratio` (baseline over value) says more than either.
+Machines are shared and noisy: what runs on one thread is measured by its least processor time, in turns with its
+baseline, all else by medians; `ratio` (baseline over value) says more than either.
 """
 
 from __future__ import annotations
@@ -62,6 +63,10 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
         for kind in exported.MODELS
     },
     "body.call": steps.body,
+    "body.call.sliding": partial(steps.body, slides=True),
+    "body.call.overhead": steps.body_overhead,
+    "body.call.4": partial(steps.body_feet, feet=4),
+    "body.call.16": partial(steps.body_feet, feet=16),
     "export.body": exported.body,
     "coupled.four_feet.call": steps.coupled,
     "coupled.four_feet.batch": partial(steps.coupled, environments=1000),
@@ -78,6 +83,8 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
         simulator_costs.mujoco_warp, scene=mujoco_scenes.grip()
     ),
     "batch.reduced": gradients.reduced_batch_alone,
+    "rollout.reduced.20": steps.short_rollout,
+    "gradient.reduced.20": gradients.short,
     "gradient.published": gradients.published,
     "gradient.published.batch": gradients.published_batch,
     "gradient.reduced": gradients.reduced,

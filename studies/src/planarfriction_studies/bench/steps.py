@@ -20,6 +20,7 @@ from planarfriction_studies.bench.measurement import (
     Measurement,
     disc,
     law,
+    least,
     line,
     median,
     mixed_twists,
@@ -28,38 +29,45 @@ from planarfriction_studies.bench.measurement import (
 FEET = ((0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03))
 """Positions of the feet of a box [m]."""
 
+SETTLING = 50
+"""Steps after which a block is held."""
 
-def _compiled_loop(model: Any, twists: np.ndarray) -> float:
-    """Measure the time of a model's steps through `twists`, compiled [s]."""
-    return median(lambda: rollout(model, None, twists, 1.0, 1e-4), 9)
+AT_ONCE = 150
+"""Bodies of a batch that is stepped on one thread."""
+
+
+def _loop(model: Any, twists: np.ndarray) -> Callable[[], Any]:
+    """Return the steps of a model through `twists`, compiled."""
+    return lambda: rollout(model, None, twists, 1.0, 1e-4)
 
 
 def published_loop(full: bool) -> Measurement:
     """Measure a step of the published reduced model, in a compiled loop."""
-    twists = mixed_twists(20_000)
-    model = ReducedModelPublished(disc(), law())
-    loop = _compiled_loop(model, twists)
-    call = _python_step(model, 1000)
-    return line(
-        loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6
-    )
+    return _loop_beside_calls(ReducedModelPublished(disc(), law()), 20_000, 1000)
 
 
 def distributed_loop(full: bool) -> Measurement:
     """Measure a step of the distributed model, in a compiled loop."""
-    model = DistributedModel(disc(), law())
-    twists = mixed_twists(1000)
-    loop = _compiled_loop(model, twists)
-    call = _python_step(model, 100)
+    return _loop_beside_calls(DistributedModel(disc(), law()), 1000, 100)
+
+
+def _loop_beside_calls(model: Any, steps: int, inner: int) -> Measurement:
+    (loop,) = least(_loop(model, mixed_twists(steps)))
+    call = _python_step(model, inner)
     return line(
-        loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6
+        loop / steps * 1e6, "us", "one Python call of the same step", call * 1e6
     )
 
 
 def _python_step(model: Any, inner: int) -> float:
+    return least(_call(model), inner=inner)[0]
+
+
+def _call(model: Any) -> Callable[[], Any]:
+    """Return one Python call of a step."""
     state = model.rest()
     twist = (0.01, 0.0, 1.0)
-    return median(lambda: model.step(state, twist, 1.0, 1e-3), 9, inner)
+    return lambda: model.step(state, twist, 1.0, 1e-3)
 
 
 def published_call(full: bool) -> Measurement:
@@ -67,10 +75,8 @@ def published_call(full: bool) -> Measurement:
     model = ReducedModelPublished(disc(), law())
     state = model.rest()
     twist = np.array([0.01, 0.0, 1.0])
-    rate = median(lambda: model.rate(state, twist, 1.0), 9, 100)
-    return line(
-        _python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6
-    )
+    call, rate = least(_call(model), lambda: model.rate(state, twist, 1.0), inner=300)
+    return line(call * 1e6, "us", "one Python call of rate", rate * 1e6)
 
 
 def reduced_loop(full: bool, cells: int = ReducedModel.cells) -> Measurement:
@@ -80,7 +86,7 @@ def reduced_loop(full: bool, cells: int = ReducedModel.cells) -> Measurement:
         ReducedModel(disc(), law(), cells=cells),
         ReducedModelPublished(disc(), law()),
     )
-    ours, theirs = (_compiled_loop(model, twists) for model in models)
+    ours, theirs = least(*(_loop(model, twists) for model in models))
     return line(
         ours / len(twists) * 1e6, "us", AGAINST_PUBLISHED, theirs / len(twists) * 1e6
     )
@@ -88,10 +94,8 @@ def reduced_loop(full: bool, cells: int = ReducedModel.cells) -> Measurement:
 
 def reduced_call(full: bool) -> Measurement:
     """Measure a step of `ReducedModel`, from Python."""
-    ours, theirs = (
-        _python_step(model(disc(), law()), 2000)
-        for model in (ReducedModel, ReducedModelPublished)
-    )
+    models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
+    ours, theirs = least(*map(_call, models), inner=2000)
     return line(ours * 1e6, "us", AGAINST_PUBLISHED, theirs * 1e6)
 
 
@@ -112,23 +116,62 @@ def reduced_four(full: bool) -> Measurement:
     return _beside_a_step(model, lambda: model.step(states, twists, loads, 1e-3))
 
 
-def _beside_a_step(model: ReducedModel, action: Callable[[], Any]) -> Measurement:
-    return line(
-        median(action, 9, 2000) * 1e6,
-        "us",
-        "one Python call of step",
-        _python_step(model, 2000) * 1e6,
+def _beside_a_step(
+    model: ReducedModel, action: Callable[[], Any], inner: int = 2000
+) -> Measurement:
+    ours, theirs = least(action, _call(model), inner=inner)
+    return line(ours * 1e6, "us", "one Python call of step", theirs * 1e6)
+
+
+def _block(slides: bool = False) -> tuple[SlidingBody, tuple[Any, ...]]:
+    """Return a block that is held, or one that begins to slide and turn, with the inputs of its next step of 1 ms."""
+    block = SlidingBody(0.2, 1e-5, ReducedModel(disc(), law()))
+    twist = (0.1, 0.0, 3.0) if slides else (0.0, 0.0, 0.0)
+    push = (2.3, 0.0, 1e-3) if slides else (1.5, 0.0, 0.0)
+    end = block.step(block.rest(), twist, 2.0, 1e-3, push)
+    for _ in range(0 if slides else SETTLING):
+        end = block.step(end.state, end.twist, 2.0, 1e-3, push)
+    return block, (end.state, end.twist, 2.0, 1e-3, push)
+
+
+def body(full: bool, slides: bool = False) -> Measurement:
+    """Measure an implicit step of 1 ms of a block that is held, or slides, in one Python call."""
+    block, given = _block(slides)
+    model: Any = block.models
+    return _beside_a_step(model, lambda: block.step(*given), 500)
+
+
+def body_overhead(full: bool) -> Measurement:
+    """Measure what Python adds to a step of a block that is held, beside the step itself in a batch on one thread."""
+    block, (state, *given) = _block()
+    states = np.tile(state, (AT_ONCE, 1))
+    whole, batch = least(
+        lambda: block.step(state, *given), lambda: block.step(states, *given), inner=100
     )
+    alone = batch / AT_ONCE
+    words = f"the step itself, of one of {AT_ONCE} in a call"
+    return line((whole - alone) * 1e6, "us", words, alone * 1e6)
 
 
-def body(full: bool) -> Measurement:
-    """Measure an implicit step of 1 ms of a block that is held, in one Python call."""
+def body_feet(full: bool, feet: int) -> Measurement:
+    """Measure an implicit step of 1 ms of a body that slides and turns on feet, in one Python call."""
     model = ReducedModel(disc(), law())
-    block = SlidingBody(0.2, 1e-5, model)
-    end = block.step(block.rest(), np.zeros(3), 2.0, 1e-3, (1.5, 0.0, 0.0))
+    around = np.linspace(0.0, 2.0 * np.pi, feet, endpoint=False)
+    places = 0.05 * np.stack([np.cos(around), np.sin(around)], axis=-1)
+    box = SlidingBody(0.2, 1e-4, [model] * feet, places)
+    loads = np.full(feet, 2.0 / feet)
+    end = box.step(box.rest(), (0.05, 0.0, 1.0), loads, 1e-3)
+    push = (0.3, 0.0, 0.0)
     return _beside_a_step(
-        model, lambda: block.step(end.state, end.twist, 2.0, 1e-3, (1.5, 0.0, 0.0))
+        model, lambda: box.step(end.state, end.twist, loads, 1e-3, push), 100
     )
+
+
+def short_rollout(full: bool) -> Measurement:
+    """Measure a rollout of 20 steps in one Python call, as planners and filters make many of, beside 20 of step."""
+    model = ReducedModel(disc(), law())
+    ours, theirs = least(_loop(model, mixed_twists(20)), _call(model), inner=500)
+    return line(ours * 1e6, "us", "20 Python calls of step", 20.0 * theirs * 1e6)
 
 
 def coupled(full: bool, environments: int = 1) -> Measurement:

@@ -76,7 +76,8 @@ def bench(
       planarfriction bench --compare old.json --only sweep
 
     --compare measures again and prints how far the ratios to the baselines have moved since, which depends less on the
-    machine than the times do. NumPy, SciPy and PyTorch get one thread unless OMP_NUM_THREADS says otherwise.
+    machine than the times do. What runs on one thread is measured by its least processor time, all else by medians.
+    NumPy, SciPy and PyTorch get one thread unless OMP_NUM_THREADS says otherwise.
     """
     import dataclasses
     import json
@@ -90,6 +91,7 @@ def bench(
     then = None if old is None else comparison.read_run(old)
     if then is not None and not force:
         comparison.check_idle()
+    click.echo(comparison.machine(), err=True)
     with work_progress("measuring") as progress:
         rounds = (
             rounds if rounds is not None else 1 if then is None else comparison.ROUNDS
