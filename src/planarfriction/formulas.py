@@ -125,18 +125,14 @@ def traction(z: Any, zdot: Any, velocity: Any, law: Any) -> Any:
 
 
 def mean_decay(start: Any, end: Any, dt: Any) -> Any:
-    """Mean of k over a step [1/s] from its values at the start and at the predicted end ("A step at a held twist")."""
-    return end + (start - end) * start_share(start, end, dt)
-
-
-def start_share(start: Any, end: Any, dt: Any) -> Any:
-    """Share of the start in the mean of k over a step: `1/(2 + x + x^2)` of `x = k dt`.
+    """Mean of k over a step [1/s] from its values at the start and at the predicted end.
 
     Half and half for short steps (second order), all on the end for steps much longer than the bristle's memory,
-    whose result is then the steady state of k at the end. ("A step at a held twist")
+    whose result is then the steady state of k at the end; the share of the start, `1/(2 + x + x^2)` of `x = k dt`,
+    leads over. ("A step at a held twist")
     """
     x = 0.5 * (start + end) * dt
-    return 1.0 / (2.0 + x + x * x)
+    return end + (start - end) / (2.0 + x + x * x)
 
 
 def relaxation(xp: Any, decay_dt: Any) -> tuple[Any, Any]:

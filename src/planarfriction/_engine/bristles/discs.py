@@ -56,6 +56,10 @@ class _Drive(NamedTuple):
     """Decay of `z_t` over k: `(1 - l)/c_t` [-]."""
     decay_s: float
     """Decay of `z_s` over k: `1/c_s` [-]."""
+    decay_p: float
+    """Decay of the component of `z_t` along `u_t` over k: `(1 - l W_s^2/|W|^2)/c_t` [-]."""
+    across: float
+    """l"""
     drag: float
     """`l/|W|` [s/m]: a bristle along W takes this much of u."""
     speed: float
@@ -77,16 +81,19 @@ def _drive(law: LawNumbers, u: Vector, slid: tuple) -> _Drive:
     across = across * xp.where(law.elasto_plastic > 0.0, 1.0, formulas.PLAIN_ACROSS)
     both = 1.0 / (c_t * c_s)
     size = norm(pull)
+    n_s = ratio(pull[2], size)
     return _Drive(
         u,
         (1.0 - across) * c_s * both,
         c_t * both,
+        (1.0 - across * n_s * n_s) * c_s * both,
+        across,
         ratio(across, size),
         speed,
         inverse_deflection(law, speed),
         xp.where(size > STILL, ratio(speed, size), 1.0),
         ratio(u[2], norm(u)),
-        (ratio(pull[0], size), ratio(pull[1], size), ratio(pull[2], size)),
+        (ratio(pull[0], size), ratio(pull[1], size), n_s),
     )
 
 
@@ -134,35 +141,44 @@ def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
 
 
 @kernel
-def _ahead(drive: _Drive, z: Vector, along: float, k_dt: float, dt: float) -> Vector:
+def _lack(drive: _Drive, z: Vector, k_dt: float, dt: float) -> tuple[float, float]:
+    """Return what a bristle lacks along W of its steady state in a step, as the time that u takes for l of it.
+
+    First by its centre, then by its spin; negative where it has more.
+    """
+    n = drive.pull
+    drag = k_dt * drive.drag
+    t = n[0] * z[0] + n[1] * z[1]
+    dt = dt * drive.across
+    square = n[2] * n[2]
+    return (dt - dt * square) - drag * t, dt * square - drag * (n[2] * z[2])
+
+
+@kernel
+def _ahead(drive: _Drive, z: Vector, k_dt: float, dt: float) -> Vector:
     """Return the bristle at the predicted end of a step, each component at its own rate."""
     u = drive.u
     t = 1.0 + k_dt * drive.decay_t
     s = 1.0 + k_dt * drive.decay_s
-    per = 1.0 / (t * s)
-    t, s = s * per, t * per
-    part = dt - k_dt * (drive.drag * along)
+    p = 1.0 + k_dt * drive.decay_p
+    per = 1.0 / (t * s * p)
+    by_t, by_s = _lack(drive, z, k_dt, dt)
+    part = (dt - drive.across * dt) + (by_t * s + by_s) * (t * per)
+    t, s = s * p * per, t * p * per
     return (z[0] + part * u[0]) * t, (z[1] + part * u[1]) * t, (z[2] + dt * u[2]) * s
 
 
 @kernel
-def _mean_along(
-    drive: _Drive, start: float, ahead: float, share: float, k_dt: float, dt: float
-) -> float:
-    """Return the mean component along W: that of both ends of a short step, the steady `|W|/k` of a long one."""
-    x = k_dt * drive.per_h * drive.per_h
-    grown = start + (dt + dt * x) * (drive.speed * drive.per_h)
-    end = grown / (1.0 + x + x * x)
-    return end + share * ((start - end) + 2.0 * share * (ahead - end))
-
-
-@kernel
-def _relaxed(drive: _Drive, z: Vector, along: float, k_dt: float, dt: float) -> Vector:
-    """Return the bristle at the end of a step, `k_dt` and `along` being means over it."""
+def _relaxed(drive: _Drive, z: Vector, k_dt: float, dt: float) -> Vector:
+    """Return the bristle at the end of a step, `k_dt` being the mean over it."""
     u = drive.u
     left_t, mean_t = formulas.relaxation(xp, k_dt * drive.decay_t)
     left_s, mean_s = formulas.relaxation(xp, k_dt * drive.decay_s)
-    mean_t = mean_t * (dt - k_dt * (drive.drag * along))
+    y = k_dt * (drive.decay_p - drive.decay_t)
+    s = 1.0 + 0.5 * k_dt * (drive.decay_s - drive.decay_t)
+    by_t, by_s = _lack(drive, z, k_dt, dt)
+    lack = (by_t * s + by_s) / (s * (1.0 + y * (0.5 + y * (1.0 / 12.0))))
+    mean_t = mean_t * (dt - drive.across * dt) + left_t * lack
     mean_s = mean_s * dt
     return (
         left_t * z[0] + mean_t * u[0],
@@ -177,13 +193,10 @@ def moved(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vec
     drive = _drive(law, u, sliding(u))
     deflection, along, cosine, spin = _seen(drive, z)
     start = _decay(law, drive, deflection, cosine, spin)
-    far, ahead, cosine, spin = _seen(drive, _ahead(drive, z, along, start * dt, dt))
+    far, _, cosine, spin = _seen(drive, _ahead(drive, z, start * dt, dt))
     end = _decay(law, drive, far, cosine, spin)
-    share = formulas.start_share(start, end, dt)
-    k_dt = (end + (start - end) * share) * dt
-    mean = _mean_along(drive, along, ahead, share, k_dt, dt)
-    free = _relaxed(drive, z, mean, k_dt, dt)
-    far, along, cosine, spin = _seen(drive, free)
+    free = _relaxed(drive, z, formulas.mean_decay(start, end, dt) * dt, dt)
+    far, _, cosine, spin = _seen(drive, free)
     new, far = capped(law, free, far, deflection)
     k = _decay(law, drive, far, cosine, spin)
     return new, _rate(drive, new, dot(new, drive.pull), k)
