@@ -143,6 +143,38 @@ def test_steps_of_any_size_return_no_energy(elasto_plastic):
         assert (work + before - after >= -1e-14 * (np.abs(work) + before)).all()
 
 
+@pytest.mark.parametrize("elasto_plastic", [None, 0.3, 0.9])
+def test_no_step_moves_a_bristle_away_from_steady_sliding(elasto_plastic):
+    """From any bristle, as after friction has fallen or risen or a spin has turned back: `|z - z_ss|` never grows.
+
+    A third of the bristles had settled where friction was another: where it fell, a long step ends in steady sliding.
+    """
+    law = LuGre(mu_s=1.2, sigma_1=0.0, elasto_plastic=elasto_plastic)
+    radius = 3e-3
+    patch = ContactPatch([(0.0, 0.0)], [1e-6], radii=[radius])
+    model = DistributedModel(patch, law)
+    rng = np.random.default_rng(5)
+    many = 3000
+    for decade in range(-6, 0):
+        u = rng.normal(size=(many, 3)) * 10.0 ** rng.uniform(-5.0, 0.5, (many, 1))
+        u[:, 2] *= 10.0 ** rng.uniform(-2.0, 2.0, many)
+        speed, pull = zip(*(sliding(each)[3:] for each in u), strict=True)
+        grip = law.sigma_0 / formulas.stribeck(np, np.array(speed), law.numbers)
+        steady = np.array(pull) / (grip * speed)[:, None]
+        settled = np.arange(many) % 3 == 0
+        z = np.where(settled[:, None], steady, rng.normal(size=(many, 3)) * 1e-6)
+        factor = 10.0 ** rng.uniform(-2.0, 2.0, (many, 1))
+        z *= factor
+        twist = u / [1.0, 1.0, KAPPA * radius]
+        new = model.step(z[..., None], twist, 1.0, 10.0**decade)[0][..., 0]
+        before, after = (np.linalg.norm(each - steady, axis=1) for each in (z, new))
+        size = np.linalg.norm(steady, axis=1)
+        assert (after <= before + 1e-12 * size).all()
+        fell = settled & (factor[:, 0] > 1.0)
+        long = fell & (grip * speed * 10.0**decade > 300.0)
+        assert (after[long] < 1e-3 * size[long]).all()
+
+
 def test_what_lies_across_the_sliding_decays_more_slowly():
     """Far from a disc by the share `3/(4 q^2)`, by the mean of `1/|u|^2` over it: `(1 + 1/(2 q^2))/q^2`; within 1 %."""
     q = 100.0

@@ -56,8 +56,8 @@ class _Drive(NamedTuple):
     """Decay of `z_t` over k: `(1 - l)/c_t` [-]."""
     decay_s: float
     """Decay of `z_s` over k: `1/c_s` [-]."""
-    decay_p: float
-    """Decay of the component of `z_t` along `u_t` over k: `(1 - l W_s^2/|W|^2)/c_t` [-]."""
+    more: float
+    """Further decay of what of `z_t` lies along `u_t`, over k: `(l/c_t) |W_t|^2/|W|^2` [-]."""
     across: float
     """l"""
     drag: float
@@ -86,7 +86,7 @@ def _drive(law: LawNumbers, u: Vector, slid: tuple) -> _Drive:
         u,
         (1.0 - across) * c_s * both,
         c_t * both,
-        (1.0 - across * n_s * n_s) * c_s * both,
+        across * (1.0 - n_s * n_s) * (c_s * both),
         across,
         ratio(across, size),
         speed,
@@ -98,11 +98,11 @@ def _drive(law: LawNumbers, u: Vector, slid: tuple) -> _Drive:
 
 
 @kernel
-def _seen(drive: _Drive, z: Vector) -> tuple[float, float, float, float]:
-    """Return the deflection of a bristle, its component along W, the cosine of the two, and the share of spin in it."""
+def _seen(drive: _Drive, z: Vector) -> tuple[float, float, float]:
+    """Return the deflection of a bristle, the cosine of it and W, and the share of spin in it."""
     size = norm(z)
-    along = dot(z, drive.pull)
-    return size * (drive.q * drive.per_h), along, ratio(along, size), ratio(z[2], size)
+    deflection = size * (drive.q * drive.per_h)
+    return deflection, ratio(dot(z, drive.pull), size), ratio(z[2], size)
 
 
 @kernel
@@ -119,11 +119,11 @@ def _decay(
 
 
 @kernel
-def _rate(drive: _Drive, z: Vector, along: float, k: float) -> Vector:
+def _rate(drive: _Drive, z: Vector, k: float) -> Vector:
     """Return z'."""
     u = drive.u
     t = k * drive.decay_t
-    part = 1.0 - k * (drive.drag * along)
+    part = 1.0 - k * (drive.drag * dot(z, drive.pull))
     return (
         part * u[0] - t * z[0],
         part * u[1] - t * z[1],
@@ -135,23 +135,22 @@ def _rate(drive: _Drive, z: Vector, along: float, k: float) -> Vector:
 def evaluate(law: LawNumbers, z: Vector, u: Vector) -> tuple[Vector, Vector]:
     """Return z' and the traction of a disc that moves at u."""
     drive = _drive(law, u, sliding(u))
-    deflection, along, cosine, spin = _seen(drive, z)
-    rate = _rate(drive, z, along, _decay(law, drive, deflection, cosine, spin))
+    rate = _rate(drive, z, _decay(law, drive, *_seen(drive, z)))
     return rate, traction(law, z, rate, u)
 
 
 @kernel
 def _lack(drive: _Drive, z: Vector, k_dt: float, dt: float) -> tuple[float, float]:
-    """Return what a bristle lacks along W of its steady state in a step, as the time that u takes for l of it.
+    """Return what a bristle lacks along W in a step, by its centre and by its spin, as times [s] for which l u acts.
 
-    First by its centre, then by its spin; negative where it has more.
+    Both are 0 in steady sliding, and below 0 where friction has fallen.
     """
     n = drive.pull
     drag = k_dt * drive.drag
-    t = n[0] * z[0] + n[1] * z[1]
-    dt = dt * drive.across
-    square = n[2] * n[2]
-    return (dt - dt * square) - drag * t, dt * square - drag * (n[2] * z[2])
+    dt = drive.across * dt
+    spin = n[2] * n[2]
+    centre = n[0] * z[0] + n[1] * z[1]
+    return (dt - dt * spin) - drag * centre, dt * spin - drag * (n[2] * z[2])
 
 
 @kernel
@@ -160,11 +159,11 @@ def _ahead(drive: _Drive, z: Vector, k_dt: float, dt: float) -> Vector:
     u = drive.u
     t = 1.0 + k_dt * drive.decay_t
     s = 1.0 + k_dt * drive.decay_s
-    p = 1.0 + k_dt * drive.decay_p
-    per = 1.0 / (t * s * p)
-    by_t, by_s = _lack(drive, z, k_dt, dt)
-    part = (dt - drive.across * dt) + (by_t * s + by_s) * (t * per)
-    t, s = s * p * per, t * p * per
+    along = t + k_dt * drive.more
+    per = 1.0 / (t * s * along)
+    by_centre, by_spin = _lack(drive, z, k_dt, dt)
+    part = (dt - drive.across * dt) + (by_centre * s + by_spin) * (t * per)
+    t, s = s * along * per, t * along * per
     return (z[0] + part * u[0]) * t, (z[1] + part * u[1]) * t, (z[2] + dt * u[2]) * s
 
 
@@ -174,15 +173,15 @@ def _relaxed(drive: _Drive, z: Vector, k_dt: float, dt: float) -> Vector:
     u = drive.u
     left_t, mean_t = formulas.relaxation(xp, k_dt * drive.decay_t)
     left_s, mean_s = formulas.relaxation(xp, k_dt * drive.decay_s)
-    y = k_dt * (drive.decay_p - drive.decay_t)
+    y = k_dt * drive.more
     s = 1.0 + 0.5 * k_dt * (drive.decay_s - drive.decay_t)
-    by_t, by_s = _lack(drive, z, k_dt, dt)
-    lack = (by_t * s + by_s) / (s * (1.0 + y * (0.5 + y * (1.0 / 12.0))))
-    mean_t = mean_t * (dt - drive.across * dt) + left_t * lack
+    by_centre, by_spin = _lack(drive, z, k_dt, dt)
+    lack = (by_centre * s + by_spin) / (s * (1.0 + y * (0.5 + y * (1.0 / 12.0))))
+    part = mean_t * (dt - drive.across * dt) + left_t * lack
     mean_s = mean_s * dt
     return (
-        left_t * z[0] + mean_t * u[0],
-        left_t * z[1] + mean_t * u[1],
+        left_t * z[0] + part * u[0],
+        left_t * z[1] + part * u[1],
         left_s * z[2] + mean_s * u[2],
     )
 
@@ -191,15 +190,14 @@ def _relaxed(drive: _Drive, z: Vector, k_dt: float, dt: float) -> Vector:
 def moved(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
     """Return the bristle after dt and its rate there, by the equations of `bristle_step`."""
     drive = _drive(law, u, sliding(u))
-    deflection, along, cosine, spin = _seen(drive, z)
+    deflection, cosine, spin = _seen(drive, z)
     start = _decay(law, drive, deflection, cosine, spin)
-    far, _, cosine, spin = _seen(drive, _ahead(drive, z, start * dt, dt))
-    end = _decay(law, drive, far, cosine, spin)
+    ahead = _ahead(drive, z, start * dt, dt)
+    end = _decay(law, drive, *_seen(drive, ahead))
     free = _relaxed(drive, z, formulas.mean_decay(start, end, dt) * dt, dt)
-    far, _, cosine, spin = _seen(drive, free)
+    far, cosine, spin = _seen(drive, free)
     new, far = capped(law, free, far, deflection)
-    k = _decay(law, drive, far, cosine, spin)
-    return new, _rate(drive, new, dot(new, drive.pull), k)
+    return new, _rate(drive, new, _decay(law, drive, far, cosine, spin))
 
 
 @kernel
