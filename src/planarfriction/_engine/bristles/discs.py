@@ -146,11 +146,10 @@ def _lack(drive: _Drive, z: Vector, k_dt: float, dt: float) -> tuple[float, floa
     Both are 0 in steady sliding, and below 0 where friction has fallen.
     """
     n = drive.pull
-    drag = k_dt * drive.drag
     dt = drive.across * dt
-    spin = n[2] * n[2]
-    centre = n[0] * z[0] + n[1] * z[1]
-    return (dt - dt * spin) - drag * centre, dt * spin - drag * (n[2] * z[2])
+    spin = dt * (n[2] * n[2])
+    centre = drive.drag * (n[0] * z[0] + n[1] * z[1])
+    return (dt - spin) - k_dt * centre, spin - k_dt * (drive.drag * (n[2] * z[2]))
 
 
 @kernel
