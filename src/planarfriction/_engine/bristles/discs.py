@@ -168,7 +168,10 @@ def _ahead(drive: _Drive, z: Vector, k_dt: float, dt: float) -> Vector:
 
 @kernel
 def _relaxed(drive: _Drive, z: Vector, k_dt: float, dt: float) -> Vector:
-    """Return the bristle at the end of a step, `k_dt` being the mean over it."""
+    """Return the bristle at the end of a step, `k_dt` being the mean over it.
+
+    Of an excess along `u_t`, `e^-x (1 - y/2 + y^2/12)/(1 + y/2 + y^2/12)` is left: about `e^-(x + y)`, never below 0.
+    """
     u = drive.u
     left_t, mean_t = formulas.relaxation(xp, k_dt * drive.decay_t)
     left_s, mean_s = formulas.relaxation(xp, k_dt * drive.decay_s)
@@ -187,7 +190,7 @@ def _relaxed(drive: _Drive, z: Vector, k_dt: float, dt: float) -> Vector:
 
 @kernel
 def moved(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vector]:
-    """Return the bristle after dt and its rate there, by the equations of `bristle_step`."""
+    """Return the bristle after dt and its rate there: `bristle_step` with a rate for each component."""
     drive = _drive(law, u, sliding(u))
     deflection, cosine, spin = _seen(drive, z)
     start = _decay(law, drive, deflection, cosine, spin)
