@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.cells.gathering import gather
+from planarfriction._engine.cells.gathering import Discs, gather
 from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
@@ -25,17 +25,10 @@ from planarfriction.patch.discs import Membership
 class Cells(NamedTuple):
     """Cells of a patch, and the discs that stand for them."""
 
-    members: Membership
-    """Cells of each disc, or of each cell itself."""
-    stiffness: np.ndarray
-    """Stiffness of the cells on their pad `[N]`, but for a factor; empty without a pad."""
-    numbers: np.ndarray
-    """Shares of the load, lever coordinates x and y from `middle`, and second moments about it, of the cells `[4, N]`;
-    `[4, 0]` if discs do not move."""
+    discs: Discs
+    """Cells, and discs of them, in lever coordinates from `middle`; cells that are bristles of their own stay."""
     middle: np.ndarray
     """Middle of the cells `[2]` [m], so that little is lost where they lie far from the origin."""
-    whole: np.ndarray
-    """Places from `middle` and radii of discs of all of their cells alike `[3, n]`; `[3, 0]` if they do not move."""
     count: int
     """Number N of cells."""
 
@@ -54,12 +47,12 @@ class Cells(NamedTuple):
     ) -> Cells:
         """Return cells in discs; `discs` are their shares, places `[N, 2]` and own second moments, if these move."""
         count = int(members.cells.max()) + 1
-        stiffness = (
-            np.zeros(0) if stiffness is None else np.ascontiguousarray(stiffness)
-        )
+        begins = np.append(members.begins, len(members.cells))
+        alike = members.cells, members.parted, begins
+        stiffness = np.zeros(0) if stiffness is None else np.array(stiffness)
         if discs is None:
             none = np.zeros((4, 0))
-            return cls(members, stiffness, none, np.zeros(2), none[1:], count)
+            return cls(Discs(*alike, stiffness, none, none[1:]), np.zeros(2), count)
         shares, places, squares = discs
         middle = places.mean(axis=0)
         x, y = (places - middle).T
@@ -67,7 +60,7 @@ class Cells(NamedTuple):
         x, y, square = members.sums(numbers[1:]) / members.sums(np.ones(count))
         radii = np.sqrt(2.0 * np.maximum(square - x * x - y * y, 0.0))
         whole = np.array([x, y, radii])
-        return cls(members, stiffness, numbers, middle, whole, count)
+        return cls(Discs(*alike, stiffness, numbers, whole), middle, count)
 
     def under(self, loads: Any, cover: Any = None) -> Pressing:
         """Return the discs under `loads` `[..., N]` [N], now or (before, now), with the pressed shares of cells.
@@ -97,15 +90,11 @@ class Cells(NamedTuple):
     def _gathered(
         self, now: np.ndarray, cover: np.ndarray, before: np.ndarray, batch: tuple[int, ...]
     ) -> Pressing:  # fmt: skip
-        cells, parted, begins = self.members
-        n = len(begins)
+        n = len(self.discs.begins) - 1
         weights = np.empty((len(now), n))
-        pads = np.empty((len(now), 2, n if self.stiffness.size else 0))
-        moved = np.empty((len(now), 3, n if self.numbers.size else 0))
-        gather(
-            now, cover, before, cells, parted, np.append(begins, len(cells)), self.stiffness, self.numbers,
-            self.whole, weights, pads, moved,
-        )  # fmt: skip
+        pads = np.empty((len(now), 2, n if self.discs.stiffness.size else 0))
+        moved = np.empty((len(now), 3, n if self.discs.numbers.size else 0))
+        gather(now, cover, before, self.discs, weights, pads, moved)
         moves = moved.size > 0
         return Pressing(
             now.sum(-1).reshape(batch),

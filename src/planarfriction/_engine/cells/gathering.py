@@ -6,27 +6,42 @@ See `planarfriction.models.cell_loads` for the equations.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from planarfriction._engine.compiler import jit
 
 
+class Discs(NamedTuple):
+    """Cells and the discs that stand for them."""
+
+    cells: np.ndarray
+    """Cell of each membership `[M]`."""
+    parted: np.ndarray
+    """Part of the cell that belongs to the disc `[M]`."""
+    begins: np.ndarray
+    """First membership of each disc, and M, `[n + 1]`."""
+    stiffness: np.ndarray
+    """Stiffness of the cells `[N]`; empty without a pad."""
+    numbers: np.ndarray
+    """Shares of the load, places x and y, and second moments about the origin, of the cells `[4, N]`; `[4, 0]` if discs
+    stay."""
+    whole: np.ndarray
+    """Places and radii of discs of which nothing is pressed `[3, n]`."""
+
+
 @jit
 def gather(
-    loads: np.ndarray, cover: np.ndarray, before: np.ndarray, cells: np.ndarray, parted: np.ndarray, begins: np.ndarray,
-    stiffness: np.ndarray, numbers: np.ndarray, whole: np.ndarray, weights: np.ndarray, pads: np.ndarray,
+    loads: np.ndarray, cover: np.ndarray, before: np.ndarray, discs: Discs, weights: np.ndarray, pads: np.ndarray,
     moved: np.ndarray,
 ) -> None:  # fmt: skip
     """Write shares of the load `[B, n]`, the stiffness and what is kept of it `[B, 2, n]`, and discs `[B, 3, n]`.
 
-    Loads and pressed shares, now and before, are `[B, N]` of N cells; disc k has the memberships from `begins[k]` to
-    `begins[k + 1]` `[n + 1]`, each a part of a cell `[M]`. `stiffness` `[N]` is that of the cells, none where empty.
-    `numbers` `[4, N]` are shares of a load, places x and y, and `x^2 + y^2` with the cell's own second moment; discs
-    stay where it is empty, and where nothing of them is pressed they are those of `whole` `[3, n]`.
+    Loads and pressed shares of the cells, now and before, are `[B, N]`.
     """
+    (cells, parted, begins, stiffness, numbers, whole) = discs
     count = loads.shape[0]
-    discs = begins.shape[0] - 1
     elastic = stiffness.shape[0] > 0
     moves = numbers.shape[1] > 0
     for b in range(count):
@@ -34,7 +49,7 @@ def gather(
         for i in range(loads.shape[1]):
             total = total + loads[b, i]
         per = 1.0 / total if total > 0.0 else 0.0
-        for k in range(discs):
+        for k in range(begins.shape[0] - 1):
             load = 0.0
             full = 0.0
             pressed = 0.0
