@@ -74,41 +74,24 @@ def stribeck_at(effect: Any, law: Any) -> Any:
 def slip_fraction(xp: Any, deflection: Any, breakaway_ratio: Any) -> Any:
     """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection.
 
-    `1/2 + 1/2 sin(pi (share - 1/2)) = sin^2(pi share/2)` of the share of the way from breakaway to full deflection, as
-    a polynomial of `q = share^2` within 1e-12, whose value at both ends and slope at full deflection are exact: nothing
-    creeps below breakaway. ("Bristles")
+    `1/2 + 1/2 sin(pi (share - 1/2)) = sin^2(pi share/2)` of the share of the way from breakaway to full deflection: in
+    this form exactly zero below breakaway, so that rounding cannot creep. ("Bristles")
     """
-    share = _slip_share(xp, deflection, breakaway_ratio)
-    q = share * share
-    rest = 1.0 - q
-    return q * ((1.0 + rest) + rest * rest * _slip_rest(q))
-
-
-def _slip_share(xp: Any, deflection: Any, breakaway_ratio: Any) -> Any:
     share = (deflection - breakaway_ratio) * (1.0 / (1.0 - breakaway_ratio))
-    return xp.minimum(xp.maximum(share, 0.0), 1.0)
-
-
-def _slip_rest(q: Any) -> Any:
-    """`(sin^2(pi/2 sqrt(q))/q - 2 + q)/(1 - q)^2`, of least largest error in `slip_fraction`."""
-    low = 0.46740110020034753 + q * -0.09455386056614092
-    middle = 0.011122539229197596 + q * -0.0008662531766041039
-    high = 4.804904852204762e-05 + q * -1.8504337106256236e-06
-    q2 = q * q
-    return (low + q2 * middle) + (q2 * q2) * high
+    root = xp.sin(0.5 * math.pi * xp.minimum(xp.maximum(share, 0.0), 1.0))
+    return root * root
 
 
 def slip_fraction_slope(xp: Any, deflection: Any, breakaway_ratio: Any) -> Any:
     """Derivative of `alpha` with respect to `|z|/z_max` [-]."""
-    share = _slip_share(xp, deflection, breakaway_ratio)
-    q = share * share
-    rest = 1.0 - q
-    low = -0.09455386056614092 + q * (2.0 * 0.011122539229197596)
-    middle = 3.0 * -0.0008662531766041039 + q * (4.0 * 4.804904852204762e-05)
-    q2 = q * q
-    steep = (low + q2 * middle) + (q2 * q2) * (5.0 * -1.8504337106256236e-06)
-    sloped = 2.0 + (rest - 2.0 * q) * _slip_rest(q) + q * rest * steep
-    return 2.0 * share * rest * sloped * (1.0 / (1.0 - breakaway_ratio))
+    per_width = 1.0 / (1.0 - breakaway_ratio)
+    phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) * per_width
+    return (
+        0.5
+        * math.pi
+        * per_width
+        * xp.cos(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
+    )
 
 
 def bristle_decay(
