@@ -244,6 +244,9 @@ def passes_of(
     ends = [0, *_cuts(own, block, count), len(own)]
     kept = [_handed(own, block, end) for end in ends]
     shared = [writer.line(each) for each in operations if each.name in common]
+    truths = {
+        each.name for each in own if writer.line(each).startswith("const int ")
+    }
     room = [f"row[{row}][i]" for row in range(len(own))]
     room = [*room[:3], *places, *room[3:]]
     texts = []
@@ -267,7 +270,7 @@ def passes_of(
         lines += [writer.line(each) for each in again if each.name in read]
         lines += [writer.line(each) for each in own[first:last]]
         lines += [
-            f"    {place} = {name};"
+            f"    {place} = {'(real)' if name in truths else ''}{name};"
             for name, place in places_of.items()
             if name not in before
         ]

@@ -91,7 +91,6 @@ def bench(
     then = None if old is None else comparison.read_run(old)
     if then is not None and not force:
         comparison.check_idle()
-    click.echo(comparison.machine(), err=True)
     with work_progress("measuring") as progress:
         rounds = (
             rounds if rounds is not None else 1 if then is None else comparison.ROUNDS
@@ -102,6 +101,7 @@ def bench(
             else [name for name in benchmarks.BENCHMARKS if name in then]
         )
         lines = benchmarks.run(names, full=full, rounds=rounds, progress=progress)
+    click.echo(comparison.machine(), err=True)
     if as_json:
         print(json.dumps([dataclasses.asdict(line) for line in lines], indent=2))
     elif then is not None:
