@@ -14,6 +14,7 @@ from planarfriction._engine.coupled.steps import PLAIN, in_order, ready
 from planarfriction._support import validation
 from planarfriction.derivatives.parameters import PackedRollout, pack
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LARGEST
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
@@ -194,7 +195,7 @@ def _of_one(
 
 def _each(value: Any, steps: int) -> Any:
     """Return a plain number as one for each step, anything else as it is."""
-    if type(value) not in PLAIN:
+    if type(value) not in PLAIN or (type(value) is int and abs(value) > LARGEST):
         return value
     filled = np.empty(steps)
     filled.fill(value)

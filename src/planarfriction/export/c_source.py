@@ -244,9 +244,7 @@ def passes_of(
     ends = [0, *_cuts(own, block, count), len(own)]
     kept = [_handed(own, block, end) for end in ends]
     shared = [writer.line(each) for each in operations if each.name in common]
-    truths = {
-        each.name for each in own if writer.line(each).startswith("const int ")
-    }
+    truths = {each.name for each in own if each.kind == "bool"}
     room = [f"row[{row}][i]" for row in range(len(own))]
     room = [*room[:3], *places, *room[3:]]
     texts = []
