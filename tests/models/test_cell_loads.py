@@ -26,6 +26,13 @@ MODELS = {
     "cells": pf.DistributedModel(GRADED, DAMPED),
     "discs": pf.ReducedModel(GRADED, DAMPED),
     "discs with a metric": pf.ReducedModel(GRAINED, DAMPED),
+    "discs of a circle": pf.ReducedModel(pf.ContactPatch.disc(0.01, cells=21), DAMPED),
+    "discs of a soft finger": pf.ReducedModel(
+        pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(c=0.006, k=0.33)), DAMPED
+    ),
+    "discs with an asymmetry": pf.ReducedModel(
+        GRADED.with_friction_metric(np.eye(2), (0.2, 0.1)), DAMPED
+    ),
     "feet": pf.ReducedModel(FEET, DAMPED),
     "cells of a layer": pf.DistributedModel(GRADED, DAMPED, pad=LAYER),
     "discs of a layer": pf.ReducedModel(GRADED, DAMPED, pad=LAYER),
@@ -49,7 +56,11 @@ def drawn(model, count, rng):
 def test_loads_of_the_pressure_are_the_normal_force(name):
     model = MODELS[name]
     state, twist, _ = drawn(model, 4, np.random.default_rng(1))
-    loads = 2.5 * model.patch.weights(2.5)
+    # Shares of cells, which differ from those of points at the rim of a circle.
+    patch = (
+        model.patch if model.reduction.pad or name == "cells" else model.patch.discs()
+    )
+    loads = 2.5 * patch.weights(2.5)
     given = model.step(state, twist, None, 1e-3, loads=loads)
     for got, wanted in zip(given, model.step(state, twist, 2.5, 1e-3), strict=True):
         np.testing.assert_allclose(
@@ -243,6 +254,8 @@ def test_loads_that_make_no_sense_are_refused():
         ({"loads": -loads}, "loads.*>= 0"),
         ({"loads": loads, "cover": 2.0 * np.ones(384)}, r"cover.*\[0, 1\]"),
         ({"loads": loads, "cover": 0.0 * loads}, "cover.*> 0 where a cell bears load"),
+        ({"loads": loads, "cover": (2.0 + loads, loads)}, r"cover.*\[0, 1\]"),
+        ({"loads": [loads, [1.0]]}, "loads.*rows of equal length"),
         ({"cover": loads}, "loads.*be given"),
     ):
         with refused(words):

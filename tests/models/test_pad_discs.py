@@ -1,7 +1,5 @@
 """Fits of the discs of pads are kept on disk, told to who watches, and end at Ctrl-C."""
 
-import uuid
-
 import numpy as np
 import pytest
 import scipy.optimize
@@ -20,8 +18,9 @@ PAD = Pad.measured(4e3, 0.4)
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A folder that nothing is kept in yet."""
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
     source = tmp_path / "source.py"
-    source.write_text(uuid.uuid4().hex)  # where NUMBA_CACHE_DIR names a folder of all
+    source.touch()
     monkeypatch.setattr(pad_discs, "SOURCES", Sources(tmp_path, [source]))
     forget()
     yield tmp_path

@@ -72,11 +72,11 @@ class Cells(NamedTuple):
         (covered_before, covered) = (None, (now > 0.0).astype(float))
         if cover is not None:
             covered_before, covered = _pair("cover", cover, self.count)
-            largest = float(covered.max(initial=0.0))
-            if largest > 1.0:
-                raise InvalidValueError("cover", "be in [0, 1]", largest)
         if covered_before is None:
             covered_before = covered if earlier is None else (earlier > 0.0) + 0.0
+        largest = max(each.max(initial=0.0) for each in (covered, covered_before))
+        if largest > 1.0:
+            raise InvalidValueError("cover", "be in [0, 1]", float(largest))
         shapes = now.shape, covered.shape, covered_before.shape
         batch = validation.common_shape("loads", shapes, "broadcast with cover")
         given = [
@@ -108,9 +108,14 @@ class Cells(NamedTuple):
         )
 
 
+def in_time(value: Any) -> tuple[Any, Any]:
+    """Return what was before, or None, and what is now, of a value that may be both."""
+    return value if isinstance(value, tuple) and len(value) == 2 else (None, value)
+
+
 def _pair(name: str, value: Any, count: int) -> tuple[np.ndarray | None, np.ndarray]:
     """Return the arrays before, or None, and now."""
-    pair = value if isinstance(value, tuple) and len(value) == 2 else (None, value)
+    pair = in_time(value)
     arrays = [None if each is None else _checked(name, each, count) for each in pair]
     if arrays[1] is None:
         raise InvalidValueError(name, "be an array or (before, now)", value)

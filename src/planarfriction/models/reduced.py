@@ -21,7 +21,7 @@ from planarfriction.models.base import (
     ModelJacobians,
     refuse_common,
 )
-from planarfriction.models.cell_loads import Cells
+from planarfriction.models.cell_loads import Cells, in_time
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.models.pad_discs import discs_of
 from planarfriction.pads import Pad
@@ -92,9 +92,12 @@ class ReducedModel(FrictionModel):
     def _cells(self) -> Cells:
         patch = self.patch
         n = POINTS * self.cells if is_rate_law(self.law) else self.cells
+        cells = own_discs(patch)
+        shares = mean_weights(cells)
         if self.pad is None or self.pad.springs_of_law or patch.cells <= n:
             members = members_of(patch, n)
         else:
+            shares = patch.weights()
             members = clusters_of(patch, self.pad.shares(patch), n)
         stiffness = None if self.pad is None else self.pad.pieces(patch, self.law)
         if members is None:
@@ -102,13 +105,13 @@ class ReducedModel(FrictionModel):
         if is_rate_law(self.law):
             return Cells.of(members, stiffness)
         places = np.stack(patch.lever_coordinates(*patch.positions.T), -1)
-        squares = 0.5 * own_discs(patch).lever_radii ** 2
-        return Cells.of(members, stiffness, (mean_weights(patch), places, squares))
+        squares = 0.5 * cells.lever_radii**2
+        return Cells.of(members, stiffness, (shares, places, squares))
 
     def _pressing(self, loads: Any, cover: Any) -> Pressing:
         """Return the discs under loads of the cells, or of the discs."""
         count = self.reduction.patch.cells
-        shape = np.shape(loads[-1] if isinstance(loads, tuple) else loads)
+        shape = validation.numbers("loads", in_time(loads)[1]).shape
         if shape[-1:] == (count,) != (self.patch.cells,):
             alike = None if self.pad is None else np.ones(count)
             return Cells.alone(count, alike).under(loads, cover)

@@ -149,9 +149,14 @@ class CompiledModel:
         """Yield rows of the flat batch, the model at the load of each row or at the one load of all, and offsets.
 
         Pressures are about the centres `[..., 2]` [m], if given: patches whose pressure keeps its shape move by offsets
-        `[rows, 2]` [m], None else. Rows without load may be left out; their results are zero.
+        `[rows, 2]` [m], None else. Models of cells take a `Pressing` in place of centres. Rows without load may be left
+        out; their results are zero.
         """
         raise NotImplementedError
+
+    def left(self, state: np.ndarray, pressure: Any) -> np.ndarray:
+        """Return the state that a new pressure leaves of one before: all of it, unless cells of a pad have come."""
+        return state
 
     def points(self) -> tuple[np.ndarray, int]:
         """Return the cells that share the load, `[n, 2]` [m], and the words of their record, or one point that has all.
@@ -320,7 +325,7 @@ class CompiledModel:
         centre: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return new states and wrenches `[..., 3]`; `centre` as in `pressed`."""
-        z = state.reshape(-1, self._size)
+        z = self.left(state, centre).reshape(-1, self._size)
         v = twist.reshape(-1, 3)
         f = load.reshape(-1)
         h = dt.reshape(-1)

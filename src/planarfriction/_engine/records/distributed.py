@@ -63,15 +63,11 @@ class CompiledDistributed(CompiledModel):
             return PAD
         return LEANS if self.patch.asymmetric else PLAIN
 
-    @property
-    def _behind(self) -> int:
-        """Numbers of a cell behind those of its lever."""
-        return {PLAIN: 0, LEANS: 2, PAD: 1}[self.sort]
-
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         matrices = MATRICES if self.sort == PAD else LINEAR
-        rows = numbers[len(numbers) - self._behind :]
+        behind = {PLAIN: 0, LEANS: 2, PAD: 1}[self.sort]
+        rows = numbers[len(numbers) - behind :]
         lean = rows if self.sort == LEANS else rows[:0]
         stiff = rows if self.sort == PAD else rows[:0]
         return CellsContact(
@@ -114,32 +110,21 @@ class CompiledDistributed(CompiledModel):
         if given.stiffer is not None:
             numbers[:, -1] *= given.stiffer
         (record, _) = self.record(numbers[0], weights)
-        at = places_of(numbers)
-        behind = 8 * numbers.shape[-1] * (numbers.shape[1] - self._behind)
-        columns = {"weights": places_of(weights), "cells": at}
-        columns |= {PLAIN: {}, LEANS: {"lean": at + behind}, PAD: {"stiff": at + behind}}[self.sort]  # fmt: skip
+        columns = {"weights": places_of(weights), "cells": places_of(numbers)}
+        if self.sort == PAD:
+            last = numbers.strides[1] * (numbers.shape[1] - 1)
+            columns["stiff"] = places_of(numbers) + last
         rows = rows_of(record, len(weights), **columns)
         return packed._replace(records=rows, keepalive=(weights, numbers))
 
-    def left(self, state: np.ndarray, given: Any) -> np.ndarray:
-        """Return the state that a new pressure leaves of one before."""
-        if not isinstance(given, Pressing) or given.kept is None:
-            return state
-        left = state.reshape(len(given.kept), -1).copy()
-        bristles = left[:, : self.size * given.kept.shape[1]]
-        bristles *= np.tile(given.kept, self.size)
-        return left.reshape(state.shape)
-
-    def step(
-        self,
-        state: np.ndarray,
-        twist: np.ndarray,
-        load: np.ndarray,
-        dt: np.ndarray,
-        centre: np.ndarray | Pressing | None = None,
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def left(self, state: np.ndarray, pressure: Any) -> np.ndarray:
         """See `CompiledModel`."""
-        return super().step(self.left(state, centre), twist, load, dt, centre)
+        if not isinstance(pressure, Pressing) or pressure.kept is None:
+            return state
+        left = state.reshape(len(pressure.kept), -1).copy()
+        bristles = left[:, : self.size * pressure.kept.shape[1]]
+        bristles *= np.tile(pressure.kept, self.size)
+        return left.reshape(state.shape)
 
     def step_jacobians(
         self,
