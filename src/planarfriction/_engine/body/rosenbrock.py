@@ -49,7 +49,7 @@ from planarfriction._engine.codegen.vectors import (
     times,
 )
 from planarfriction._engine.compiler import compiled_math as xp
-from planarfriction._engine.compiler import entry, jit, kernel
+from planarfriction._engine.compiler import kernel, sequential_entry, sequential_jit
 from planarfriction._engine.compiler.calls import address_of, call
 from planarfriction._engine.compiler.memory import (
     Doubles,
@@ -341,7 +341,7 @@ def _missed_inside(
     return largest
 
 
-@entry
+@sequential_entry
 def attempt(run: Place, piece: int, since: float, step: float, fresh: int) -> None:
     """Try a step, and write its error into `verdict`; `fresh` is 1 if the linearisation is yet to be made at y."""
     run = read_run(run)
@@ -409,7 +409,7 @@ def _accept(
     return time
 
 
-@jit
+@sequential_jit
 def advance(run: Place, max_steps: int) -> int:
     """Integrate the run at an address from where it stands to the last break, or for `max_steps` trials.
 

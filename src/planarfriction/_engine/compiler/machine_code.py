@@ -36,6 +36,9 @@ from planarfriction._support.writing import replacing
 need(CompileResult, "_reduce", "_rebuild")
 _PASSES = "planarfriction._engine.compiler.interrupts", "heard_between_passes"
 heard_between_passes = part(*_PASSES, contextlib.nullcontext)
+shortcuts = part(
+    "planarfriction._engine.compiler.shortcuts", "shortcuts", contextlib.nullcontext
+)
 
 _SETTINGS = (
     "OPT",
@@ -70,7 +73,7 @@ def kept(dispatcher: Any, sources: Sources) -> Any:
 
     def compile_hearing(signature: Any) -> Any:
         wait_for(dispatcher)
-        with heard_between_passes():
+        with heard_between_passes(), shortcuts():
             return compile_deaf(signature)
 
     dispatcher.compile = compile_hearing

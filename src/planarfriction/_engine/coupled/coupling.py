@@ -24,7 +24,7 @@ import numpy as np
 from planarfriction._engine.codegen.small_matrices import leave_out_rising, solved
 from planarfriction._engine.codegen.vectors import clear, copy
 from planarfriction._engine.compiler import compiled_math as xp
-from planarfriction._engine.compiler import entry, jit, kernel
+from planarfriction._engine.compiler import kernel, sequential_entry, sequential_jit
 from planarfriction._engine.compiler.calls import call, pointer
 from planarfriction._engine.compiler.memory import (
     Doubles,
@@ -426,7 +426,7 @@ def find(
     return best, accepted
 
 
-@entry
+@sequential_entry
 def solve(patches_at: Place, problem_at: Place) -> None:
     """Solve the problem of one row; arguments are the addresses of its `Patches` and of that row."""
     patches = read(patches_at)
@@ -452,7 +452,7 @@ def solve(patches_at: Place, problem_at: Place) -> None:
     p.converged[0] = 1.0 if best <= accepted else 0.0
 
 
-@jit
+@sequential_jit
 def solve_batch(words: np.ndarray, problems: np.ndarray, first: int, last: int) -> None:
     """Solve the problems [E, words] from `first` to `last`; `words` are the row of their `Patches`."""
     patches = read(words)

@@ -19,7 +19,7 @@ from numba.core.errors import NumbaError
 
 from planarfriction._engine.codegen.vectors import clear, copy, plus, put, three, times
 from planarfriction._engine.compiler import compiled_math as xp
-from planarfriction._engine.compiler import jit, kernel
+from planarfriction._engine.compiler import jit, kernel, sequential_jit
 from planarfriction._engine.compiler.calls import call, pointer
 from planarfriction._engine.compiler.memory import Doubles, Place, at, reader
 from planarfriction._engine.protocol import SLOPES
@@ -87,7 +87,7 @@ def _step(
         clear(new, table.states)
 
 
-@jit
+@sequential_jit
 def step_one(
     stepped: np.ndarray,
     z: np.ndarray,
