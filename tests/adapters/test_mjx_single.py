@@ -11,7 +11,8 @@ import jax.numpy as jnp  # noqa: E402
 import mujoco  # noqa: E402
 
 from planarfriction.adapters import mujoco as adapter  # noqa: E402
-from planarfriction.adapters.mjx import Friction, PatchContact, prepare  # noqa: E402
+from planarfriction.adapters.mjx import Friction, PatchContact, newton, prepare  # noqa: E402
+from planarfriction.adapters.mjx.friction import ITERATIONS, TOLERANCE  # noqa: E402
 
 pytestmark = pytest.mark.mjx
 
@@ -66,7 +67,7 @@ def test_a_box_slides_and_rests_as_in_double_precision():
         theirs.step(d)
         path.append([d.qpos.copy(), d.qvel.copy(), theirs.wrenches(d)[0].copy()])
     positions, speeds, wrenches = (np.array(each) for each in zip(*path, strict=True))
-    # what single precision leaves of the response of the host; 1e-4 m/s, and as much at a decimetre, is what a simulator may miss by
+    # what single precision leaves of the response of the host; a simulator may miss by 1e-4 m/s at a decimetre
     np.testing.assert_allclose(qpos, positions, atol=1e-5)
     np.testing.assert_allclose(qvel[:, :3], speeds[:, :3], atol=1e-4)
     np.testing.assert_allclose(qvel[:, 3:], speeds[:, 3:], atol=1e-3)
@@ -74,3 +75,24 @@ def test_a_box_slides_and_rests_as_in_double_precision():
     assert np.mean(converged) > 0.99 and np.mean(iterations) < 4.0
     creep = abs(qpos[-1] - qpos[-101])[:2].max() / 0.2
     assert creep < 2e-8  # m/s
+
+
+@pytest.mark.parametrize("steep", [1.0, 30.0, 1000.0])
+def test_steep_friction_is_solved_to_its_rounding(steep):
+    """Bristles that a step stretches by `steep` times what the host gives in turn make that much of the last digit."""
+    random = np.random.default_rng(3)
+    twists = jnp.array(random.normal(size=(50, 3)) * 0.01, dtype=jnp.float32)
+
+    def solved(twist):
+        host = newton.HostResponse(
+            twist, jnp.ones(1), 0.02 * jnp.eye(3), jnp.zeros((1, 3))
+        )
+        stiff = newton.UnitLoadFriction(lambda v, load: -50.0 * steep * v, False)
+        return newton.solve(
+            stiff, host, jnp.zeros(3), jnp.full(1, 0.02), TOLERANCE, ITERATIONS
+        )
+
+    found = jax.jit(jax.vmap(solved))(twists)
+    assert found.converged.all() and found.iterations.max() <= 2
+    right = -50.0 * steep / (1.0 + steep) * np.asarray(twists)
+    np.testing.assert_allclose(found.wrench, right, rtol=1e-6 * (1.0 + steep))

@@ -102,6 +102,7 @@ class _Round(NamedTuple):
     held: Any
     iterations: Any
     best: Any
+    fits: Any
     wrench: Any
     """Wrench of the models where the misfit was least."""
     done: Any
@@ -120,6 +121,8 @@ class _Search(NamedTuple):
     """Twists of unit energy, `[k, 3]`."""
     near: jax.Array
     """Misfit [m/s] at which wrenches fit."""
+    speeds: jax.Array
+    """Twists of which the searched ones are sums, `[k, 3]`."""
     most: int
     """Largest number of iterations."""
 
@@ -150,6 +153,12 @@ class _Search(NamedTuple):
             gap, self.diagonal * missing[:, None] * jnp.array([1.0, 1.0, 0.0])
         )
         return jnp.where(jnp.isfinite(gap).all(), gap.max(), jnp.inf)
+
+    def rounding(self, load, slopes):
+        """Return the misfit [m/s] that the last digit of the twists makes where friction rises steeply with them."""
+        moved = (abs(load[:, None, None] * slopes) @ self.speeds[..., None])[..., 0]
+        eps = jnp.finfo(moved.dtype).eps
+        return 2.0 * eps * (self.diagonal * self.lever * moved).max()
 
     def newton(self, w, twist, load, unit, slopes, by_load, held):
         """Return the step, the twists that it adds, and `A dW . s` at its start."""
@@ -204,15 +213,17 @@ class _Search(NamedTuple):
         unit = jnp.where(back, c.unit, unit)
         slopes = jnp.where(back, c.slopes, slopes)
         by_load = jnp.where(back, c.by_load, by_load)
-        to_rest = (c.phase == _GUESS) & (misfit > self.near)
+        near = jnp.maximum(self.near, self.rounding(load, slopes))
+        to_rest = (c.phase == _GUESS) & (misfit > near)
         iterations = c.iterations + (searching & far_enough)
         better = accepted & (misfit < c.best)
         best = jnp.where(better, misfit, c.best)
+        fits = jnp.where(better, misfit <= near, c.fits)
         wrench = jnp.where(better, (load[:, None] * unit).ravel(), c.wrench)
         done = (
             accepted
             & ~to_rest
-            & ((misfit <= self.near) | (iterations >= self.most) | (misfit == jnp.inf))
+            & ((misfit <= near) | (iterations >= self.most) | (misfit == jnp.inf))
         )
         # a new step, or less of the last
         held = jnp.where(accepted, iterations % ROUND >= JOINT, c.held)
@@ -232,7 +243,7 @@ class _Search(NamedTuple):
             load=jnp.where(to_rest | held, load, host.loads(w)), unit=unit, slopes=slopes, by_load=by_load,
             misfit=misfit, start=start, change=change, move=move, first=first, far=far,
             tries=jnp.where(accepted, 0, c.tries + 1), whole=jnp.where(accepted, c.phase == _REST, c.whole) & ~back,
-            held=held & ~to_rest, iterations=iterations, best=best, wrench=wrench, done=done,
+            held=held & ~to_rest, iterations=iterations, best=best, fits=fits, wrench=wrench, done=done,
         )  # fmt: skip
 
 
@@ -248,12 +259,12 @@ def solve(
     count = len(host.load)
     lever = jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
     caused = host.response @ guess
-    speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
+    speeds = (abs(host.twist + caused) + abs(caused)).reshape(-1, 3)
     rounding = ROUNDING if speeds.dtype == jnp.float64 else ROUNDING_SINGLE
-    near = jnp.maximum(tolerance, rounding * speeds.max())
+    near = jnp.maximum(tolerance, rounding * (lever * speeds).max())
     diagonal = jnp.diagonal(host.response).reshape(-1, 3)
     scale = jnp.where(diagonal > 0.0, jnp.sqrt(abs(diagonal)), 1.0)
-    search = _Search(unit, host, lever, diagonal, scale, near, most)
+    search = _Search(unit, host, lever, diagonal, scale, near, speeds, most)
     none = jnp.zeros(3 * count)
     zeros = jnp.zeros((count, 3))
     first = _Round(
@@ -261,10 +272,10 @@ def solve(
         unit=zeros, slopes=jnp.zeros((count, 3, 3)), by_load=zeros, misfit=jnp.asarray(jnp.inf),
         start=guess, change=none, move=none, first=jnp.asarray(0.0), far=jnp.asarray(1.0), tries=jnp.asarray(0),
         whole=jnp.asarray(False), held=jnp.asarray(False), iterations=jnp.asarray(0),
-        best=jnp.asarray(jnp.inf), wrench=none, done=jnp.asarray(False),
+        best=jnp.asarray(jnp.inf), fits=jnp.asarray(False), wrench=none, done=jnp.asarray(False),
     )  # fmt: skip
     end = jax.lax.while_loop(lambda c: ~c.done, search.next_round, first)
-    return Solved(end.wrench, end.iterations, end.best, end.best <= near)
+    return Solved(end.wrench, end.iterations, end.best, end.fits)
 
 
 def fitting(unit: UnitLoadFriction, host: HostResponse, found: jax.Array) -> jax.Array:
