@@ -282,7 +282,7 @@ def _texts(
                 "\n".join([functions["step"], repr(tables)]).encode()
             ).hexdigest()[:16],
             "pieces": pieces,
-            "states": pieces.count * pieces.states,
+            "states": pieces.all_states,
             "precision": precision,
             "parameters": {
                 each: (writer.constant(value), PARAMETERS[each][0])
@@ -298,7 +298,7 @@ def _texts(
             "slip": slip and slip.words,
             "passes": passes,
             "turns": turns,
-            "body": body_of(model, precision, given["patches"]),
+            "body": body_of(model, pieces, precision, given["patches"]),
             "share": share,
             "own": own,
             "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),

@@ -94,6 +94,19 @@ FIXED = "gamma", "elasto_plastic", "creep_speed"
 """Numbers of a law that are constants of the source: stored maps and the shape of the code depend on them."""
 
 
+class Face(NamedTuple):
+    """Face of a pad that hangs on its back (see `_engine.coupled.face`)."""
+
+    compliance: np.ndarray
+    """Compliance that all pieces have in common, [3, 3]."""
+    lag: float
+    """Time [s] in which that follows."""
+    stuck: np.ndarray
+    """Stiffness of the bristles while all of them stick, [3, 3]."""
+    viscous: np.ndarray
+    """Viscous friction of all bristles per unit load, [3, 3]."""
+
+
 class Pieces(NamedTuple):
     """A model as source code needs it: `count` cells that see the same twist and share the load."""
 
@@ -121,11 +134,18 @@ class Pieces(NamedTuple):
     """True for pieces of a pad, which see their loads."""
     moves: bool = False
     """True if the patch moves where pressures that follow moments cannot be had by other shares."""
+    face: Face | None = None
+    """Face that a compliance common to all pieces of a pad moves, whose three states follow those of the cells."""
 
     @property
     def columns(self) -> int:
         """Number of derivatives of a number of a cell."""
         return self.states + 3 + len(self.parameters) + self.pad
+
+    @property
+    def all_states(self) -> int:
+        """Number of states of all cells and of the face."""
+        return self.count * self.states + (0 if self.face is None else 3)
 
 
 def pieces_of(
@@ -133,12 +153,11 @@ def pieces_of(
 ) -> Pieces:
     """Take a model apart for a `precision` of `library.PRECISIONS`.
 
-    Only one of a `fixed` shape, or also cells whose pressure follows the load. If it has fewer cells than `count`,
-    others without load follow.
+    Only one of a `fixed` shape without a face, or also cells whose pressure follows the load, and pads with a common
+    compliance. If it has fewer cells than `count`, others without load follow.
 
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
-    depends on the load, friction that differs from cell to cell in other ways than by a metric, pads with a common
-    compliance.
+    depends on the load, friction that differs from cell to cell in other ways than by a metric.
     """
     whole = model.reduction if isinstance(model, ReducedModel) else model
     law = getattr(model, "law", None)
@@ -155,6 +174,8 @@ def pieces_of(
                 raise InvalidValueError(
                     "model", rule, model.patch.name or "a patch that does"
                 )
+            if fixed:
+                refuse_common(whole, "Warp")
             return taken_apart(whole, precision, count)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
     given = f"{type(model).__name__}, {type(law).__name__}"
@@ -246,7 +267,6 @@ def _cell(size: int, pad: bool, precision: str) -> tuple[Any, Any, Any]:
 
 
 def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
-    refuse_common(model, "source code")
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
     numbers = model.compiled.numbers()
@@ -256,8 +276,13 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
     cell, plain, sliding = _cell(size, kind.pad, precision)
-    # Pads whose stiffness is their own do not feel sigma_0.
+    # Pads whose stiffness is their own do not feel sigma_0, and those behind a common compliance have no sigma_1.
+    face = None
     constant = () if model.compiled.springs else ("sigma_0",)
+    if model.compiled.compliance is not None:
+        compiled: Any = model.compiled
+        face = Face(compiled.compliance, compiled.lag, *compiled.held)
+        constant = (*constant, "sigma_1")
     parameters = _parameters(law, constant)
     by = cells_rollout.by_of(kind.path, kind.pad)
     lever = twin(kind.lever)
@@ -344,6 +369,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         None if kind.pad else lambda: traced(functools.partial(slopes, turns=True)),
         rungs,
         kind.pad,
+        face=face,
     )
 
 

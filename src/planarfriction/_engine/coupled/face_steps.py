@@ -62,11 +62,11 @@ _read = reader(Hanging)
 @kernel
 def _held(own: Hanging, p: ContactSolve, i: int, x: Doubles) -> float:
     """Return element i of the wrench by which bristles that stick hold against a twist."""
-    wrench = 0.0
+    held = 0.0
     for j in range(3):
-        stiff = p.dt[0] * own.stuck[3 * i + j] + p.load[0] * own.viscous[3 * i + j]
-        wrench += stiff * x[j]
-    return wrench
+        held += p.dt[0] * own.stuck[3 * i + j] * x[j]
+        held += p.load[0] * own.viscous[3 * i + j] * x[j]
+    return held
 
 
 @kernel
@@ -93,12 +93,12 @@ def _start(own: Hanging, patches: Patches, p: ContactSolve, h: float) -> None:
     turn = _held(own, p, 2, p.change) / patches.radius[0]
     size = math.sqrt(x * x + y * y + turn * turn)
     largest = own.limit * p.load[0]
-    share = largest / size if size > largest else 1.0
+    part = largest / size if size > largest else 1.0
     for i in range(3):
-        p.twist[i] = p.free_twist[i] + share * (p.change[i] - p.free_twist[i])
+        p.twist[i] = p.free_twist[i] + part * (p.change[i] - p.free_twist[i])
         for j in range(3):
             one = 1.0 if i == j else 0.0
-            p.matrix[3 * i + j] = one + share * (p.matrix[3 * i + j] - one)
+            p.matrix[3 * i + j] = one + part * (p.matrix[3 * i + j] - one)
 
 
 @kernel
