@@ -23,6 +23,9 @@ _STEP = Fixed(0)
 _SLOPES = Fixed(1)
 """Stands in place of the address of a patch's step with its slopes."""
 
+_TABLES = "radius", "stuck", "viscous", "compliance", "back", "lag"
+"""Arrays of `Patches` that are tables of the source, in their order: the first, of pads three, with faces all."""
+
 _FUNCTIONS = {_STEP: "step_patch", _SLOPES: "slope_patch"}
 
 ROUNDING = {"double": coupling.ROUNDING, "float": 1e-5}
@@ -41,7 +44,11 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
         [(name, "f8", (count,)) for name, count in (counts | given).items() if count]
     )
     tables = {"lever_arm": np.full(patches, lever_of(model) or 1.0)}
-    hangs = pieces.face is not None
+    if pieces.held:
+        tables |= {
+            "stuck_stiffness": np.tile(pieces.held[0].ravel(), patches),
+            "stuck_damping": np.tile(pieces.held[1].ravel(), patches),
+        }
     if pieces.face:
         compliance = pieces.face.compliance
         back = np.linalg.pinv(compliance, hermitian=True)
@@ -49,8 +56,6 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
             "common_compliance": np.tile(compliance.ravel(), patches),
             "common_stiffness": np.tile(back.ravel(), patches),
             "common_lag": np.full(patches, pieces.face.lag),
-            "stuck_stiffness": pieces.face.stuck.ravel(),
-            "stuck_damping": pieces.face.viscous.ravel(),
         }
     known = [Array(name, each.shape, fixed=True) for name, each in tables.items()]
     own = Patches(**dict.fromkeys(Patches._fields, Fixed(0)))._replace(  # pyright: ignore
@@ -58,7 +63,8 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
         steps=_STEP,
         slopes=_SLOPES,
         firsts=Array("firsts", (patches + 1,), "int", fixed=True),
-        **dict(zip(("radius", "compliance", "back", "lag"), known, strict=False)),
+        soft=Fixed(int(pieces.pad)),
+        **dict(zip(_TABLES, known, strict=False)),
     )
     writer = Writer()
     p = CStruct("p", record)
@@ -69,9 +75,9 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
     rounding = Fixed(ROUNDING[precision])
     most = Scalar("most", "int"), Scalar("again", "int")
     names = {"find": loops.add(coupling.find, (own, p, rounding, *most))[0]}
-    if hangs:
+    if pieces.face:
         alone = own._replace(count=Fixed(1))
-        hanging = Hanging(*map(Fixed, (0, 0, 0)), Scalar("limit"), *known[-2:])
+        hanging = Hanging(*map(Fixed, (0, 0, 0)), Scalar("limit"), *known[1:3])
         names |= {
             "soften": loops.add(face.soften, (own, p))[0],
             "move_faces": loops.add(face.move_faces, (own, p))[0],

@@ -101,10 +101,6 @@ class Face(NamedTuple):
     """Compliance that all pieces have in common, [3, 3]."""
     lag: float
     """Time [s] in which that follows."""
-    stuck: np.ndarray
-    """Stiffness of the bristles while all of them stick, [3, 3]."""
-    viscous: np.ndarray
-    """Viscous friction of all bristles per unit load, [3, 3]."""
 
 
 class Pieces(NamedTuple):
@@ -132,6 +128,8 @@ class Pieces(NamedTuple):
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
     pad: bool = False
     """True for pieces of a pad, which see their loads."""
+    held: tuple[np.ndarray, np.ndarray] | None = None
+    """Stiffness of a pad that sticks, and its viscous friction per unit load, [3, 3] each."""
     moves: bool = False
     """True if the patch moves where pressures that follow moments cannot be had by other shares."""
     face: Face | None = None
@@ -281,7 +279,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     constant = () if model.compiled.springs else ("sigma_0",)
     if model.compiled.compliance is not None:
         compiled: Any = model.compiled
-        face = Face(compiled.compliance, compiled.lag, *compiled.held)
+        face = Face(compiled.compliance, compiled.lag)
         constant = (*constant, "sigma_1")
     parameters = _parameters(law, constant)
     by = cells_rollout.by_of(kind.path, kind.pad)
@@ -369,6 +367,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         None if kind.pad else lambda: traced(functools.partial(slopes, turns=True)),
         rungs,
         kind.pad,
+        model.compiled.held if kind.pad else None,
         face=face,
     )
 

@@ -56,16 +56,6 @@ class CompiledSoft(CompiledDistributed):
         """See `CompiledDistributed`."""
         return self._hung(self._pieces.under(given))
 
-    @property
-    def held(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness of the bristles while all of them stick, and viscous friction per unit load, `[3, 3]` each."""
-        law = self.law.numbers
-        levers = self.patch.levers()
-        shares = self.patch.areas / self.patch.areas.sum()
-        by = "n,nda,ndb->ab"
-        stuck = np.einsum(by, law.sigma_0 * self.stiff, levers, levers)
-        return stuck, law.sigma_2 * np.einsum(by, shares, levers, levers)
-
     def _hung(self, pieces: PackedModel) -> PackedModel:
         stuck, viscous = self.held
         alone = self._alone.patches
