@@ -46,7 +46,7 @@ def test_at_a_held_load_it_is_a_law_of_another_sigma_0(load):
         one = fixed.step(z, _host(seed, load), 1e-3)
         other = published.step(y, _host(seed, load), 1e-3)
         np.testing.assert_allclose(one.wrench, other.wrench, rtol=1e-7, atol=1e-9)
-        assert one.converged and one.iterations == other.iterations
+        assert one.converged and other.converged
         z = one.state
         y = other.state
 

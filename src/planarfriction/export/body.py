@@ -44,18 +44,19 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
         [(name, "f8", (count,)) for name, count in (counts | given).items() if count]
     )
     tables = {"lever_arm": np.full(patches, lever_of(model) or 1.0)}
-    if pieces.held:
+    compiled = model.reduction.compiled
+    if pieces.pad:
+        stuck, viscous = compiled.held
         tables |= {
-            "stuck_stiffness": np.tile(pieces.held[0].ravel(), patches),
-            "stuck_damping": np.tile(pieces.held[1].ravel(), patches),
+            "stuck_stiffness": np.tile(stuck.ravel(), patches),
+            "stuck_damping": np.tile(viscous.ravel(), patches),
         }
     if pieces.face:
-        compliance = pieces.face.compliance
-        back = np.linalg.pinv(compliance, hermitian=True)
+        back = np.linalg.pinv(compiled.compliance, hermitian=True)
         tables |= {
-            "common_compliance": np.tile(compliance.ravel(), patches),
+            "common_compliance": np.tile(compiled.compliance.ravel(), patches),
             "common_stiffness": np.tile(back.ravel(), patches),
-            "common_lag": np.full(patches, pieces.face.lag),
+            "common_lag": np.full(patches, compiled.lag),
         }
     known = [Array(name, each.shape, fixed=True) for name, each in tables.items()]
     own = Patches(**dict.fromkeys(Patches._fields, Fixed(0)))._replace(  # pyright: ignore

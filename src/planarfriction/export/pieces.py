@@ -94,15 +94,6 @@ FIXED = "gamma", "elasto_plastic", "creep_speed"
 """Numbers of a law that are constants of the source: stored maps and the shape of the code depend on them."""
 
 
-class Face(NamedTuple):
-    """Face of a pad that hangs on its back (see `_engine.coupled.face`)."""
-
-    compliance: np.ndarray
-    """Compliance that all pieces have in common, [3, 3]."""
-    lag: float
-    """Time [s] in which that follows."""
-
-
 class Pieces(NamedTuple):
     """A model as source code needs it: `count` cells that see the same twist and share the load."""
 
@@ -128,12 +119,10 @@ class Pieces(NamedTuple):
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
     pad: bool = False
     """True for pieces of a pad, which see their loads."""
-    held: tuple[np.ndarray, np.ndarray] | None = None
-    """Stiffness of a pad that sticks, and its viscous friction per unit load, [3, 3] each."""
     moves: bool = False
     """True if the patch moves where pressures that follow moments cannot be had by other shares."""
-    face: Face | None = None
-    """Face that a compliance common to all pieces of a pad moves, whose three states follow those of the cells."""
+    face: bool = False
+    """True for pieces of a pad with a compliance in common: three states of its face follow those of the cells."""
 
     @property
     def columns(self) -> int:
@@ -143,7 +132,7 @@ class Pieces(NamedTuple):
     @property
     def all_states(self) -> int:
         """Number of states of all cells and of the face."""
-        return self.count * self.states + (0 if self.face is None else 3)
+        return self.count * self.states + 3 * self.face
 
 
 def pieces_of(
@@ -274,13 +263,9 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
     cell, plain, sliding = _cell(size, kind.pad, precision)
-    # Pads whose stiffness is their own do not feel sigma_0, and those behind a common compliance have no sigma_1.
-    face = None
-    constant = () if model.compiled.springs else ("sigma_0",)
-    if model.compiled.compliance is not None:
-        compiled: Any = model.compiled
-        face = Face(compiled.compliance, compiled.lag)
-        constant = (*constant, "sigma_1")
+    face = model.compiled.compliance is not None
+    # Pads whose stiffness is their own do not feel sigma_0, and behind a common compliance nothing damps.
+    constant = ("sigma_0",) * (not model.compiled.springs) + ("sigma_1",) * face
     parameters = _parameters(law, constant)
     by = cells_rollout.by_of(kind.path, kind.pad)
     lever = twin(kind.lever)
@@ -367,7 +352,6 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         None if kind.pad else lambda: traced(functools.partial(slopes, turns=True)),
         rungs,
         kind.pad,
-        model.compiled.held if kind.pad else None,
         face=face,
     )
 

@@ -89,7 +89,7 @@ class CompiledModel:
 
     @property
     def held(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness of the bristles of a pad while all of them stick, and viscous friction per unit load, `[3, 3]` each."""
+        """Stiffness of the bristles of a pad that sticks, and viscous friction per unit load, `[3, 3]` each."""
         return np.zeros((3, 3)), np.zeros((3, 3))
 
     rollouts: Any = None
