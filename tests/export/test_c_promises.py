@@ -45,7 +45,7 @@ STEP_STACK = 4608
 BODY_STACK = 8192
 """Stack of the step of a body with derivatives of its patches [bytes]."""
 
-FACE_STACK = 8192
+FACE_STACK = 9216
 """Stack of the step of a pad whose face is looked for, with derivatives [bytes]."""
 
 SLOPES_STACK = 6144

@@ -71,7 +71,7 @@ NEAR = 10.0
 """Misfit of the guess, over the tolerance, up to which a Newton step goes from there: rest need not be tried."""
 
 SHARP = 1e-2
-"""Share of the misfit that a step with slopes of pads leaves at most where the next may keep them."""
+"""Share of the least misfit that a step on pads leaves at most where the next may keep its slopes."""
 
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
@@ -407,14 +407,13 @@ def _search(
         if not known:
             step_all_with_slopes(patches, p)
         write_load_slopes(patches, p)
-        before = misfit
         if not _newton(patches, p, keep_loads, False):
             _newton(patches, p, keep_loads, True)
         _go(patches, p, keep_loads, rest, careful)
         rest = False
         misfit = _misfit(patches, p)
         if patches.soft > 0:
-            known = misfit <= SHARP * before and not careful
+            known = misfit <= SHARP * best and not careful
     if not misfit <= best:
         _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best
