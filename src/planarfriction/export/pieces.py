@@ -114,7 +114,7 @@ class Pieces(NamedTuple):
 
     Derivatives are by states, twist, parameters and, of a pad, by the load of the cell, which is `carried`."""
     turns: Callable[[], Block] | None = None
-    """Trace the wrench per unit load and, row by row, its derivatives by the twist; not of pads."""
+    """Trace the wrench per unit load and, row by row, its derivatives by the twist."""
     rungs: int = 0
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
     pad: bool = False
@@ -275,17 +275,17 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     names += ["gyration"] * (size == 3)
 
     def given(trace: Trace, load: str) -> tuple[Any, Any, Any]:
-        """Return the numbers of the lever, the law of the cell under a load, and its velocity."""
+        """Return the numbers of the lever, the law of the cell under its load or a share of all, and its velocity."""
         own = _vector(trace, *(f"{name}[k]" for name in names))
         found: Any = _law(trace, law, constant)
         if kind.pad:
             found = Elastic(found, *_vector(trace, "stiff[k]", load))
+            if load == "normal_force":
+                found = found._replace(load=Number(trace, "shares[k]") * found.load)
         return own, found, lever.seen(own, _vector(trace, *_TWIST))
 
     def step(trace: Trace) -> Any:
         own, found, u = given(trace, "normal_force")
-        if kind.pad:
-            found = found._replace(load=Number(trace, "shares[k]") * found.load)
         dt = Number(trace, "dt")
         new, traction = twin(cell)(found, _state(trace, size, n), u, dt)
         return new, lever.wrench(own, traction)
@@ -300,7 +300,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         return lever.wrench(own, twin(plain)(found, z, u, 0.0)[1])
 
     def slopes(trace: Trace, turns: bool = False) -> Any:
-        own, found, u = given(trace, "carried")
+        own, found, u = given(trace, "normal_force" if turns else "carried")
         written = derive(cell, by, {"z": size, "u": size})
         forth = twin(written.forth)
         back = twin(written.back)
@@ -349,7 +349,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         parameters,
         traced(steady),
         lambda: traced(slopes),
-        None if kind.pad else lambda: traced(functools.partial(slopes, turns=True)),
+        lambda: traced(functools.partial(slopes, turns=True)),
         rungs,
         kind.pad,
         face=face,
