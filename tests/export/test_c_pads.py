@@ -161,25 +161,43 @@ def test_steps_of_faces(name, precision, options):
     assert np.abs(wanted[0][:, -3:-1]).max() > 1e-6
 
 
-@pytest.mark.parametrize("precision", KINDS)
-@pytest.mark.parametrize("name", HUNG)
-def test_the_search_finds_faces_that_broyden_does_not(name, precision):
-    """A library whose first search gives up at once."""
-    made = library(name, precision, "-O1")
+def _with(made, name, *changes):
+    """Compile a library with changes behind the head of the search for a face."""
     source = (made.folder / "friction.c").read_text()
     head = source.index("static int found_of_face_steps")
-    never = source[head:].replace("i < 20", "i < 0", 1)
-    assert never != source[head:]
-    (made.folder / "never.c").write_text(source[:head] + never)
-    files = "never.c", "driver.c", "-o", "never.so", "-lm"
+    rest = source[head:]
+    for old, new in changes:
+        assert old in rest
+        rest = rest.replace(old, new, 1)
+    (made.folder / f"{name}.c").write_text(source[:head] + rest)
+    files = f"{name}.c", "driver.c", "-o", f"{name}.so", "-lm"
     subprocess.run(
         ["gcc", "-O1", "-fPIC", "-shared", *files], cwd=made.folder, check=True
     )
-    functions = ctypes.CDLL(str(made.folder / "never.so"))
+    return made._replace(functions=ctypes.CDLL(str(made.folder / f"{name}.so")))
+
+
+GIVES_UP = "i < 20", "i < 0"
+"""Change with which Broyden's method ends before it begins."""
+
+
+@pytest.mark.parametrize("precision", KINDS)
+@pytest.mark.parametrize("name", HUNG)
+def test_the_search_finds_faces_that_broyden_does_not(name, precision):
+    made = library(name, precision, "-O1")
     inputs = samples(made.model, made.kind, 600)
-    found = run(made._replace(functions=functions), inputs)
+    found = run(_with(made, "search", GIVES_UP), inputs)
     near = 1e-11 if precision == "double" else 1e-4
     _compare(found, made.model.step(*inputs), inputs[2], near)
+
+
+def test_a_face_that_nothing_finds_is_an_error():
+    """Where neither search may iterate."""
+    made = library("measured", "double", "-O1")
+    made = _with(made, "nothing", GIVES_UP, (", 100, 1, least", ", 0, 0, least"))
+    state = np.full(made.model.state_shape, 1e-6)
+    new, wrench, code = _one(made, state, (0.1, 0.02, 3.0), 2.0, 1e-3)
+    assert code == 4 and np.array_equal(new, state) and (wrench == 7.0).all()
 
 
 @pytest.mark.parametrize("name", HUNG)
