@@ -38,6 +38,7 @@ def _host(seed, load=None, response=0.0):
 
 @pytest.mark.parametrize("load", [1.0, 2.5])
 def test_at_a_held_load_it_is_a_law_of_another_sigma_0(load):
+    """Within the tolerance of 1e-9 m/s over the host's response of 0.01 m/(N s)."""
     fixed = _patches(1.0)
     published = _patches(None, 1e6 / load)
     z = fixed.rest()
@@ -45,7 +46,7 @@ def test_at_a_held_load_it_is_a_law_of_another_sigma_0(load):
     for seed in range(10):
         one = fixed.step(z, _host(seed, load), 1e-3)
         other = published.step(y, _host(seed, load), 1e-3)
-        np.testing.assert_allclose(one.wrench, other.wrench, rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(one.wrench, other.wrench, rtol=0.0, atol=2e-7)
         assert one.converged and other.converged
         z = one.state
         y = other.state
