@@ -78,7 +78,8 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
     names = {"find": loops.add(coupling.find, (own, p, rounding, *most))[0]}
     if pieces.face:
         alone = own._replace(count=Fixed(1))
-        hanging = Hanging(*map(Fixed, (0, 0, 0)), Scalar("limit"), *known[1:3])
+        none = Fixed(0)
+        hanging = Hanging(none, none, none, Scalar("limit"), *known[1:3])  # pyright: ignore
         names |= {
             "soften": loops.add(face.soften, (own, p))[0],
             "move_faces": loops.add(face.move_faces, (own, p))[0],
