@@ -8,11 +8,11 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.export.pieces import ladder_of
-from tests.support.c_libraries import library, samples
+from tests.support.c_libraries import HUNG, library, samples
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 
-NAMES = "few", "distributed", "table", "ellipsoid", "soft", "discs at a load"
+NAMES = "few", "distributed", "table", "ellipsoid", "soft", "discs at a load", *HUNG
 NOT_CONVERGED = 4
 BLOCK = 0.2, 1e-5, 0.0, 0.0, 0.0
 """Mass and inertia of a block above the middle of its patch."""
@@ -66,9 +66,10 @@ def problems(made, count, hard, patches=1):
         *((name, "float", 1) for name in ("few", "table")),
         *(
             (name, "double", 3)
-            for name in ("few", "distributed", "soft", "discs at a load")
+            for name in ("few", "distributed", "soft", "discs at a load", "half-space")
         ),
         ("few", "float", 3),
+        ("measured", "float", 3),
     ],
 )
 def test_steps(name, precision, patches):

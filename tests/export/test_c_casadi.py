@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from tests.support.c_libraries import MODELS, PADS, STRICT, samples
+from tests.support.c_libraries import HUNG, MODELS, PADS, STRICT, samples
 from tests.support.refusals import refused
 
 ca = pytest.importorskip("casadi", reason="needs the extra [casadi]")
@@ -17,10 +17,12 @@ pytestmark = [
 ]
 
 
-@pytest.fixture(scope="module", params=["few", "table", "discs at a load"])
+@pytest.fixture(
+    scope="module", params=["few", "table", "discs at a load", "half-space"]
+)
 def loaded(request, tmp_path_factory):
     """Return a model, its function in CasADi, inputs and the model's parameters."""
-    model = (MODELS | PADS)[request.param]()
+    model = (MODELS | PADS | HUNG)[request.param]()
     folder = tmp_path_factory.mktemp("casadi")
     pf.export_c(model, folder, casadi=True)
     command = [
@@ -47,6 +49,7 @@ def loaded(request, tmp_path_factory):
         law.v_s,
         law.breakaway_ratio,
     ]
+    params = params[2:] if request.param in HUNG else params
     inputs = [each[1::2][:20] for each in samples(model, np.float64, 40)]
     inputs[0], inputs[2] = inputs[0].reshape(20, -1), np.maximum(inputs[2], 0.1)
     return model, step, inputs, params
@@ -91,7 +94,8 @@ def test_jacobians(loaded):
         np.testing.assert_allclose(
             by_load[:, 0],
             exact.wrench_load,
-            atol=1e-9 * np.abs(exact.wrench_load).max(),
+            # Python has differences there.
+            atol=(1e-6 if model.pad else 1e-9) * np.abs(exact.wrench_load).max(),
         )
         assert by_state.shape == (3, state.size) and by_law.shape == (3, len(params))
         new, _ = (each.full() for each in step(state, *given, params))

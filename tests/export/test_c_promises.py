@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.support.c_libraries import (
+    HUNG,
     MODELS,
     REDUCED,
     STRICT,
@@ -44,6 +45,9 @@ STEP_STACK = 4608
 BODY_STACK = 8192
 """Stack of the step of a body with derivatives of its patches [bytes]."""
 
+FACE_STACK = 7680
+"""Stack of the step of a pad whose face is looked for [bytes]."""
+
 SLOPES_STACK = 6144
 """Stack of its step with derivatives [bytes]."""
 
@@ -55,6 +59,7 @@ EACH = [
     pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
     for name in MODELS
 ]
+FACES = [*EACH, next(iter(HUNG))]
 REMOTE = "aarch64-linux-gnu-gcc", "qemu-aarch64"
 BARE = "arm-none-eabi-gcc"
 HEAP = "malloc", "calloc", "realloc"
@@ -132,7 +137,7 @@ def stack_of(frames, words):
     return sum(int(size) for where, size, _ in frames if re.search(words, where))
 
 
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize("name", FACES)
 def test_calls_and_memory(name):
     """No memory is asked for, nothing that changes is kept, and the stack has a known size."""
     folder = objects(name, "gcc", "-O2", PLAIN, "-fstack-usage")
@@ -159,6 +164,10 @@ def test_calls_and_memory(name):
             and body < BODY_STACK
         )
         assert slopes < SLOPES_STACK and asked < STEP_STACK
+    elif name in HUNG:
+        search = stack_of(frames, "step_hung|step_patch|coupling|face|small_matrices")
+        last = max(stack_of(frames, each) for each in ("slope_patch", "step_with"))
+        assert 2048 < search + last < FACE_STACK
 
 
 TARGETS = {
@@ -187,7 +196,7 @@ def test_stack_of_vector_code(name, target):
     )
 
 
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize("name", FACES)
 def test_loops_and_calls_end(name):
     """Loops count to constants, and functions call only what stands above them."""
     source = (library(name).folder / "friction.c").read_text()

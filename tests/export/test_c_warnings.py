@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import pytest
 
@@ -36,9 +37,13 @@ MODELS = {
         SOFT, law, cells=8, pad=pf.Pad.layer(1e6, 2e-3)
     ),
 }
+HUNG = pf.Pad.measured(1e5, 0.4)
+MODELS["face"] = lambda law: pf.DistributedModel(
+    FEW, law if law.numbers.sigma_1 == 0.0 else replace(law, sigma_1=0.0), pad=HUNG
+)
 UNKNOWN = {("table", "creep"), ("ellipsoid", "creep")}
 """Models that do not take a law."""
-QUICK, SLOW = ("points", "ellipsoid", "pad"), pytest.mark.slow
+QUICK, SLOW = ("points", "ellipsoid", "pad", "face"), pytest.mark.slow
 WARNINGS = *STRICT, "-Wconversion", "-Wshadow"
 
 

@@ -68,6 +68,16 @@ PADS = {
     "metric at a load": lambda: pf.DistributedModel(METRIC, LAW, pad=_AT_LOAD),
 }
 """Models on elastic pads."""
+_QUIET = pf.LuGre(mu_s=1.2, sigma_1=0.0, elasto_plastic=0.9)
+HUNG = {
+    "half-space": lambda: pf.ReducedModel(
+        FEW, _QUIET, cells=8, pad=pf.Pad.half_space(2e6, 0.4)
+    ),
+    "measured": lambda: pf.DistributedModel(
+        FEW, pf.LuGre(mu_s=1.2, sigma_1=0.0, sigma_2=0.2), pad=pf.Pad.measured(1e5, 0.4)
+    ),
+}
+"""Models on pads whose face hangs on its back."""
 FOLLOWING["soft layer"] = lambda: pf.ReducedModel(
     FOLLOWING["soft"]().patch, LAW, pad=_LAYER
 )
@@ -139,7 +149,7 @@ def library(
     name: str, precision: str = "double", *options: str, patches: int = 1
 ) -> Library:
     """Compile the model called `name` once, without a warning, and load it."""
-    model = (MODELS | FOLLOWING | TURNED | PADS)[name]()
+    model = (MODELS | FOLLOWING | TURNED | PADS | HUNG)[name]()
     folder = Path(_folder().name) / "-".join([name, precision, str(patches), *options])
     pf.export_c(model, folder, precision=precision, patches=patches)
     (folder / "driver.c").write_text(DRIVER)
@@ -191,13 +201,16 @@ def samples(model: Any, kind: type, count: int, seed: int = 0) -> list[np.ndarra
 def slopes_type(model: Any, kind: type) -> np.dtype:
     """Return the record of derivatives of a model."""
     states = int(np.prod(model.state_shape))
-    own = model.state_shape[0]
-    pad = getattr(model, "pad", None)
-    count = 6 + bool(model.law.elasto_plastic) - (pad == _LAYER)
+    own = model.reduction.patch.bristles if model.pad else model.state_shape[0]
+    pad = model.pad
+    face = pad is not None and model.compiled.compliance is not None
+    count = 6 + bool(model.law.elasto_plastic) - (pad == _LAYER) - 2 * face
     shapes = {
         "wrench_state": (3, states), "wrench_twist": (3, 3), "wrench_load": (3,), "wrench_params": (3, count),
-        "state_state": (states, own), "state_twist": (states, 3), "state_params": (states, count),
+        "state_state": (states, own),
     }  # fmt: skip
+    shapes |= {"state_face": (states, 3), "face_state": (3, states)} if face else {}
+    shapes |= {"state_twist": (states, 3), "state_params": (states, count)}
     shapes |= {} if pad is None else {"state_load": (states,)}
     return np.dtype([(name, kind, shape) for name, shape in shapes.items()])
 

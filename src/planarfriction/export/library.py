@@ -236,6 +236,7 @@ def _texts(
     }
     tables |= {} if slip is None else slip.tables
     step = functions["step"].splitlines()
+    body = body_of(model, pieces, precision, given["patches"])
     vector = Writer(precision, own=precision == "double")
     share = (
         "(at->low[k] + at->part * (at->high[k] - at->low[k]))"
@@ -279,10 +280,15 @@ def _texts(
                 f"{type(model).__name__} of {model.patch.name or 'a patch'}, {type(model.law).__name__}"
             ),
             "digest": hashlib.sha256(
-                "\n".join([functions["step"], repr(tables)]).encode()
+                "\n".join(
+                    [
+                        functions["step"],
+                        repr(tables) + pieces.face * repr(body["tables"]),
+                    ]
+                ).encode()
             ).hexdigest()[:16],
             "pieces": pieces,
-            "states": pieces.count * pieces.states,
+            "states": pieces.all_states,
             "precision": precision,
             "parameters": {
                 each: (writer.constant(value), PARAMETERS[each][0])
@@ -298,7 +304,7 @@ def _texts(
             "slip": slip and slip.words,
             "passes": passes,
             "turns": turns,
-            "body": body_of(model, precision, given["patches"]),
+            "body": body,
             "share": share,
             "own": own,
             "samples": samples_of(model, slip, writer, pieces.tables.get("rungs")),
@@ -319,8 +325,13 @@ def _places(pieces: Pieces) -> list[str]:
 
 
 def _pattern(pieces: Pieces) -> list[int]:
-    """Return rows, columns, starts of columns and rows of entries of the derivative of new states by states."""
-    states = pieces.count * pieces.states
+    """Return rows, columns, starts of columns and rows of entries of the derivative of new states by states.
+
+    A face moves all of them: behind rows and columns, 1 stands for all entries.
+    """
+    states = pieces.all_states
+    if pieces.face:
+        return [states, states, 1]
     rows = [
         c % pieces.count + pieces.count * i
         for c in range(states)

@@ -74,7 +74,7 @@ class Loops:
         if kernel in self.replaced:
             return (
                 self.replaced[kernel](arguments),
-                [isinstance(x, (CStruct, Scalar)) for x in leaves(arguments)],
+                [isinstance(x, (CStruct, Scalar, int)) for x in leaves(arguments)],
                 None,
             )
         straight = kernel.py_func.__module__ == surfaces.__name__

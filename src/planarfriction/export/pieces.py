@@ -114,18 +114,25 @@ class Pieces(NamedTuple):
 
     Derivatives are by states, twist, parameters and, of a pad, by the load of the cell, which is `carried`."""
     turns: Callable[[], Block] | None = None
-    """Trace the wrench per unit load and, row by row, its derivatives by the twist; not of pads."""
+    """Trace the wrench per unit load and, row by row, its derivatives by the twist."""
     rungs: int = 0
     """Number of loads, the table `rungs`, that `share` [rungs, count] is for; 0 for a fixed shape."""
     pad: bool = False
     """True for pieces of a pad, which see their loads."""
     moves: bool = False
     """True if the patch moves where pressures that follow moments cannot be had by other shares."""
+    face: bool = False
+    """True for pieces of a pad with a compliance in common: three states of its face follow those of the cells."""
 
     @property
     def columns(self) -> int:
         """Number of derivatives of a number of a cell."""
         return self.states + 3 + len(self.parameters) + self.pad
+
+    @property
+    def all_states(self) -> int:
+        """Number of states of all cells and of the face."""
+        return self.count * self.states + 3 * self.face
 
 
 def pieces_of(
@@ -133,12 +140,11 @@ def pieces_of(
 ) -> Pieces:
     """Take a model apart for a `precision` of `library.PRECISIONS`.
 
-    Only one of a `fixed` shape, or also cells whose pressure follows the load. If it has fewer cells than `count`,
-    others without load follow.
+    Only one of a `fixed` shape without a face, or also cells whose pressure follows the load, and pads with a common
+    compliance. If it has fewer cells than `count`, others without load follow.
 
     Raises InvalidValueError for models without straight-line source: laws of the user's own, other patches whose shape
-    depends on the load, friction that differs from cell to cell in other ways than by a metric, pads with a common
-    compliance.
+    depends on the load, friction that differs from cell to cell in other ways than by a metric.
     """
     whole = model.reduction if isinstance(model, ReducedModel) else model
     law = getattr(model, "law", None)
@@ -155,6 +161,8 @@ def pieces_of(
                 raise InvalidValueError(
                     "model", rule, model.patch.name or "a patch that does"
                 )
+            if fixed:
+                refuse_common(whole, "Warp")
             return taken_apart(whole, precision, count)
     names = ", ".join(kind.__name__ for kind in (*_KINDS, ReducedModel))
     given = f"{type(model).__name__}, {type(law).__name__}"
@@ -246,7 +254,6 @@ def _cell(size: int, pad: bool, precision: str) -> tuple[Any, Any, Any]:
 
 
 def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
-    refuse_common(model, "source code")
     if model.patch.asymmetry is not None:
         raise InvalidValueError("model", "have no asymmetry", model.patch.asymmetry)
     numbers = model.compiled.numbers()
@@ -256,8 +263,9 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     more = max(count - model.patch.cells, 0)
     n = model.patch.cells + more
     cell, plain, sliding = _cell(size, kind.pad, precision)
-    # Pads whose stiffness is their own do not feel sigma_0.
-    constant = () if model.compiled.springs else ("sigma_0",)
+    face = model.compiled.compliance is not None
+    # Pads whose stiffness is their own do not feel sigma_0, and behind a common compliance nothing damps.
+    constant = ("sigma_0",) * (not model.compiled.springs) + ("sigma_1",) * face
     parameters = _parameters(law, constant)
     by = cells_rollout.by_of(kind.path, kind.pad)
     lever = twin(kind.lever)
@@ -267,17 +275,17 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     names += ["gyration"] * (size == 3)
 
     def given(trace: Trace, load: str) -> tuple[Any, Any, Any]:
-        """Return the numbers of the lever, the law of the cell under a load, and its velocity."""
+        """Return the numbers of the lever, the law of the cell under its load or a share of all, and its velocity."""
         own = _vector(trace, *(f"{name}[k]" for name in names))
         found: Any = _law(trace, law, constant)
         if kind.pad:
             found = Elastic(found, *_vector(trace, "stiff[k]", load))
+            if load == "normal_force":
+                found = found._replace(load=Number(trace, "shares[k]") * found.load)
         return own, found, lever.seen(own, _vector(trace, *_TWIST))
 
     def step(trace: Trace) -> Any:
         own, found, u = given(trace, "normal_force")
-        if kind.pad:
-            found = found._replace(load=Number(trace, "shares[k]") * found.load)
         dt = Number(trace, "dt")
         new, traction = twin(cell)(found, _state(trace, size, n), u, dt)
         return new, lever.wrench(own, traction)
@@ -292,7 +300,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         return lever.wrench(own, twin(plain)(found, z, u, 0.0)[1])
 
     def slopes(trace: Trace, turns: bool = False) -> Any:
-        own, found, u = given(trace, "carried")
+        own, found, u = given(trace, "normal_force" if turns else "carried")
         written = derive(cell, by, {"z": size, "u": size})
         forth = twin(written.forth)
         back = twin(written.back)
@@ -341,9 +349,10 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
         parameters,
         traced(steady),
         lambda: traced(slopes),
-        None if kind.pad else lambda: traced(functools.partial(slopes, turns=True)),
+        lambda: traced(functools.partial(slopes, turns=True)),
         rungs,
         kind.pad,
+        face=face,
     )
 
 

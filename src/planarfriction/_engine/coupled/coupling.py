@@ -39,7 +39,11 @@ from planarfriction._engine.coupled.coupling_rows import (
     Patches,
     read,
 )
-from planarfriction._engine.coupled.coupling_steps import step_all, write_load_slopes
+from planarfriction._engine.coupled.coupling_steps import (
+    step_all,
+    step_all_with_slopes,
+    write_load_slopes,
+)
 from planarfriction._engine.coupled.face import hang, unhang
 from planarfriction._engine.coupled.following import follow
 
@@ -65,6 +69,9 @@ PATIENCE = 10
 
 NEAR = 10.0
 """Misfit of the guess, over the tolerance, up to which a Newton step goes from there: rest need not be tried."""
+
+SHARP = 1e-2
+"""Share of the least misfit that a step on pads leaves at most where the next may keep its slopes."""
 
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""
@@ -257,7 +264,7 @@ def _go(
             p.twist[i] = p.gap[i] + far * p.move[i]
         if not keep_loads:
             _load(patches, p)
-        step_all(patches, p, patches.steps)
+        step_all(patches, p)
         here = _slope(patches, p)
         passed = first > 0.0 and not here >= 0.0 if careful else too_far(first, here)
         if whole or not passed or shortening == most:
@@ -313,16 +320,16 @@ def _largest_speed(patches: Patches, p: ContactSolve) -> float:
 def _start(patches: Patches, p: ContactSolve, tolerance: float) -> tuple[float, bool]:
     """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
     _host(patches, p)
-    step_all(patches, p, patches.steps)
+    step_all(patches, p)
     misfit = _misfit(patches, p)
     if misfit > NEAR * tolerance:
         clear(p.twist, 3 * patches.count)
-        step_all(patches, p, patches.steps)
+        step_all(patches, p)
         at_rest = _misfit(patches, p)
         if at_rest <= misfit:
             return at_rest, True
         _host(patches, p)
-        step_all(patches, p, patches.steps)
+        step_all(patches, p)
     return misfit, False
 
 
@@ -367,12 +374,27 @@ def _restrain(patches: Patches, p: ContactSolve) -> None:
 
 
 @kernel
+def _stick(patches: Patches, p: ContactSolve) -> None:
+    """Write the slopes of pads that stick all over."""
+    for k in range(patches.count):
+        for i in range(9 * k, 9 * k + 9):
+            elastic = p.dt[0] * patches.stuck[i]
+            per = 1.0 / p.load[k] if p.load[k] > 0.0 else 0.0
+            p.unit_slopes[i] = -per * elastic - patches.viscous[i]
+
+
+@kernel
 def _search(
     patches: Patches, p: ContactSolve, tolerance: float, most: int, careful: bool
 ) -> tuple[float, bool]:
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
     misfit, rest = _start(patches, p, tolerance)
     best = math.inf
+    known = False
+    if patches.soft > 0:
+        known = rest and not careful
+        if known:
+            _stick(patches, p)
     for iteration in range(most + 1):
         p.iterations[0] = iteration
         if misfit < best:
@@ -382,13 +404,16 @@ def _search(
             break
         keep_loads = iteration % ROUND >= JOINT
         # Dear: not before they are needed, which at rest they are not.
-        step_all(patches, p, patches.slopes)
+        if not known:
+            step_all_with_slopes(patches, p)
         write_load_slopes(patches, p)
         if not _newton(patches, p, keep_loads, False):
             _newton(patches, p, keep_loads, True)
         _go(patches, p, keep_loads, rest, careful)
         rest = False
         misfit = _misfit(patches, p)
+        if patches.soft > 0:
+            known = misfit <= SHARP * best and not careful
     if not misfit <= best:
         _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best
@@ -407,7 +432,7 @@ def find(
     accepted = tolerance
     if best > tolerance:
         if not current:
-            step_all(patches, p, patches.steps)
+            step_all(patches, p)
         accepted = xp.maximum(tolerance, PRECISION * _largest_speed(patches, p))
         current = True
     if best > accepted and again:
@@ -422,7 +447,7 @@ def find(
             current = False
             _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
     if not current:
-        step_all(patches, p, patches.steps)
+        step_all(patches, p)
     return best, accepted
 
 

@@ -176,6 +176,12 @@ class Patches(NamedTuple):
     """Lever arms of the patches that turn spins into speeds [m], [k]."""
     pad: Integers
     """1 of pads, whose bristles see their loads; 0 of others, [k]."""
+    soft: int
+    """1 if all of them are pads, else 0."""
+    stuck: Doubles
+    """Stiffnesses of the bristles of pads while all of them stick, [k, 9]; 0 of others."""
+    viscous: Doubles
+    """Viscous friction of these per unit load, [k, 9]."""
     bristle: Integers
     """Components of the bristles of each patch, [k]."""
     compliance: Doubles

@@ -65,26 +65,38 @@ def write_load_slopes(patches: Patches, p: ContactSolve) -> None:
 
 
 @kernel
-def step_all(patches: Patches, p: ContactSolve, functions: Integers) -> None:
-    """Step all patches at the twists of a problem: write the new state and wrenches per unit load.
+def _step_acting(
+    patches: Patches, p: ContactSolve, functions: Integers, k: int
+) -> None:
+    """Step patch k at the twist of a problem: write the new state and the wrench per unit load."""
+    seen = p.seen
+    dx = p.shift[2 * k]
+    dy = p.shift[2 * k + 1]
+    spin = p.twist[3 * k + 2]
+    if p.acting[k] == 0:
+        clear(p.step, 12)
+    else:
+        seen[0] = p.twist[3 * k] - spin * dy
+        seen[1] = p.twist[3 * k + 1] + spin * dx
+        seen[2] = spin
+        step_patch(patches, p, functions, k, p.load[k])
+        if dx != 0.0 or dy != 0.0:
+            _bring_back(p.step, dx, dy)
+    for i in range(3):
+        p.unit[3 * k + i] = p.step[i]
 
-    `functions` are those of `Patches`: its `steps`, or its `slopes`, which write the slopes of the wrenches as well.
-    """
+
+@kernel
+def step_all(patches: Patches, p: ContactSolve) -> None:
+    """Step all patches at the twists of a problem: write the new state and wrenches per unit load."""
     for k in range(patches.count):
-        seen = p.seen
-        dx = p.shift[2 * k]
-        dy = p.shift[2 * k + 1]
-        spin = p.twist[3 * k + 2]
-        if p.acting[k] == 0:
-            clear(p.step, 12)
-        else:
-            seen[0] = p.twist[3 * k] - spin * dy
-            seen[1] = p.twist[3 * k + 1] + spin * dx
-            seen[2] = spin
-            step_patch(patches, p, functions, k, p.load[k])
-            if dx != 0.0 or dy != 0.0:
-                _bring_back(p.step, dx, dy)
-        for i in range(3):
-            p.unit[3 * k + i] = p.step[i]
+        _step_acting(patches, p, patches.steps, k)
+
+
+@kernel
+def step_all_with_slopes(patches: Patches, p: ContactSolve) -> None:
+    """Step all patches and write the slopes of the wrenches by the twists as well."""
+    for k in range(patches.count):
+        _step_acting(patches, p, patches.slopes, k)
         for i in range(9):
             p.unit_slopes[9 * k + i] = p.step[3 + i]

@@ -21,12 +21,12 @@ HOST = 12
 
 
 @kernel
-def _bent(patches: Patches, p: ContactSolve, k: int, i: int, w: Doubles) -> float:
+def bent(patches: Patches, p: ContactSolve, k: int, i: int, w: Doubles) -> float:
     """Return element i of `b + C W` of patch k under the wrenches `w` [3k]."""
-    bent = p.state[patches.firsts[k + 1] - 3 + i]
+    off = p.state[patches.firsts[k + 1] - 3 + i]
     for j in range(3):
-        bent += patches.compliance[9 * k + 3 * i + j] * w[3 * k + j]
-    return bent
+        off += patches.compliance[9 * k + 3 * i + j] * w[3 * k + j]
+    return off
 
 
 @kernel
@@ -35,8 +35,8 @@ def add_faces(patches: Patches, p: ContactSolve, w: Doubles, twist: Doubles) -> 
     for k in range(patches.count):
         if patches.lag[k] > 0.0:
             for i in range(3):
-                bent = _bent(patches, p, k, i, w)
-                twist[3 * k + i] += bent / (p.dt[0] + patches.lag[k])
+                off = bent(patches, p, k, i, w)
+                twist[3 * k + i] += off / (p.dt[0] + patches.lag[k])
 
 
 @kernel
@@ -52,17 +52,14 @@ def _guess(patches: Patches, p: ContactSolve, k: int) -> None:
 
 
 @kernel
-def hang(patches: Patches, p: ContactSolve) -> None:
-    """Write the faces in place of the host, whose numbers are kept."""
+def soften(patches: Patches, p: ContactSolve) -> None:
+    """Add the compliances of the faces to the response of the host, and turn its twists into those of faces."""
     n = 3 * patches.count
     for k in range(patches.count):
         if patches.lag[k] > 0.0:
-            kept = at(p.host, HOST * k)
             _guess(patches, p, k)
             for i in range(3):
                 row = at(p.response, n * (3 * k + i) + 3 * k)
-                copy(row, at(kept, 3 * i), 3)
-                kept[9 + i] = p.free_twist[3 * k + i]
                 for j in range(3):
                     soft = patches.compliance[9 * k + 3 * i + j]
                     row[j] += soft / (p.dt[0] + patches.lag[k])
@@ -70,17 +67,41 @@ def hang(patches: Patches, p: ContactSolve) -> None:
 
 
 @kernel
-def unhang(patches: Patches, p: ContactSolve) -> None:
-    """Write the host's numbers back, its twists, and the new displacements of the faces."""
+def move_faces(patches: Patches, p: ContactSolve) -> None:
+    """Write the new displacements of the faces under the wrenches."""
+    for k in range(patches.count):
+        if patches.lag[k] > 0.0:
+            last = patches.firsts[k + 1] - 3
+            for i in range(3):
+                off = bent(patches, p, k, i, p.wrench) / (p.dt[0] + patches.lag[k])
+                b = p.state[last + i] - off * p.dt[0]
+                p.new[last + i] = b if p.load[k] > 0.0 else 0.0
+
+
+@kernel
+def hang(patches: Patches, p: ContactSolve) -> None:
+    """Write the faces in place of the host, whose numbers are kept."""
     n = 3 * patches.count
     for k in range(patches.count):
         if patches.lag[k] > 0.0:
             kept = at(p.host, HOST * k)
-            last = patches.firsts[k + 1] - 3
+            for i in range(3):
+                row = at(p.response, n * (3 * k + i) + 3 * k)
+                copy(row, at(kept, 3 * i), 3)
+                kept[9 + i] = p.free_twist[3 * k + i]
+    soften(patches, p)
+
+
+@kernel
+def unhang(patches: Patches, p: ContactSolve) -> None:
+    """Write the host's numbers back, its twists, and the new displacements of the faces."""
+    n = 3 * patches.count
+    move_faces(patches, p)
+    for k in range(patches.count):
+        if patches.lag[k] > 0.0:
+            kept = at(p.host, HOST * k)
             for i in range(3):
                 copy(at(kept, 3 * i), at(p.response, n * (3 * k + i) + 3 * k), 3)
                 p.free_twist[3 * k + i] = kept[9 + i]
-                bent = _bent(patches, p, k, i, p.wrench) / (p.dt[0] + patches.lag[k])
-                p.twist[3 * k + i] -= bent
-                b = p.state[last + i] - bent * p.dt[0]
-                p.new[last + i] = b if p.load[k] > 0.0 else 0.0
+                off = bent(patches, p, k, i, p.wrench) / (p.dt[0] + patches.lag[k])
+                p.twist[3 * k + i] -= off

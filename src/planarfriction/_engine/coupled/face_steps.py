@@ -15,23 +15,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from planarfriction._engine.bristles.bristle_step import cap
-from planarfriction._engine.cells.cell_blocks import scratch
-from planarfriction._engine.codegen.small_matrices import inverse
-from planarfriction._engine.codegen.vectors import (
-    Vector,
-    clear,
-    copy,
-    dot,
-    matrix_applied,
-    matrix_applied_back,
-    matrix_product,
-    plus,
-    put,
-    reader_of,
-    three,
-    times,
-)
+from planarfriction._engine.codegen.small_matrices import solved
+from planarfriction._engine.codegen.vectors import clear, copy
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import entry, kernel
 from planarfriction._engine.compiler.calls import call
@@ -43,7 +28,9 @@ from planarfriction._engine.compiler.memory import (
     reader,
 )
 from planarfriction._engine.coupled.coupling import ROUNDING
-from planarfriction._engine.coupled.coupling_rows import Patches, read
+from planarfriction._engine.coupled.coupling_rows import ContactSolve, Patches, read
+from planarfriction._engine.coupled.coupling_steps import step_patch
+from planarfriction._engine.coupled.face import bent, move_faces
 
 TRIES = 20
 """Steps of the bristles at most, before the search of `coupling`."""
@@ -70,88 +57,111 @@ class Hanging(NamedTuple):
 
 
 _read = reader(Hanging)
-_nine = reader_of(9)
 
 
 @kernel
-def _product(a: Vector, b: Vector) -> Vector:
-    """Return the matrix `a b'` [3, 3]."""
-    return (
-        *times(a[0], b),
-        *times(a[1], b),
-        *times(a[2], b),
-    )
+def _held(own: Hanging, p: ContactSolve, i: int, x: Doubles) -> float:
+    """Return element i of the wrench by which bristles that stick hold against a twist."""
+    held = 0.0
+    for j in range(3):
+        held += p.dt[0] * own.stuck[3 * i + j] * x[j]
+        held += p.load[0] * own.viscous[3 * i + j] * x[j]
+    return held
 
 
 @kernel
-def _largest(twist: Vector, lever: float) -> float:
-    """Return the largest speed of a twist."""
-    return xp.maximum(xp.maximum(abs(twist[0]), abs(twist[1])), lever * abs(twist[2]))
+def _start(own: Hanging, patches: Patches, p: ContactSolve, h: float) -> None:
+    """Write a first twist of the face, and the slopes of `-r` by it into `matrix`.
+
+    Friction holds a share of the wrench of bristles that stick.
+    """
+    for j in range(3):
+        clear(p.change, 3)
+        p.change[j] = 1.0
+        for i in range(3):
+            p.move[i] = _held(own, p, i, p.change)
+        for i in range(3):
+            slope = p.change[i]
+            for m in range(3):
+                slope += patches.compliance[3 * i + m] * p.move[m] / h
+            p.matrix[3 * i + j] = slope
+    copy(p.matrix, p.slopes, 9)
+    copy(p.free_twist, p.change, 3)
+    solved(p.slopes, p.change, 3)
+    x = _held(own, p, 0, p.change)
+    y = _held(own, p, 1, p.change)
+    turn = _held(own, p, 2, p.change) / patches.radius[0]
+    size = math.sqrt(x * x + y * y + turn * turn)
+    largest = own.limit * p.load[0]
+    part = largest / size if size > largest else 1.0
+    for i in range(3):
+        p.twist[i] = p.free_twist[i] + part * (p.change[i] - p.free_twist[i])
+        for j in range(3):
+            one = 1.0 if i == j else 0.0
+            p.matrix[3 * i + j] = one + part * (p.matrix[3 * i + j] - one)
 
 
 @kernel
-def _start(
-    own: Hanging, patches: Patches, twist: Vector, load: float, dt: float, h: float
-) -> tuple[Vector, Vector]:
-    """Return a first twist of the face, and the matrix that turns residuals into changes of it, [3, 3]."""
-    soft = _nine(patches.compliance, 0, 1)
-    held = plus(times(dt, _nine(own.stuck, 0, 1)), load, _nine(own.viscous, 0, 1))
-    yields = times(-1.0 / h, matrix_product(soft, held))
-    pull = matrix_applied(held, matrix_applied(inverse(1.0, yields), twist))
-    turn = pull[2] / patches.radius[0]
-    size = math.sqrt(pull[0] * pull[0] + pull[1] * pull[1] + turn * turn)
-    share = cap(size, own.limit * load)
-    face = plus(twist, -share / h, matrix_applied(soft, pull))
-    return face, inverse(1.0, times(share, yields))
+def _try(patches: Patches, p: ContactSolve, h: float) -> bool:
+    """Step at the twist of the face and write the residual into `gap`; return True where it is rounding."""
+    copy(p.twist, p.seen, 3)
+    step_patch(patches, p, patches.steps, 0, p.load[0])
+    off = 0.0
+    speed = 0.0
+    for i in range(3):
+        p.unit[i] = p.step[i]
+        p.wrench[i] = p.load[0] * p.step[i]
+    for i in range(3):
+        lever = patches.radius[0] if i == 2 else 1.0
+        b = p.state[patches.firsts[1] - 3 + i]
+        moved = bent(patches, p, 0, i, p.wrench)
+        p.gap[i] = p.free_twist[i] - p.twist[i] + moved / h
+        off = xp.maximum(off, lever * abs(p.gap[i]))
+        fast = abs(p.free_twist[i]) + (abs(b) + abs(moved - b)) / h
+        speed = xp.maximum(speed, lever * fast)
+    return off <= p.tolerance[0] * speed
 
 
 @kernel
-def _found(
-    own: Hanging, patches: Patches, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles
-) -> bool:  # fmt: skip
-    """Step with the face that Broyden's method finds; return False if it does not."""
-    soft = _nine(patches.compliance, 0, 1)
+def _learn(patches: Patches, p: ContactSolve) -> None:
+    """Mend the slopes by the residual that is left of the last change of the face's twist."""
     lever = patches.radius[0]
-    last = patches.states - 3
-    b = three(at(z, last))
-    twist = three(v)
-    load = v[3]
-    h = dt + patches.lag[0]
-    face, inverse_slope = _start(own, patches, twist, load, dt, h)
-    seen = scratch(4)
-    seen[3] = load
-    change = times(0.0, face)
-    residual = change
+    p.move[0] = p.change[0]
+    p.move[1] = p.change[1]
+    p.move[2] = lever * lever * p.change[2]
+    size = 0.0
+    for i in range(3):
+        size += p.move[i] * p.change[i]
+    per = 1.0 / size if size != 0.0 else 0.0
+    for i in range(3):
+        for j in range(3):
+            p.matrix[3 * i + j] -= per * p.gap[i] * p.move[j]
+
+
+@kernel
+def found(own: Hanging, patches: Patches, p: ContactSolve) -> bool:
+    """Step with the face that Broyden's method finds; return False if it does not.
+
+    The tolerance of the problem is that in the largest speed.
+    """
+    h = p.dt[0] + patches.lag[0]
+    _start(own, patches, p, h)
     for i in range(TRIES):
-        put(seen, face)
-        call(patches.steps[0], (own.pieces, z, seen, dt, new, out))
-        wrench = times(load, three(out))
-        pulled = matrix_applied(soft, wrench)
-        bent = plus(b, 1.0, pulled)
-        now = plus(plus(twist, -1.0, face), 1.0 / h, bent)
-        if i > 0:
-            caused = matrix_applied(inverse_slope, plus(residual, -1.0, now))
-            weighed = (change[0], change[1], lever * lever * change[2])
-            row = matrix_applied_back(inverse_slope, weighed)
-            along = dot(weighed, caused)
-            per = 1.0 / along if along != 0.0 else 0.0
-            missing = times(per, plus(change, -1.0, caused))
-            inverse_slope = plus(inverse_slope, 1.0, _product(missing, row))
-        residual = now
-        speed = _largest(twist, lever)
-        speed += (_largest(b, lever) + _largest(pulled, lever)) / h
-        if _largest(residual, lever) <= ROUNDING * speed:
-            put(at(new, last), plus(b, -dt / h, bent))
+        if _try(patches, p, h):
+            move_faces(patches, p)
             return True
-        change = matrix_applied(inverse_slope, residual)
-        face = plus(face, 1.0, change)
+        if i > 0:
+            _learn(patches, p)
+        copy(p.matrix, p.slopes, 9)
+        copy(p.gap, p.change, 3)
+        solved(p.slopes, p.change, 3)
+        for j in range(3):
+            p.twist[j] += p.change[j]
     return False
 
 
 @kernel
-def _search(
-    own: Hanging, patches: Patches, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, row: Doubles,
-) -> None:  # fmt: skip
+def _search(own: Hanging, patches: Patches, z: Doubles, v: Doubles, dt: float, row: Doubles) -> None:  # fmt: skip
     """Step as `coupling` does, whose host does not yield here; its problem is `row`."""
     clear(row, own.words)
     p = arrays_at(patches.row, row)
@@ -163,10 +173,8 @@ def _search(
     copy(z, p.state, patches.states)
     p.records[0] = own.pieces
     call(patches.solve, (own.patches, row))
-    copy(p.new, new, patches.states)
-    copy(p.unit, out, 3)
     if p.converged[0] == 0.0:
-        out[0] = math.nan
+        p.unit[0] = math.nan
 
 
 @entry
@@ -176,5 +184,15 @@ def step(
     """Implement `protocol.StepFunctions.step`; behind the wrench is scratch, and no number is in it if all fails."""
     own = _read(contact)
     patches = read(own.patches)
-    if not _found(own, patches, z, v, dt, new, out):
-        _search(own, patches, z, v, dt, new, out, at(out, 3))
+    row = at(out, 3)
+    p = arrays_at(patches.row, row)
+    p.dt[0] = dt
+    p.tolerance[0] = ROUNDING
+    copy(v, p.free_twist, 3)
+    p.load[0] = v[3]
+    copy(z, p.state, patches.states)
+    p.acting[0] = own.pieces
+    if not found(own, patches, p):
+        _search(own, patches, z, v, dt, row)
+    copy(p.new, new, patches.states)
+    copy(p.unit, out, 3)

@@ -86,6 +86,12 @@ class CompiledModel:
     """Common compliance of a pad about the origin `[3, 3]` (see `coupled.face`)."""
     lag = 0.0
     """Lag of a pad with a common compliance [s]."""
+
+    @property
+    def held(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness of the bristles of a pad that sticks, and viscous friction per unit load, `[3, 3]` each."""
+        return np.zeros((3, 3)), np.zeros((3, 3))
+
     rollouts: Any = None
     """The model as the loops of rollouts see it, once `derivatives` has packed it."""
     behind = 0

@@ -57,6 +57,19 @@ class CompiledDistributed(CompiledModel):
         return functions_of_cells(self.size, self.patch.anisotropic, self.sort)
 
     @property
+    def held(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `CompiledModel`."""
+        if self.stiff is None:
+            return super().held
+        law = self.law.numbers
+        levers = self.patch.levers()
+        shares = self.patch.areas / self.patch.areas.sum()
+        by = "n,nda,ndb->ab"
+        stuck = np.einsum(by, law.sigma_0 * self.stiff, levers, levers)
+        damps = law.sigma_1 + law.sigma_2
+        return stuck, damps * np.einsum(by, shares, levers, levers)
+
+    @property
     def sort(self) -> str:
         """Sort of bristles (see `cells.cell_loops.KINDS`)."""
         if self.stiff is not None:

@@ -57,14 +57,10 @@ class CompiledSoft(CompiledDistributed):
         return self._hung(self._pieces.under(given))
 
     def _hung(self, pieces: PackedModel) -> PackedModel:
-        law = self.law.numbers
-        levers = self.patch.levers()
-        shares = self.patch.areas / self.patch.areas.sum()
-        by = "n,nda,ndb->ab"
-        stuck = np.einsum(by, law.sigma_0 * self.stiff, levers, levers)
-        viscous = law.sigma_2 * np.einsum(by, shares, levers, levers)
+        stuck, viscous = self.held
         alone = self._alone.patches
-        face = Hanging(0, alone.address, self.behind, law.mu_s, stuck, viscous)
+        limit = self.law.numbers.mu_s
+        face = Hanging(0, alone.address, self.behind, limit, stuck, viscous)
         records = rows_of(face, len(pieces.records), pieces=places_of(pieces.records))
         kept = (*pieces.keepalive, pieces.records, stuck, viscous, alone.words)
         return pieces._replace(

@@ -152,7 +152,7 @@ def _slope(own, patches):
     copy(problem.free_twist, problem.twist, n)
     add_faces(patches, problem, problem.guess, problem.twist)
     copy(problem.free_load, problem.load, own.host.count)
-    step_all(patches, problem, patches.steps)
+    step_all(patches, problem)
     total = 0.0
     for i in range(n):
         total += own.scratch.move[i] * (
