@@ -209,13 +209,17 @@ def _share_of(
     step: Plane,
 ) -> float:
     """Return the share of a step to go: all, or to about where the dual is least along the step."""
-    first = _slopes(x, y, w, n, total, s, plane, step)[0]
     low = 0.0
     high = 1.0
     far = 1.0
-    for _ in range(SHORTENINGS):
+    first = 0.0
+    for i in range(SHORTENINGS):
         slope, rise = _slopes(x, y, w, n, total, s, _stepped(plane, far, step), step)
-        if not (abs(slope) > OVERSHOT * abs(first)) or (far == 1.0 and slope < 0.0):
+        if far == 1.0 and slope < 0.0:
+            break
+        if i == 0:
+            first = _slopes(x, y, w, n, total, s, plane, step)[0]
+        if not abs(slope) > OVERSHOT * abs(first):
             break
         low, high = (low, far) if slope > 0.0 else (far, high)
         next_one = far - slope / rise

@@ -7,81 +7,16 @@ from typing import Any
 import numpy as np
 
 from planarfriction._engine.cells import edge_cells, following_cells
+from planarfriction._engine.cells.given_pressure import OWN, GivenPressure, Pressed
 from planarfriction._engine.cells.moment_pressure import NARROW
-from planarfriction._engine.compiler.memory import place_of, places_of, row_of, rows_of
-from planarfriction._engine.protocol import calls_of
+from planarfriction._engine.compiler.memory import places_of, row_of, rows_of
+from planarfriction._engine.protocol import ModelFunctions, calls_of
 from planarfriction._engine.records.distributed import CompiledDistributed
 from planarfriction._engine.records.packed import PackedModel
 from planarfriction.errors import InvalidValueError
 
 SMALLEST = 1e-9
 """Least radius of the disc that a cell stands for [m]: a point without size is covered or not."""
-
-
-def under_edge(
-    compiled: CompiledDistributed, packed: PackedModel, outline: np.ndarray
-) -> PackedModel:
-    """Return packed cells that carry load where the body is above them, whose `outline` is `[M, 2]` [m].
-
-    Raises InvalidValueError for an outline around nothing.
-    """
-    (weights, cells) = packed.keepalive
-    chosen = packed.cells
-    patch = compiled.patch
-    x, y = np.ascontiguousarray(patch.positions[chosen].T)
-    # A disc of the same area.
-    sides = np.sqrt(patch.cell_extents()[chosen].prod(axis=1) / np.pi)
-    radii = np.maximum(
-        np.where(patch.radii[chosen] > 0.0, patch.radii[chosen], sides), SMALLEST
-    )
-    centre = np.array([x.mean(), y.mean()])
-    middle = np.append(centre, (np.hypot(x - centre[0], y - centre[1]) + radii).max())
-    # A corner may stand there twice.
-    outline = outline[(outline != np.roll(outline, 1, axis=0)).any(axis=1)]
-    ahead = np.roll(outline, -1, axis=0)
-    area = 0.5 * float(
-        (outline[:, 0] * ahead[:, 1] - outline[:, 1] * ahead[:, 0]).sum()
-    )
-    if area == 0.0:
-        raise InvalidValueError(
-            "outline", "enclose an area where a contact has an edge", "none"
-        )
-    corners = np.ascontiguousarray(outline if area > 0.0 else outline[::-1])
-    shapes = {"rate": packed.states, "by_place": (3, packed.states), "wrench": 3}
-    for name in ("held", "trial"):
-        shapes |= {f"{name}_weights": len(x), f"{name}_cells": cells.shape}
-    room = {name: np.zeros(shape) for name, shape in shapes.items()}
-    held, trial = (
-        row_of(compiled.record(room[f"{name}_cells"], room[f"{name}_weights"])[0])
-        for name in ("held", "trial")
-    )
-    arrays = {
-        "x": x,
-        "y": y,
-        "radii": radii,
-        "middle": middle,
-        "outline": corners,
-        "weights": weights,
-        "cells": cells,
-    }
-    arrays |= {"calls": calls_of(packed.functions), **room}
-    record = edge_cells.EdgeContact(
-        **arrays, count=len(x), numbers=len(cells), turned=patch.anisotropic, discs=compiled.size == 3,
-        corners=len(corners), whole=place_of(packed.records), held=place_of(held), trial=place_of(trial),
-        states=packed.states,
-    )  # fmt: skip
-    return packed._replace(
-        functions=edge_cells.FUNCTIONS,
-        records=rows_of(
-            record,
-            len(weights),
-            weights=places_of(weights),
-            whole=places_of(packed.records),
-        ),
-        workspace=edge_cells.OWN + packed.workspace,
-        keepalive=(*packed.keepalive, packed.records, held, trial, *arrays.values()),
-    )
-
 
 LAG = 1e-3
 """Time [s] with which the pressure follows the load: about a step of a simulator, whose patches follow the load
@@ -91,6 +26,38 @@ STATES = 2
 """States behind the bristles: how far the centre of pressure is from the centre of mass, along x and y [m]."""
 
 
+def under_edge(
+    compiled: CompiledDistributed, packed: PackedModel, outline: np.ndarray
+) -> PackedModel:
+    """Return packed cells that carry load where the body is above them, whose `outline` is `[M, 2]` [m].
+
+    Raises InvalidValueError for an outline around nothing.
+    """
+    (_, cells) = packed.keepalive
+    patch = compiled.patch
+    positions = patch.positions[packed.cells]
+    # A disc of the same area.
+    sides = np.sqrt(patch.cell_extents().prod(axis=1) / np.pi)
+    radii = np.where(patch.radii > 0.0, patch.radii, sides)[packed.cells]
+    radii = np.maximum(radii, SMALLEST)
+    centre = positions.mean(axis=0)
+    reach = (np.hypot(*(positions - centre).T) + radii).max()
+    # A corner may stand there twice.
+    outline = outline[(outline != np.roll(outline, 1, axis=0)).any(axis=1)]
+    ahead = np.roll(outline, -1, axis=0)
+    area = float((outline[:, 0] * ahead[:, 1] - outline[:, 1] * ahead[:, 0]).sum())
+    if area == 0.0:
+        rule = "enclose an area where a contact has an edge"
+        raise InvalidValueError("outline", rule, "none")
+    corners = np.ascontiguousarray(outline if area > 0.0 else outline[::-1])
+    record = edge_cells.EdgeContact(
+        given=_given(compiled, packed, 3, False), numbers=len(cells), turned=patch.anisotropic, discs=compiled.size == 3,
+        radii=radii, middle=np.append(centre, reach), outline=corners,
+        corners=len(corners), cells=cells,
+    )  # fmt: skip
+    return _packed(packed, edge_cells.FUNCTIONS, record)
+
+
 def following(
     compiled: CompiledDistributed,
     packed: PackedModel,
@@ -98,52 +65,55 @@ def following(
     height: float,
 ) -> PackedModel:
     """Return packed cells whose pressure follows a load at `centre` [m] in the contact frame, `height` [m] above it."""
-    (weights, numbers) = packed.keepalive
+    (weights, _) = packed.keepalive
     positions = compiled.patch.positions[packed.cells]
-    count = weights.shape[1]
-    (x, y) = np.ascontiguousarray(positions.T)
     middle, slopes, radius = _statics_of(weights, positions)
+    by_load = {"middle": middle, "slope_x": slopes[0], "slope_y": slopes[1]}
     size = packed.states + STATES
-    blanks = {
-        "pressed": count,
-        "trial": count,
-        "scratch": size,
-        "zero": size,
-        "rows": 12,
-    }
-    scratch = {name: np.zeros(length) for name, length in blanks.items()}
-    by_load = {
-        "weights": weights,
-        "middle": middle,
-        "slope_x": slopes[0],
-        "slope_y": slopes[1],
-    }
-    arrays: dict[str, Any] = (
-        {"x": x, "y": y, "calls": calls_of(packed.functions, change=True)}
-        | scratch
-        | by_load
-    )
-    cells, trial_cells = (
-        row_of(compiled.record(numbers, scratch[name])[0])
-        for name in ("pressed", "trial")
-    )
     record = following_cells.FollowingContact(
-        **arrays, count=count, states=packed.states, cells=place_of(cells), trial_cells=place_of(trial_cells),
-        radius=radius, centre_x=centre[0], centre_y=centre[1], height=height, lag=LAG,
+        given=_given(compiled, packed, STATES, True), **by_load, zero=np.zeros(size), rows=np.zeros(12), radius=radius,
+        centre_x=centre[0], centre_y=centre[1], height=height, lag=LAG,
     )  # fmt: skip
+    scale = np.full(STATES, radius / np.sqrt(weights.shape[1] + 1))
+    return _packed(packed, following_cells.FUNCTIONS, record, **by_load)._replace(
+        states=size, state_scale=np.append(packed.state_scale, scale)
+    )
+
+
+def _given(
+    compiled: CompiledDistributed, packed: PackedModel, inputs: int, change: bool
+) -> GivenPressure:
+    """Return packed cells with room for two pressures that follow from so many inputs; `change` as in `calls_of`."""
+    (weights, cells) = packed.keepalive
+    x, y = np.ascontiguousarray(compiled.patch.positions[packed.cells].T)
+
+    def room() -> Pressed:
+        own = weights[0].copy(), cells.copy()
+        return Pressed(row_of(compiled.record(own[1], own[0])[0]), *own)
+
+    return GivenPressure(
+        count=len(x), states=packed.states, calls=calls_of(packed.functions, change=change), x=x, y=y,
+        whole=packed.records, weights=weights, held=room(), trial=room(), rate=np.zeros(packed.states), wrench=np.zeros(3),
+        by_input=np.zeros((inputs, packed.states)),
+    )  # fmt: skip
+
+
+def _packed(
+    packed: PackedModel, functions: ModelFunctions, record: Any, **by_load: np.ndarray
+) -> PackedModel:
+    """Pack a contact whose cells are those of a packed model, some of its arrays having a row for each load."""
+    count = len(packed.records)
+    columns = {name: places_of(rows) for name, rows in by_load.items()}
+    own = {
+        "whole": places_of(packed.records),
+        "weights": places_of(record.given.weights),
+    }
+    given = rows_of(record.given, count, **own)
     return packed._replace(
-        functions=following_cells.FUNCTIONS,
-        records=rows_of(
-            record,
-            len(weights),
-            **{name: places_of(each) for name, each in by_load.items()},
-        ),
-        states=size,
-        workspace=following_cells.OWN + packed.workspace,
-        state_scale=np.append(
-            packed.state_scale, np.full(STATES, radius / np.sqrt(count + 1))
-        ),
-        keepalive=(*packed.keepalive, *arrays.values(), cells, trial_cells),
+        functions=functions,
+        records=rows_of(record, count, given=given, **columns),
+        workspace=OWN + packed.workspace,
+        keepalive=(*packed.keepalive, record),
     )
 
 
