@@ -1,10 +1,8 @@
-"""Cells under a body that has an edge: those beyond its outline carry nothing, the others carry all of the load.
+"""Source of the pressure under a body that has an edge (see `given_pressure`): the place of the body, q.
 
-Each cell stands for a small disc. The part of it that the body covers acts as a disc of the same area at its centroid,
-with the share of the load that it had per area; then all shares grow by one factor, so that the load stays what it is.
-Rates and wrench, `z' = f(z, V, q)` and `W = sum w_i(q) B_i(q)' t_i`, see the place q of the body:
-
-    dW/dq = dW/dq at held bristles + dW/dz D^-1 df/dq,     D dz = r + df/dV dV + df/dq dq.
+Cells beyond the outline carry nothing, the others carry all of the load. Each cell stands for a small disc. The part of
+it that the body covers acts as a disc of the same area at its centroid, with the share of the load that it had per
+area; then all shares grow by one factor, so that the load stays what it is.
 """
 
 from __future__ import annotations
@@ -13,26 +11,16 @@ import math
 from typing import NamedTuple
 
 from planarfriction._engine.cells.given_pressure import (
-    OWN,
-    PLACES,
-    TEMPLATES,
     GivenPressure,
     Pressed,
     Source,
-    held,
+    functions_from,
 )
 from planarfriction._engine.codegen.vectors import Vector, copy
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
-from planarfriction._engine.compiler.calls import call
-from planarfriction._engine.compiler.memory import (
-    Doubles,
-    Place,
-    arrays_at,
-    at,
-    reader,
-)
-from planarfriction._engine.protocol import SEEN, functions_of
+from planarfriction._engine.compiler.memory import Doubles, arrays_at, reader
+from planarfriction._engine.protocol import SEEN
 
 _NONE = 1e-9
 """Share of the area of a disc below which nothing of it is covered: rounding makes
@@ -46,8 +34,6 @@ class EdgeContact(NamedTuple):
     """A contact of n cells under a body with an outline."""
 
     given: GivenPressure
-    numbers: int
-    """Numbers of each cell."""
     turned: bool
     """True if the first three are a map of the velocity (see `cells.cells`)."""
     discs: bool
@@ -62,9 +48,6 @@ class EdgeContact(NamedTuple):
     """M"""
     cells: Doubles
     """Numbers of whole cells, [numbers, n]."""
-
-
-read = reader(EdgeContact)
 
 
 @kernel
@@ -139,7 +122,7 @@ def covered_part(
 
 
 @kernel
-def _inputs(record: EdgeContact, z: Doubles, v: Doubles) -> Vector:
+def _place(record: EdgeContact, z: Doubles, v: Doubles) -> Vector:
     """Return the place of the body in the contact frame: x, y, cosine and sine."""
     seen = arrays_at(SEEN, v)
     cos = math.cos(seen.place[2])
@@ -150,16 +133,12 @@ def _inputs(record: EdgeContact, z: Doubles, v: Doubles) -> Vector:
 
 
 @kernel
-def _moved(record: EdgeContact, place: Vector, i: int, share: float) -> Vector:
+def _moved(place: Vector, i: int, by: float) -> Vector:
     x, y, cos, sin = place
-    by = share * record.middle[2] if i < 2 else share
-    if i == 0:
-        x += by
-    elif i == 1:
-        y += by
-    else:
-        cos, sin = cos - by * sin, sin + by * cos
-    return (x, y, cos, sin), by
+    turn = by if i == 2 else 0.0
+    x += by if i == 0 else 0.0
+    y += by if i == 1 else 0.0
+    return x, y, cos - turn * sin, sin + turn * cos
 
 
 @kernel
@@ -176,7 +155,7 @@ def _press(record: EdgeContact, place: Vector, v: Doubles, to: Pressed) -> bool:
     y = cos * dy - sin * dx
     if covered_part(record.outline, record.corners, x, y, record.middle[2])[0] == 1.0:
         return False
-    copy(record.cells, to.cells, record.numbers * n)
+    copy(record.cells, to.cells, given.numbers * n)
     total = 0.0
     borne = 0.0
     lever = 3 if record.turned else 0
@@ -208,53 +187,5 @@ def _press(record: EdgeContact, place: Vector, v: Doubles, to: Pressed) -> bool:
     return borne < total
 
 
-@kernel
-def _rates(record: EdgeContact, z: Doubles, w: Doubles, zdot: Doubles) -> None:
-    """Leave all states to the cells."""
-
-
-def factor(
-    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles
-) -> None:
-    """Prepare D, and write the stiffness, and the slopes by the place behind it."""
-    given = read(contact).given
-    m = arrays_at(PLACES, lin)
-    w = given.wrench
-    cells = held(given, m)
-    call(given.calls.factor, (cells, z, shift, at(lin, OWN), stiffness))
-    for j in range(int(3.0 * m.acts[0])):
-        by_place = at(given.by_input, j * given.states)
-        call(given.calls.eliminate, (cells, z, shift, by_place, at(lin, OWN), w))
-        for i in range(3):
-            stiffness[9 + 3 * i + j] = m.slopes[3 * j + i] + w[i]
-
-
-def eliminate(
-    contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles
-) -> None:
-    """Write the wrench that a residual causes."""
-    given = read(contact).given
-    cells = held(given, arrays_at(PLACES, lin))
-    call(given.calls.eliminate, (cells, z, shift, r, at(lin, OWN), w))
-
-
-def back_substitute(
-    contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles
-) -> None:
-    """Solve for the bristles."""
-    given = read(contact).given
-    copy(r, given.rate, given.states)
-    m = arrays_at(PLACES, lin)
-    for j in range(int(3.0 * m.acts[0])):
-        for i in range(given.states):
-            given.rate[i] += dv[3 + j] * given.by_input[j * given.states + i]
-    states = held(given, m), z, given.rate, dv, at(lin, OWN), out
-    call(given.calls.back_substitute, states)
-
-
-FUNCTIONS = functions_of(
-    "edge",
-    (*TEMPLATES, factor, eliminate, back_substitute),
-    source=Source(3, True, _inputs, _moved, _press, _rates),
-    read=read,
-)
+SOURCE = Source(3, False, _place, _moved, _press)
+FUNCTIONS = functions_from("edge", SOURCE, reader(EdgeContact))

@@ -7,7 +7,12 @@ from typing import Any
 import numpy as np
 
 from planarfriction._engine.cells import edge_cells, following_cells
-from planarfriction._engine.cells.given_pressure import OWN, GivenPressure, Pressed
+from planarfriction._engine.cells.given_pressure import (
+    OWN,
+    GivenPressure,
+    Pressed,
+    Source,
+)
 from planarfriction._engine.cells.moment_pressure import NARROW
 from planarfriction._engine.compiler.memory import places_of, row_of, rows_of
 from planarfriction._engine.protocol import ModelFunctions, calls_of
@@ -33,7 +38,7 @@ def under_edge(
 
     Raises InvalidValueError for an outline around nothing.
     """
-    (_, cells) = packed.keepalive
+    cells = packed.keepalive[1]
     patch = compiled.patch
     positions = patch.positions[packed.cells]
     # A disc of the same area.
@@ -51,9 +56,9 @@ def under_edge(
         raise InvalidValueError("outline", rule, "none")
     corners = np.ascontiguousarray(outline if area > 0.0 else outline[::-1])
     record = edge_cells.EdgeContact(
-        given=_given(compiled, packed, 3, False), numbers=len(cells), turned=patch.anisotropic, discs=compiled.size == 3,
-        radii=radii, middle=np.append(centre, reach), outline=corners,
-        corners=len(corners), cells=cells,
+        given=_given(compiled, packed, edge_cells.SOURCE, radius=reach), turned=patch.anisotropic,
+        discs=compiled.size == 3, radii=radii, middle=np.append(centre, reach), outline=corners, corners=len(corners),
+        cells=cells,
     )  # fmt: skip
     return _packed(packed, edge_cells.FUNCTIONS, record)
 
@@ -67,34 +72,48 @@ def following(
     """Return packed cells whose pressure follows a load at `centre` [m] in the contact frame, `height` [m] above it."""
     (weights, _) = packed.keepalive
     positions = compiled.patch.positions[packed.cells]
-    middle, slopes, radius = _statics_of(weights, positions)
-    by_load = {"middle": middle, "slope_x": slopes[0], "slope_y": slopes[1]}
-    size = packed.states + STATES
+    middle = weights @ positions
+    away = positions - middle[:, None]
+    spread = away.mT * weights[:, None] @ away
+    radius = float(np.sqrt(np.trace(spread, axis1=1, axis2=2).max()))
+    # A plane over cells along a line does not tilt them across it.
+    slopes = np.linalg.pinv(spread, rcond=NARROW, hermitian=True) @ away.mT
+    by_load = {"middle": middle, "slopes": np.ascontiguousarray(slopes)}
+    lagging = {"radius": radius, "height": height, "lag": LAG}
+    given = _given(compiled, packed, following_cells.SOURCE, **lagging)
     record = following_cells.FollowingContact(
-        given=_given(compiled, packed, STATES, True), **by_load, zero=np.zeros(size), rows=np.zeros(12), radius=radius,
-        centre_x=centre[0], centre_y=centre[1], height=height, lag=LAG,
-    )  # fmt: skip
+        given=given, **by_load, centre_x=centre[0], centre_y=centre[1]
+    )
     scale = np.full(STATES, radius / np.sqrt(weights.shape[1] + 1))
     return _packed(packed, following_cells.FUNCTIONS, record, **by_load)._replace(
-        states=size, state_scale=np.append(packed.state_scale, scale)
+        states=packed.states + STATES,
+        state_scale=np.append(packed.state_scale, scale),
     )
 
 
 def _given(
-    compiled: CompiledDistributed, packed: PackedModel, inputs: int, change: bool
+    compiled: CompiledDistributed,
+    packed: PackedModel,
+    source: Source,
+    radius: float,
+    height: float = 0.0,
+    lag: float = 0.0,
 ) -> GivenPressure:
-    """Return packed cells with room for two pressures that follow from so many inputs; `change` as in `calls_of`."""
+    """Return packed cells with room for two pressures."""
     (weights, cells) = packed.keepalive
+    n = packed.states
     x, y = np.ascontiguousarray(compiled.patch.positions[packed.cells].T)
 
     def room() -> Pressed:
         own = weights[0].copy(), cells.copy()
         return Pressed(row_of(compiled.record(own[1], own[0])[0]), *own)
 
+    calls = calls_of(packed.functions, change=source.follows)
     return GivenPressure(
-        count=len(x), states=packed.states, calls=calls_of(packed.functions, change=change), x=x, y=y,
-        whole=packed.records, weights=weights, held=room(), trial=room(), rate=np.zeros(packed.states), wrench=np.zeros(3),
-        by_input=np.zeros((inputs, packed.states)),
+        count=len(x), numbers=len(cells), states=n, calls=calls, x=x, y=y, whole=packed.records, weights=weights,
+        held=room(), trial=room(), acts=np.zeros(1), rate=np.zeros(n), wrench=np.zeros(3),
+        by_input=np.zeros((source.inputs, n)), zero=np.zeros(n), rows=np.zeros(12), radius=radius, height=height,
+        lag=lag,
     )  # fmt: skip
 
 
@@ -114,24 +133,4 @@ def _packed(
         records=rows_of(record, count, given=given, **columns),
         workspace=OWN + packed.workspace,
         keepalive=(*packed.keepalive, record),
-    )
-
-
-def _statics_of(
-    weights: np.ndarray, positions: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the centres of pressure `[R, 2]` of rows of weights, their slopes by it `[2, R, n]`, and a radius [m].
-
-    A plane over cells along a line does not tilt them across it.
-    """
-    middle = weights @ positions
-    away = positions - middle[:, None]
-    spread = np.einsum("rn,rni,rnj->rij", weights, away, away)
-    slopes = np.einsum(
-        "rij,rnj->irn", np.linalg.pinv(spread, rcond=NARROW, hermitian=True), away
-    )
-    return (
-        middle,
-        np.ascontiguousarray(slopes),
-        float(np.sqrt(np.trace(spread, axis1=1, axis2=2).max())),
     )
