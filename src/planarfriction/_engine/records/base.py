@@ -144,13 +144,12 @@ class CompiledModel:
         return None if self.depends_on_load else self.with_all_states([None])
 
     def pressed(
-        self, load: np.ndarray, centre: np.ndarray | None = None
+        self, load: np.ndarray, pressure: Any = None
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """Yield rows of the flat batch, the model at the load of each row or at the one load of all, and offsets.
 
-        Pressures are about the centres `[..., 2]` [m], if given: patches whose pressure keeps its shape move by offsets
-        `[rows, 2]` [m], None else. Models of cells take a `Pressing` in place of centres. Rows without load may be left
-        out; their results are zero.
+        A pressure is a `Pressing` of cells, or its centres `[..., 2]` [m]: patches whose pressure keeps its shape move
+        by offsets `[rows, 2]` [m], None else. Rows without load may be left out; their results are zero.
         """
         raise NotImplementedError
 
@@ -300,14 +299,14 @@ class CompiledModel:
         state: np.ndarray,
         twist: np.ndarray,
         load: np.ndarray,
-        centre: np.ndarray | None = None,
+        pressure: Any = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rates of the states, and wrenches per unit load `[..., 3]`; `centre` as in `pressed`."""
+        """Return the rates of the states, and wrenches per unit load `[..., 3]`; `pressure` as in `pressed`."""
         z = state.reshape(-1, self._size)
         v = twist.reshape(-1, 3)
         rate = np.zeros(z.shape)
         unit = np.zeros(v.shape)
-        for rows, contact, offset in self.pressed(load, centre):
+        for rows, contact, offset in self.pressed(load, pressure):
             rate[rows], pull = rates(
                 contact,
                 z[rows],
@@ -322,16 +321,16 @@ class CompiledModel:
         twist: np.ndarray,
         load: np.ndarray,
         dt: np.ndarray,
-        centre: np.ndarray | None = None,
+        pressure: Any = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return new states and wrenches `[..., 3]`; `centre` as in `pressed`."""
-        z = self.left(state, centre).reshape(-1, self._size)
+        """Return new states and wrenches `[..., 3]`; `pressure` as in `pressed`."""
+        z = self.left(state, pressure).reshape(-1, self._size)
         v = twist.reshape(-1, 3)
         f = load.reshape(-1)
         h = dt.reshape(-1)
         new = np.zeros(z.shape)
         wrench = np.zeros(v.shape)
-        for rows, contact, offset in self.pressed(load, centre):
+        for rows, contact, offset in self.pressed(load, pressure):
             end = np.empty_like(z[rows])
             pull = np.empty_like(v[rows])
             table = self.step_table(contact)
@@ -347,15 +346,15 @@ class CompiledModel:
         twist: np.ndarray,
         load: np.ndarray,
         dt: np.ndarray,
-        centre: np.ndarray | None = None,
+        pressure: Any = None,
     ) -> StepJacobians:
-        """Differentiate steps, with the pressure held; `centre` as in `pressed`."""
+        """Differentiate steps, with the pressure held; `pressure` as in `pressed`."""
         inputs = np.concatenate(
             [twist, load[..., None], dt[..., None]], axis=-1
         ).reshape(load.size, 5)
         z = state.reshape(-1, self._size)
         results = np.zeros((load.size, self._per_contact))
-        for rows, contact, offset in self.pressed(load, centre):
+        for rows, contact, offset in self.pressed(load, pressure):
             numbers = inputs[rows]
             numbers[:, :3] = _seen(numbers[:, :3], offset)
             result = np.empty(len(numbers) * self._per_contact + self._scratch)
