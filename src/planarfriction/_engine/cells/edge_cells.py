@@ -133,15 +133,6 @@ def _place(record: EdgeContact, z: Doubles, v: Doubles) -> Vector:
 
 
 @kernel
-def _moved(place: Vector, i: int, by: float) -> Vector:
-    x, y, cos, sin = place
-    turn = by if i == 2 else 0.0
-    x += by if i == 0 else 0.0
-    y += by if i == 1 else 0.0
-    return x, y, cos - turn * sin, sin + turn * cos
-
-
-@kernel
 def _press(record: EdgeContact, place: Vector, v: Doubles, to: Pressed) -> bool:
     """Write the cells under a body at a place, unless it covers all, and the share of their load that it covers."""
     given = record.given
@@ -187,5 +178,5 @@ def _press(record: EdgeContact, place: Vector, v: Doubles, to: Pressed) -> bool:
     return borne < total
 
 
-SOURCE = Source(3, False, _place, _moved, _press)
+SOURCE = Source(3, False, _place, _press)
 FUNCTIONS = functions_from("edge", SOURCE, reader(EdgeContact))

@@ -36,12 +36,7 @@ class FollowingContact(NamedTuple):
 @kernel
 def _place(record: FollowingContact, z: Doubles, v: Doubles) -> Vector:
     n = record.given.states
-    return record.centre_x + z[n], record.centre_y + z[n + 1]
-
-
-@kernel
-def _moved(p: Vector, i: int, by: float) -> Vector:
-    return p[0] + (by if i == 0 else 0.0), p[1] + (by if i == 1 else 0.0)
+    return record.centre_x + z[n], record.centre_y + z[n + 1], 1.0, 0.0
 
 
 @kernel
@@ -49,7 +44,7 @@ def _press(record: FollowingContact, p: Vector, v: Doubles, to: Pressed) -> bool
     """Write the weights with their centre at p."""
     given = record.given
     n = given.count
-    (x, y) = p
+    x, y, _, _ = p
     lowest = 1.0
     dx = x - record.middle[0]
     dy = y - record.middle[1]
@@ -62,5 +57,5 @@ def _press(record: FollowingContact, p: Vector, v: Doubles, to: Pressed) -> bool
     return True
 
 
-SOURCE = Source(2, True, _place, _moved, _press)
+SOURCE = Source(2, True, _place, _press)
 FUNCTIONS = functions_from("following", SOURCE, reader(FollowingContact))

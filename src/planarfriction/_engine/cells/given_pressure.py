@@ -142,9 +142,7 @@ class Source(NamedTuple):
     follows: bool
     """True if the input is a centre of pressure, False if it is the place of the body."""
     place: Any
-    """`(contact, z, V)`: return the inputs."""
-    moved: Any
-    """`(s, i, by)`: return the inputs with the i-th changed."""
+    """`(contact, z, V)`: return the inputs as a place: x, y, and cosine and sine of an angle, which may be 0."""
     press: Any
     """`(contact, s, V, pressed)`: write weights and levers of cells; return True if the inputs change anything."""
 
@@ -168,6 +166,16 @@ def _solved(
     """Return `N^-1 (T r - h pull)`."""
     right = plus(times(given.lag, r), -given.height, pull)
     return matrix_applied(_four(m.inverse, 0, 1), right)
+
+
+@kernel
+def _moved(place: Vector, i: int, by: float) -> Vector:
+    """Return a place with the i-th input changed."""
+    x, y, cos, sin = place
+    turn = by if i == 2 else 0.0
+    x += by if i == 0 else 0.0
+    y += by if i == 1 else 0.0
+    return x, y, cos - turn * sin, sin + turn * cos
 
 
 @kernel
@@ -209,7 +217,7 @@ def linearise(
     call(given.calls.linearise, (_held(given, m), z, v, at(lin, OWN)))
     for j in range(source.inputs if acts else 0):
         by = NUDGE * (given.radius if j < 2 else 1.0)
-        source.press(record, source.moved(s, j, by), v, given.trial)
+        source.press(record, _moved(s, j, by), v, given.trial)
         slope = at(m.slopes, 3 * j)
         by_input = at(given.by_input, j * given.states)
         call(given.calls.evaluate, (given.trial.record, z, v, by_input, slope))
@@ -293,7 +301,7 @@ def change(
     states = given.held.record, z, zdot, at(lin, OWN), dz, dzdot, rows
     call(given.calls.change, (*states, friction, size))
     centre = source.place(read(contact), z, z)
-    moved = plus(_two(dz, given.states, 1), -size, centre)
+    moved = plus(_two(dz, given.states, 1), -size, centre[:2])
     put(wrench, plus(three(wrench), 1.0, _caused(m, moved)))
     _follow(given, dz, wrench, dzdot)
 

@@ -28,7 +28,7 @@ FARTHEST = 100.0
 STEPS = 60
 """Newton steps at most: they end after a few."""
 
-HALVINGS = 30
+SHORTENINGS = 30
 """Times at most that a Newton step is shortened."""
 
 NARROW = 1e-8
@@ -208,7 +208,7 @@ def _share_of(
     """Return the share of a step to go: all, or so little that the dual hardly rises there."""
     far = 1.0
     first = 0.0
-    for i in range(HALVINGS):
+    for i in range(SHORTENINGS):
         slope = _slope(x, y, w, n, total, s, _stepped(plane, far, step), step)
         if i == 0 and slope > 0.0:
             first = abs(_slope(x, y, w, n, total, s, plane, step))

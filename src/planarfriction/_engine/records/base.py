@@ -354,6 +354,7 @@ class CompiledModel:
         ).reshape(load.size, 5)
         z = state.reshape(-1, self._size)
         results = np.zeros((load.size, self._per_contact))
+        at = np.tile(np.eye(3), (load.size, 1, 1))
         for rows, contact, offset in self.pressed(load, pressure):
             numbers = inputs[rows]
             numbers[:, :3] = _seen(numbers[:, :3], offset)
@@ -364,39 +365,26 @@ class CompiledModel:
             results[rows] = result[: -self._scratch].reshape(
                 len(numbers), self._per_contact
             )
-            if offset is not None and len(offset) > 0:
-                self._move(results, rows, offset)
-        return StepJacobians(
+            if offset is not None:
+                at[rows, 0, 2] = -offset[:, 1]
+                at[rows, 1, 2] = offset[:, 0]
+        done = StepJacobians(
             *(
                 results[:, place].reshape(*load.shape, *shape)
                 for place, shape in self._derivatives
             )
         )
-
-    def _move(self, results: np.ndarray, rows: Any, offset: np.ndarray) -> None:
-        """Bring the derivatives of patches at an offset to the twist and the wrench about the origin, in place."""
-        at = np.tile(np.eye(3), (len(offset), 1, 1))
-        at[:, 0, 2] = -offset[:, 1]
-        at[:, 1, 2] = offset[:, 0]
+        if (at == np.eye(3)).all():
+            return done
+        # Of patches at an offset, by the twist and of the wrench about the origin.
+        at = at.reshape(*load.shape, 3, 3)
         back = at.mT
-        (_, state_twist, _, wrench_state, wrench_twist, wrench_load) = (
-            p for p, _ in self._derivatives
+        return done._replace(
+            state_twist=done.state_twist @ at,
+            wrench_state=back @ done.wrench_state,
+            wrench_twist=back @ done.wrench_twist @ at,
+            wrench_load=(back @ done.wrench_load[..., None])[..., 0],
         )
-        for place, left, right in (
-            (state_twist, None, at),
-            (wrench_state, back, None),
-            (wrench_twist, back, at),
-        ):
-            block = results[rows, place].reshape(
-                len(offset), *((-1, 3) if left is None else (3, -1))
-            )
-            block = block if right is None else block @ right
-            results[rows, place] = (block if left is None else left @ block).reshape(
-                len(offset), -1
-            )
-        results[rows, wrench_load] = (back @ results[rows, wrench_load][..., None])[
-            ..., 0
-        ]
 
     # ------------------------------------------------------------------ for the loops of others
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,10 @@ from planarfriction._engine.cells.given_pressure import (
     OWN,
     GivenPressure,
     Pressed,
-    Source,
 )
 from planarfriction._engine.cells.moment_pressure import NARROW
 from planarfriction._engine.compiler.memory import places_of, row_of, rows_of
-from planarfriction._engine.protocol import ModelFunctions, calls_of
+from planarfriction._engine.protocol import calls_of
 from planarfriction._engine.records.distributed import CompiledDistributed
 from planarfriction._engine.records.packed import PackedModel
 from planarfriction.errors import InvalidValueError
@@ -55,12 +55,11 @@ def under_edge(
         rule = "enclose an area where a contact has an edge"
         raise InvalidValueError("outline", rule, "none")
     corners = np.ascontiguousarray(outline if area > 0.0 else outline[::-1])
-    record = edge_cells.EdgeContact(
-        given=_given(compiled, packed, edge_cells.SOURCE, radius=reach), turned=patch.anisotropic,
-        discs=compiled.size == 3, radii=radii, middle=np.append(centre, reach), outline=corners, corners=len(corners),
-        cells=cells,
+    record = functools.partial(
+        edge_cells.EdgeContact, turned=patch.anisotropic, discs=compiled.size == 3, radii=radii,
+        middle=np.append(centre, reach), outline=corners, corners=len(corners), cells=cells,
     )  # fmt: skip
-    return _packed(packed, edge_cells.FUNCTIONS, record)
+    return _packed(compiled, packed, edge_cells, record, {}, radius=reach)
 
 
 def following(
@@ -78,59 +77,47 @@ def following(
     radius = float(np.sqrt(np.trace(spread, axis1=1, axis2=2).max()))
     # A plane over cells along a line does not tilt them across it.
     slopes = np.linalg.pinv(spread, rcond=NARROW, hermitian=True) @ away.mT
-    by_load = {"middle": middle, "slopes": np.ascontiguousarray(slopes)}
-    lagging = {"radius": radius, "height": height, "lag": LAG}
-    given = _given(compiled, packed, following_cells.SOURCE, **lagging)
-    record = following_cells.FollowingContact(
-        given=given, **by_load, centre_x=centre[0], centre_y=centre[1]
+    record = functools.partial(
+        following_cells.FollowingContact, centre_x=centre[0], centre_y=centre[1]
     )
+    by_load = {"middle": middle, "slopes": np.ascontiguousarray(slopes)}
     scale = np.full(STATES, radius / np.sqrt(weights.shape[1] + 1))
-    return _packed(packed, following_cells.FUNCTIONS, record, **by_load)._replace(
+    return _packed(
+        compiled, packed, following_cells, record, by_load, radius, height, LAG
+    )._replace(
         states=packed.states + STATES,
         state_scale=np.append(packed.state_scale, scale),
     )
 
 
-def _given(
-    compiled: CompiledDistributed,
-    packed: PackedModel,
-    source: Source,
-    radius: float,
-    height: float = 0.0,
-    lag: float = 0.0,
-) -> GivenPressure:
-    """Return packed cells with room for two pressures."""
+def _packed(
+    compiled: CompiledDistributed, packed: PackedModel, source: Any, make: Any,
+    by_load: dict[str, np.ndarray], radius: float, height: float = 0.0, lag: float = 0.0,
+) -> PackedModel:  # fmt: skip
+    """Pack cells with a source, a module; `make` its record with what sources share and arrays with rows by load."""
     (weights, cells) = packed.keepalive
     n = packed.states
+    count = len(packed.records)
     x, y = np.ascontiguousarray(compiled.patch.positions[packed.cells].T)
 
     def room() -> Pressed:
         own = weights[0].copy(), cells.copy()
         return Pressed(row_of(compiled.record(own[1], own[0])[0]), *own)
 
-    calls = calls_of(packed.functions, change=source.follows)
-    return GivenPressure(
+    calls = calls_of(packed.functions, change=source.SOURCE.follows)
+    given = GivenPressure(
         count=len(x), numbers=len(cells), states=n, calls=calls, x=x, y=y, whole=packed.records, weights=weights,
         held=room(), trial=room(), acts=np.zeros(1), rate=np.zeros(n), wrench=np.zeros(3),
-        by_input=np.zeros((source.inputs, n)), zero=np.zeros(n), rows=np.zeros(12), radius=radius, height=height,
-        lag=lag,
+        by_input=np.zeros((source.SOURCE.inputs, n)), zero=np.zeros(n), rows=np.zeros(12), radius=radius,
+        height=height, lag=lag,
     )  # fmt: skip
-
-
-def _packed(
-    packed: PackedModel, functions: ModelFunctions, record: Any, **by_load: np.ndarray
-) -> PackedModel:
-    """Pack a contact whose cells are those of a packed model, some of its arrays having a row for each load."""
-    count = len(packed.records)
+    at = {"whole": places_of(packed.records), "weights": places_of(weights)}
+    record = make(given=given, **by_load)
     columns = {name: places_of(rows) for name, rows in by_load.items()}
-    own = {
-        "whole": places_of(packed.records),
-        "weights": places_of(record.given.weights),
-    }
-    given = rows_of(record.given, count, **own)
+    columns["given"] = rows_of(given, count, **at)
     return packed._replace(
-        functions=functions,
-        records=rows_of(record, count, given=given, **columns),
+        functions=source.FUNCTIONS,
+        records=rows_of(record, count, **columns),
         workspace=OWN + packed.workspace,
         keepalive=(*packed.keepalive, record),
     )
