@@ -26,6 +26,7 @@ from planarfriction._engine.coupled.steps import (
 )
 from planarfriction._engine.protocol import StepFunctions
 from planarfriction._engine.records.packed import PackedModel, driven, rates
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support.equality import by_parts
 from planarfriction.geometry import twist_at, wrench_at
 
@@ -152,10 +153,6 @@ class CompiledModel:
         by offsets `[rows, 2]` [m], None else. Rows without load may be left out; their results are zero.
         """
         raise NotImplementedError
-
-    def left(self, state: np.ndarray, pressure: Any) -> np.ndarray:
-        """Return the state that a new pressure leaves of one before: all of it, unless cells of a pad have come."""
-        return state
 
     def points(self) -> tuple[np.ndarray, int]:
         """Return the cells that share the load, `[n, 2]` [m], and the words of their record, or one point that has all.
@@ -324,7 +321,9 @@ class CompiledModel:
         pressure: Any = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return new states and wrenches `[..., 3]`; `pressure` as in `pressed`."""
-        z = self.left(state, pressure).reshape(-1, self._size)
+        if isinstance(pressure, Pressing):
+            state = pressure.left(state, self.components)
+        z = state.reshape(-1, self._size)
         v = twist.reshape(-1, 3)
         f = load.reshape(-1)
         h = dt.reshape(-1)

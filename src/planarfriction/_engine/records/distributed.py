@@ -114,15 +114,6 @@ class CompiledDistributed(CompiledModel):
         rows = rows_of(record, len(weights), **columns)
         return packed._replace(records=rows, keepalive=(weights, numbers))
 
-    def left(self, state: np.ndarray, pressure: Any) -> np.ndarray:
-        """See `CompiledModel`."""
-        if not isinstance(pressure, Pressing) or pressure.kept is None:
-            return state
-        left = state.reshape(len(pressure.kept), -1).copy()
-        bristles = left[:, : self.size * pressure.kept.shape[1]]
-        bristles *= np.tile(pressure.kept, self.size)
-        return left.reshape(state.shape)
-
     def step_jacobians(
         self,
         state: np.ndarray,
@@ -132,10 +123,10 @@ class CompiledDistributed(CompiledModel):
         pressure: Any = None,
     ) -> StepJacobians:
         """See `CompiledModel`; by the state before it was left."""
-        state = self.left(state, pressure)
-        slopes = super().step_jacobians(state, twist, load, dt, pressure)
         if not isinstance(pressure, Pressing) or pressure.kept is None:
-            return slopes
+            return super().step_jacobians(state, twist, load, dt, pressure)
+        state = pressure.left(state, self.size)
+        slopes = super().step_jacobians(state, twist, load, dt, pressure)
         kept = pressure.kept.reshape(*load.shape, 1, 1, -1)
         return slopes._replace(
             state_state=slopes.state_state * kept,
