@@ -47,7 +47,6 @@ class Cells(NamedTuple):
     ) -> Cells:
         """Return cells in discs; `discs` are their shares, places `[N, 2]` and own second moments, if these move."""
         count = int(members.cells.max()) + 1
-        n = len(members.begins)
         begins = np.append(members.begins, len(members.cells))
         stiffness = np.zeros(0) if stiffness is None else np.array(stiffness)
         middle = np.zeros(2)
@@ -57,10 +56,11 @@ class Cells(NamedTuple):
             middle = places.mean(axis=0)
             x, y = (places - middle).T
             numbers = np.array([shares, x, y, x * x + y * y + squares])
-        held = Discs(members.cells, members.parted, begins, stiffness, numbers, np.zeros((3, n)))  # fmt: skip
+        alike = members.cells, members.parted, begins
+        held = Discs(*alike, stiffness, numbers, np.zeros((3, len(members.begins))))
         cells = cls(held, middle, count)
-        every = np.ones((1, count))
         if discs is not None:
+            every = np.ones((1, count))
             held.whole[:] = cells._gathered(every, every, every)[2]
         return cells
 
@@ -88,17 +88,16 @@ class Cells(NamedTuple):
         if ((given[1] == 0.0) & (given[0] > 0.0)).any():
             raise InvalidValueError("cover", "be > 0 where a cell bears load", 0.0)
         weights, pads, moved = self._gathered(*given)
-        shape = *batch[:-1], weights.shape[-1]
-        moves = moved.size > 0
+        moved[:, :2] += self.middle[:, None]
+        load = given[0].sum(-1)
+        rows = load, weights, moved[:, :2], moved[:, 2], pads[:, 0], pads[:, 1]
         return Pressing(
-            load=now.sum(-1),
-            weights=weights.reshape(shape),
-            places=(moved[:, :2] + self.middle[:, None]).reshape(*batch[:-1], 2, -1)
-            if moves
-            else None,
-            radii=moved[:, 2].reshape(shape) if moves else None,
-            stiffer=pads[:, 0].reshape(shape) if pads.size else None,
-            kept=pads[:, 1].reshape(shape) if pads.size else None,
+            *(
+                None
+                if 0 in each.shape[1:]
+                else each.reshape(*batch[:-1], *each.shape[1:])
+                for each in rows
+            )
         )
 
     def _gathered(

@@ -11,16 +11,15 @@ import math
 from typing import NamedTuple
 
 from planarfriction._engine.cells.given_pressure import (
+    RATES,
     GivenPressure,
     Pressed,
-    Source,
-    functions_from,
 )
 from planarfriction._engine.codegen.vectors import Vector, copy
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, arrays_at, reader
-from planarfriction._engine.protocol import SEEN
+from planarfriction._engine.protocol import SEEN, functions_of
 
 _NONE = 1e-9
 """Share of the area of a disc below which nothing of it is covered: rounding makes
@@ -178,5 +177,11 @@ def _press(record: EdgeContact, place: Vector, v: Doubles, to: Pressed) -> bool:
     return borne < total
 
 
-SOURCE = Source(3, False, _place, _press)
-FUNCTIONS = functions_from("edge", SOURCE, reader(EdgeContact))
+FUNCTIONS = functions_of(
+    "edge",
+    RATES,
+    read=reader(EdgeContact),
+    place=_place,
+    press=_press,
+    follows=False,
+)

@@ -8,16 +8,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planarfriction._engine.cells.given_pressure import (
+    FOLLOWING,
     GivenPressure,
     Pressed,
-    Source,
-    functions_from,
 )
 from planarfriction._engine.cells.moment_pressure import tilt
 from planarfriction._engine.codegen.vectors import Vector
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, reader
+from planarfriction._engine.protocol import functions_of
 
 
 class FollowingContact(NamedTuple):
@@ -57,5 +57,11 @@ def _press(record: FollowingContact, p: Vector, v: Doubles, to: Pressed) -> bool
     return True
 
 
-SOURCE = Source(2, True, _place, _press)
-FUNCTIONS = functions_from("following", SOURCE, reader(FollowingContact))
+FUNCTIONS = functions_of(
+    "following",
+    FOLLOWING,
+    read=reader(FollowingContact),
+    place=_place,
+    press=_press,
+    follows=True,
+)

@@ -48,8 +48,6 @@ from planarfriction._engine.compiler.memory import (
 from planarfriction._engine.protocol import (
     ROWS,
     Addresses,
-    ModelFunctions,
-    functions_of,
 )
 
 NUDGE = 1e-6
@@ -134,19 +132,6 @@ _two = reader_of(2)
 _four = reader_of(4)
 
 
-class Source(NamedTuple):
-    """Functions of a source; `contact` is its record."""
-
-    inputs: int
-    """Number of inputs."""
-    follows: bool
-    """True if the input is a centre of pressure, False if it is the place of the body."""
-    place: Any
-    """`(contact, z, V)`: return the inputs as a place: x, y, and cosine and sine of an angle, which may be 0."""
-    press: Any
-    """`(contact, s, V, pressed)`: write weights and levers of cells; return True if the inputs change anything."""
-
-
 @kernel
 def _held(given: GivenPressure, m: GivenLinearisation) -> Doubles:
     """Return the record of the cells as they were linearised last."""
@@ -186,50 +171,51 @@ def _follow(given: GivenPressure, z: Doubles, w: Doubles, zdot: Doubles) -> None
 
 
 def evaluate(
-    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, source: Source, read: Any,
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, read: Any, place: Any, press: Any,
+    follows: bool,
 ) -> None:  # fmt: skip
     """Write z' and the wrench."""
     record = read(contact)
     given = record.given
-    acts = source.press(record, source.place(record, z, v), v, given.trial)
+    acts = press(record, place(record, z, v), v, given.trial)
     given.acts[0] = 1.0 if acts else 0.0
     cells = given.trial.record if acts else given.whole
     call(given.calls.evaluate, (cells, z, v, zdot, w))
     copy(w, given.wrench, 3)
-    if source.follows:
+    if follows:
         _follow(given, z, w, zdot)
     else:
         copy(zdot, given.rate, given.states if acts else 0)
 
 
 def linearise(
-    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, source: Source, read: Any
-) -> None:
+    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, read: Any, place: Any, press: Any, follows: bool,
+) -> None:  # fmt: skip
     """Hold the cells where the contact was evaluated last, linearise them, and write the slopes by the inputs."""
     record = read(contact)
     given = record.given
     m = arrays_at(_PLACES, lin)
-    s = source.place(record, z, v)
+    s = place(record, z, v)
     acts = given.acts[0] > 0.0
     m.acts[0] = given.acts[0]
     copy(given.trial.weights, given.held.weights, given.count)
     copy(given.trial.cells, given.held.cells, given.numbers * given.count)
     call(given.calls.linearise, (_held(given, m), z, v, at(lin, OWN)))
-    for j in range(source.inputs if acts else 0):
+    for j in range((2 if follows else 3) if acts else 0):
         by = NUDGE * (given.radius if j < 2 else 1.0)
-        source.press(record, _moved(s, j, by), v, given.trial)
+        press(record, _moved(s, j, by), v, given.trial)
         slope = at(m.slopes, 3 * j)
         by_input = at(given.by_input, j * given.states)
         call(given.calls.evaluate, (given.trial.record, z, v, by_input, slope))
         per = 1.0 / by
         for i in range(3):
             slope[i] = per * (slope[i] - given.wrench[i])
-        for i in range(0 if source.follows else given.states):
+        for i in range(0 if follows else given.states):
             by_input[i] = per * (by_input[i] - given.rate[i])
 
 
 def factor(
-    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles, *, source: Source,
+    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles, *, follows: bool,
 ) -> None:  # fmt: skip
     """Prepare D, and write the stiffness, with the slopes by the place behind it."""
     given = read_given(contact)
@@ -238,11 +224,11 @@ def factor(
     k = m.slopes
     cells = _held(given, m)
     call(given.calls.factor, (cells, z, shift, at(lin, OWN), s))
-    if source.follows:
+    if follows:
         by_pull = times(-given.height, (k[0], k[3], k[1], k[4]))
         put_all(m.inverse, inverse_2(1.0 + shift * given.lag, by_pull))
     for j in range(3 if m.acts[0] > 0.0 else 0):
-        if source.follows:
+        if follows:
             e = _solved(given, m, (0.0, 0.0), (s[j], s[3 + j]))
             put_all(at(m.by_twist, 2 * j), e)
             caused = _caused(m, e)
@@ -257,25 +243,25 @@ def factor(
 
 
 def eliminate(
-    contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles, *, source: Source,
+    contact: Place, z: Doubles, shift: float, r: Doubles, lin: Doubles, w: Doubles, *, follows: bool,
 ) -> None:  # fmt: skip
     """Write the wrench that a residual causes."""
     given = read_given(contact)
     m = arrays_at(_PLACES, lin)
     call(given.calls.eliminate, (_held(given, m), z, shift, r, at(lin, OWN), w))
-    if source.follows:
+    if follows:
         e = _solved(given, m, _two(r, given.states, 1), (w[0], w[1]))
         put_all(m.residual, e)
         put(w, plus(three(w), 1.0, _caused(m, e)))
 
 
 def back_substitute(
-    contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles, *, source: Source,
+    contact: Place, z: Doubles, r: Doubles, dv: Doubles, lin: Doubles, out: Doubles, *, follows: bool,
 ) -> None:  # fmt: skip
     """Solve for the states, after `eliminate` of the same residual."""
     given = read_given(contact)
     m = arrays_at(_PLACES, lin)
-    moves = not source.follows and m.acts[0] > 0.0
+    moves = not follows and m.acts[0] > 0.0
     right = given.rate if moves else r
     for i in range(given.states if moves else 0):
         right[i] = r[i]
@@ -283,7 +269,7 @@ def back_substitute(
             right[i] += dv[3 + j] * given.by_input[j * given.states + i]
     states = _held(given, m), z, right, dv, at(lin, OWN), out
     call(given.calls.back_substitute, states)
-    if source.follows:
+    if follows:
         e = _two(m.residual, 0, 1)
         for j in range(3):
             e = plus(e, dv[j], _two(m.by_twist, 2 * j, 1))
@@ -292,7 +278,7 @@ def back_substitute(
 
 def change(
     contact: Place, z: Doubles, zdot: Doubles, lin: Doubles, dz: Doubles, dzdot: Doubles, rows: Doubles,
-    friction: float, size: float, *, source: Source, read: Any,
+    friction: float, size: float, *, read: Any, place: Any,
 ) -> None:  # fmt: skip
     """Write the changes of z' and of the wrench; in a patch that has grown, p is nearer to the middle."""
     given = read_given(contact)
@@ -300,7 +286,7 @@ def change(
     m = arrays_at(_PLACES, lin)
     states = given.held.record, z, zdot, at(lin, OWN), dz, dzdot, rows
     call(given.calls.change, (*states, friction, size))
-    centre = source.place(read(contact), z, z)
+    centre = place(read(contact), z, z)
     moved = plus(_two(dz, given.states, 1), -size, centre[:2])
     put(wrench, plus(three(wrench), 1.0, _caused(m, moved)))
     _follow(given, dz, wrench, dzdot)
@@ -342,9 +328,11 @@ def pull_back(
     put(wrench, asked)
 
 
-def functions_from(name: str, source: Source, read: Any) -> ModelFunctions:
-    """Return the functions of contacts with a source; only where the pressure follows there are derivatives."""
-    templates = evaluate, linearise, factor, eliminate, back_substitute
-    if source.follows:
-        templates += change, solve_transposed, pull_back
-    return functions_of(name, templates, source=source, read=read)
+RATES = evaluate, linearise, factor, eliminate, back_substitute
+FOLLOWING = *RATES, change, solve_transposed, pull_back
+"""Functions of contacts with a source; only where the pressure follows there are derivatives.
+
+Sources give them a reader of their record; `place`, `(contact, z, V)`, which returns the inputs as a place: x, y, and
+cosine and sine of an angle; and `press`, `(contact, place, V, pressed)`, which writes weights and levers of cells and
+returns True if the inputs change anything. `follows` is true of a centre of pressure, whose angle stays 0.
+"""

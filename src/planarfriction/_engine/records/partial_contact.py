@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from typing import Any
 
 import numpy as np
@@ -74,9 +75,14 @@ def following(
     middle = weights @ positions
     away = positions - middle[:, None]
     spread = away.mT * weights[:, None] @ away
-    radius = float(np.sqrt(np.trace(spread, axis1=1, axis2=2).max()))
+    trace = np.trace(spread, axis1=1, axis2=2)[:, None, None]
+    radius = math.sqrt(trace.max())
+    det = np.linalg.det(spread)[:, None, None]
     # A plane over cells along a line does not tilt them across it.
-    slopes = np.linalg.pinv(spread, rcond=NARROW, hermitian=True) @ away.mT
+    narrow = det <= NARROW * trace**2
+    inverse = np.where(narrow, spread, trace * np.eye(2) - spread)
+    per = np.where(narrow, trace**2, det)
+    slopes = inverse / np.where(per > 0.0, per, 1.0) @ away.mT
     record = functools.partial(
         following_cells.FollowingContact, centre_x=centre[0], centre_y=centre[1]
     )
@@ -104,20 +110,20 @@ def _packed(
         own = weights[0].copy(), cells.copy()
         return Pressed(row_of(compiled.record(own[1], own[0])[0]), *own)
 
-    calls = calls_of(packed.functions, change=source.SOURCE.follows)
+    calls = calls_of(packed.functions, change=lag > 0.0)
     given = GivenPressure(
         count=len(x), numbers=len(cells), states=n, calls=calls, x=x, y=y, whole=packed.records, weights=weights,
         held=room(), trial=room(), acts=np.zeros(1), rate=np.zeros(n), wrench=np.zeros(3),
-        by_input=np.zeros((source.SOURCE.inputs, n)), zero=np.zeros(n), rows=np.zeros(12), radius=radius,
+        by_input=np.zeros((3, n)), zero=np.zeros(n), rows=np.zeros(12), radius=radius,
         height=height, lag=lag,
     )  # fmt: skip
     at = {"whole": places_of(packed.records), "weights": places_of(weights)}
-    record = make(given=given, **by_load)
     columns = {name: places_of(rows) for name, rows in by_load.items()}
     columns["given"] = rows_of(given, count, **at)
+    record = make(given=columns["given"][0], **by_load)
     return packed._replace(
         functions=source.FUNCTIONS,
         records=rows_of(record, count, **columns),
         workspace=OWN + packed.workspace,
-        keepalive=(*packed.keepalive, record),
+        keepalive=(*packed.keepalive, given, record),
     )
