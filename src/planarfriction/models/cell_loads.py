@@ -95,7 +95,7 @@ class Cells(NamedTuple):
             *(
                 None
                 if 0 in each.shape[1:]
-                else each.reshape(*batch[:-1], *each.shape[1:])
+                else each.reshape((*batch[:-1], *each.shape[1:]))
                 for each in rows
             )
         )
