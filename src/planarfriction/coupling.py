@@ -262,7 +262,9 @@ class CoupledPatches(ByValue):
             each = pressing.spread(batch)
             model = self.models[p].compiled
             own = slice(*self._bounds[p : p + 2])
-            states[:, own] = model.left(np.ascontiguousarray(states[:, own]), each)
+            states[:, own] = each.left(
+                np.ascontiguousarray(states[:, own]), model.components
+            )
             loads[:, p] = each.load
             held[p] = model.bristles.under(each)
         return held

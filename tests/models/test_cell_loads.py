@@ -79,6 +79,20 @@ def test_loads_under_moments_are_those_of_the_tilted_pressure():
     np.testing.assert_allclose(given[1], wanted[1], rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["cells", "discs of a layer"])
+def test_covers_of_a_batch_have_one_set_of_loads(name):
+    model = MODELS[name]
+    rng = np.random.default_rng(3)
+    loads = rng.uniform(0.1, 1.0, model.patch.cells)
+    state, twist, _ = drawn(model, 3, rng)
+    cover = rng.uniform(0.5, 1.0, (3, model.patch.cells))
+    all_at_once = model.step(state, twist, None, 1e-3, loads=loads, cover=cover)
+    for b in range(3):
+        alone = model.step(state[b], twist[b], None, 1e-3, loads=loads, cover=cover[b])
+        for got, wanted in zip(all_at_once, alone, strict=True):
+            np.testing.assert_allclose(got[b], wanted, rtol=1e-12, atol=1e-18)
+
+
 def test_what_lifts_takes_its_force_along_and_comes_back_unstressed():
     """Two feet on a pad, of stiffness K/2 each, pulled by d: K d, K d/2 without one, and K d/2 when it is back."""
     feet = pf.ContactPatch.points([[0.0, 0.005], [0.0, -0.005]])

@@ -57,43 +57,26 @@ class _Tilt(NamedTuple):
         """Return the pressure of a plane on the cells `[N]`; < 0 where these lift."""
         return (self.corners * plane).sum(-1)
 
-    def slopes(self, plane: jax.Array, step: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """Return the slope of the dual along a step, and how it rises."""
+    def slope(self, plane: jax.Array, step: jax.Array) -> jax.Array:
+        """Return the slope of the dual along a step at a plane."""
         here = self.pressure(plane)
-        along = self.pressure(step)
-        share = jnp.where(here > 0.0, self.share * along, 0.0)
-        slope = (
+        share = jnp.where(here > 0.0, self.share * self.pressure(step), 0.0)
+        return (
             SOFTNESS * (plane[1:] * step[1:]).sum()
             - (step * self.asked).sum()
             + (share * here).sum()
         )
-        return slope, SOFTNESS * (step[1:] * step[1:]).sum() + (share * along).sum()
 
     def share_of(self, plane: jax.Array, step: jax.Array) -> jax.Array:
         """Return the share of a step to go."""
-        first, _ = self.slopes(plane, step)
-
-        def ends(far: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-            here, rise = self.slopes(plane + far * step, step)
-            return (
-                here,
-                rise,
-                ~(abs(here) > OVERSHOT * abs(first)) | ((far == 1.0) & (here < 0.0)),
-            )
-
-        def body(last):
-            far, low, high, here, rise, _, count = last
-            low = jnp.where(here > 0.0, low, far)
-            high = jnp.where(here > 0.0, far, high)
-            ahead = far - here / rise
-            far = jnp.where((low < ahead) & (ahead < high), ahead, 0.5 * (low + high))
-            return far, low, high, *ends(far), count + 1
-
-        whole = jnp.ones_like(first)
-        start = whole, jnp.zeros_like(first), whole, *ends(whole), jnp.asarray(1)
+        most = OVERSHOT * abs(self.slope(plane, step))
         return jax.lax.while_loop(
-            lambda last: ~last[5] & (last[6] < SHORTENINGS), body, start
-        )[0]
+            lambda far: (
+                (self.slope(plane + far * step, step) > most) & (far > 0.5**SHORTENINGS)
+            ),
+            lambda far: 0.5 * far,
+            jnp.ones_like(most),
+        )
 
     def pressing(self, narrow: jax.Array) -> jax.Array:
         """Return the cells that press in the end, bool `[N]`."""

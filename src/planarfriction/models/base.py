@@ -150,9 +150,9 @@ class FrictionModel(ByValue):
     def _evaluated(
         self, state: Any, twist: Any, normal_force: Any, moments: Any
     ) -> tuple[np.ndarray, np.ndarray]:
-        state, twist, load, centre = self._inputs(state, twist, normal_force, moments)
-        rate, unit = self.compiled.evaluate(state, twist, load, centre)
-        return rate, load[..., None] * unit
+        inputs = self._inputs(state, twist, normal_force, moments)
+        rate, unit = self.compiled.evaluate(*inputs)
+        return rate, inputs[2][..., None] * unit
 
     def step(
         self,
@@ -186,19 +186,13 @@ class FrictionModel(ByValue):
         for `loads` beside another load or in a model without cells.
         """
         compiled = self.compiled
-        if loads is not None or cover is not None:
-            *inputs, pressing = self._given(
-                state, twist, normal_force, moments, loads, cover, dt
-            )
-            return compiled.step(*inputs, pressing)
-        if moments is not None:
-            return compiled.step(
-                *self._inputs(state, twist, normal_force, moments, dt=dt)
-            )
-        return (
+        plain = moments is None and loads is None and cover is None
+        done = plain and (
             compiled.step_one(state, twist, normal_force, dt)
             or compiled.step_batch(state, twist, normal_force, dt)
-            or compiled.step(*self._inputs(state, twist, normal_force, dt=dt))
+        )
+        return done or compiled.step(
+            *self._given(state, twist, normal_force, moments, loads, cover, dt)
         )
 
     def step_jacobians(
@@ -218,18 +212,10 @@ class FrictionModel(ByValue):
 
         Raises InvalidValueError as `step` does.
         """
-        if loads is not None or cover is not None:
-            *inputs, pressing = self._given(
-                state, twist, normal_force, moments, loads, cover, dt
-            )
-            return self.compiled.step_jacobians(*inputs, pressing)
-        done = (
-            None
-            if moments is not None
-            else self.compiled.jacobians_one(state, twist, normal_force, dt)
-        )
+        plain = moments is None and loads is None and cover is None
+        done = plain and self.compiled.jacobians_one(state, twist, normal_force, dt)
         return done or self.compiled.step_jacobians(
-            *self._inputs(state, twist, normal_force, moments, dt=dt)
+            *self._given(state, twist, normal_force, moments, loads, cover, dt)
         )
 
     # ------------------------------------------------------------------ pressure given anew
@@ -246,7 +232,9 @@ class FrictionModel(ByValue):
     def _given(
         self, state: Any, twist: Any, load: Any, moments: Any, loads: Any, cover: Any, dt: Any
     ) -> list[Any]:  # fmt: skip
-        """Return checked inputs of a step under given loads, the pressure last."""
+        """Return checked inputs of a step, the pressure last."""
+        if loads is None and cover is None:
+            return self._inputs(state, twist, load, moments, dt=dt)
         for name, value in (("normal_force", load), ("moments", moments)):
             if value is not None:
                 raise InvalidValueError(name, "be None beside loads of cells", value)

@@ -48,19 +48,21 @@ class Cells(NamedTuple):
         """Return cells in discs; `discs` are their shares, places `[N, 2]` and own second moments, if these move."""
         count = int(members.cells.max()) + 1
         begins = np.append(members.begins, len(members.cells))
-        alike = members.cells, members.parted, begins
         stiffness = np.zeros(0) if stiffness is None else np.array(stiffness)
-        if discs is None:
-            none = np.zeros((4, 0))
-            return cls(Discs(*alike, stiffness, none, none[1:]), np.zeros(2), count)
-        shares, places, squares = discs
-        middle = places.mean(axis=0)
-        x, y = (places - middle).T
-        numbers = np.array([shares, x, y, x * x + y * y + squares])
-        x, y, square = members.sums(numbers[1:]) / members.sums(np.ones(count))
-        radii = np.sqrt(2.0 * np.maximum(square - x * x - y * y, 0.0))
-        whole = np.array([x, y, radii])
-        return cls(Discs(*alike, stiffness, numbers, whole), middle, count)
+        middle = np.zeros(2)
+        numbers = np.zeros((4, 0))
+        if discs is not None:
+            shares, places, squares = discs
+            middle = places.mean(axis=0)
+            x, y = (places - middle).T
+            numbers = np.array([shares, x, y, x * x + y * y + squares])
+        alike = members.cells, members.parted, begins
+        held = Discs(*alike, stiffness, numbers, np.zeros((3, len(members.begins))))
+        cells = cls(held, middle, count)
+        if discs is not None:
+            every = np.ones((1, count))
+            held.whole[:] = cells._gathered(every, every, every)[2]
+        return cells
 
     def under(self, loads: Any, cover: Any = None) -> Pressing:
         """Return the discs under `loads` `[..., N]` [N], now or (before, now), with the pressed shares of cells.
@@ -85,27 +87,29 @@ class Cells(NamedTuple):
         ]
         if ((given[1] == 0.0) & (given[0] > 0.0)).any():
             raise InvalidValueError("cover", "be > 0 where a cell bears load", 0.0)
-        return self._gathered(*given, batch[:-1])
+        weights, pads, moved = self._gathered(*given)
+        moved[:, :2] += self.middle[:, None]
+        load = given[0].sum(-1)
+        rows = load, weights, moved[:, :2], moved[:, 2], pads[:, 0], pads[:, 1]
+        return Pressing(
+            *(
+                None
+                if 0 in each.shape[1:]
+                else each.reshape((*batch[:-1], *each.shape[1:]))
+                for each in rows
+            )
+        )
 
     def _gathered(
-        self, now: np.ndarray, cover: np.ndarray, before: np.ndarray, batch: tuple[int, ...]
-    ) -> Pressing:  # fmt: skip
-        n = len(self.discs.begins) - 1
+        self, now: np.ndarray, cover: np.ndarray, before: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what `gather` writes."""
+        n = self.discs.whole.shape[1]
         weights = np.empty((len(now), n))
         pads = np.empty((len(now), 2, n if self.discs.stiffness.size else 0))
         moved = np.empty((len(now), 3, n if self.discs.numbers.size else 0))
         gather(now, cover, before, self.discs, weights, pads, moved)
-        moves = moved.size > 0
-        return Pressing(
-            now.sum(-1).reshape(batch),
-            weights.reshape(*batch, n),
-            (moved[:, :2] + self.middle[:, None]).reshape(*batch, 2, n)
-            if moves
-            else None,
-            moved[:, 2].reshape(*batch, n) if moves else None,
-            pads[:, 0].reshape(*batch, n) if pads.size else None,
-            pads[:, 1].reshape(*batch, n) if pads.size else None,
-        )
+        return weights, pads, moved
 
 
 def in_time(value: Any) -> tuple[Any, Any]:

@@ -19,6 +19,7 @@ from planarfriction._engine.compiler import SOURCES, kept_numbers
 from planarfriction._engine.compiler.messages import show, watched
 from planarfriction._engine.compiler.sources import digest_of
 from planarfriction.laws import FrictionLaw, LuGre
+from planarfriction.models.cell_loads import Cells
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.pads import Pad, Pieces
 from planarfriction.patch import ContactPatch
@@ -81,26 +82,14 @@ def _gathered(
     """Return discs of clusters of cells by their `shares`, and their stiffness."""
     members = clusters_of(patch, shares, n)
     weights = patch.weights()
-    load = members.sums(weights)
-    places = np.array([members.sums(weights * each) for each in patch.positions.T])
-    places = (places / load).T
-    sizes = np.diff([*members.begins, len(members.cells)])
-    away = patch.positions[members.cells] - np.repeat(places, sizes, axis=0)
-    squares = (away**2).sum(axis=1) + (patch.cell_extents() ** 2).sum(axis=1)[
-        members.cells
-    ] / 12.0
-    second = np.add.reduceat(
-        weights[members.cells] * members.parted * squares, members.begins
-    )
+    squares = (patch.cell_extents() ** 2).sum(axis=1) / 12.0
+    cells = Cells.of(members, None, (weights, patch.positions, squares))
+    places = cells.discs.whole[:2].T + cells.middle
     areas = members.sums(patch.areas)
+    law = PerCell(members.sums(weights) / areas)
     with warnings.catch_warnings(action="ignore"):  # of the size, said before
         few = type(patch)(
-            places,
-            areas,
-            PerCell(load / areas),
-            None,
-            patch.name,
-            radii=np.sqrt(2.0 * second / load),
+            places, areas, law, None, patch.name, radii=cells.discs.whole[2]
         )
     return few, members.sums(stiffness)
 

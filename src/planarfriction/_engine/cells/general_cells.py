@@ -14,7 +14,7 @@ from planarfriction._engine.bristles.law import traction
 from planarfriction._engine.cells.cells import Lever
 from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.ratios import ratio
-from planarfriction._engine.codegen.small_matrices import inverse
+from planarfriction._engine.codegen.small_matrices import inverse, inverse_2
 from planarfriction._engine.codegen.source import run_source, text_of
 from planarfriction._engine.codegen.vectors import (
     Vector,
@@ -90,7 +90,7 @@ def bristle(size: int, linear: bool) -> Bristle:
     identity = tuple(float(i % (size + 1) == 0) for i in range(size * size))
     readers = reader_of(size), reader_of(size * size)
     return Bristle(
-        size, *readers, identity, inverse if size == 3 else _inverse_2, linear
+        size, *readers, identity, inverse if size == 3 else inverse_2, linear
     )
 
 
@@ -122,16 +122,6 @@ def _rows_of(back: Any, size: int) -> Any:
         "rows(tape)", [*lines, f"return {', '.join(f'({row})' for row in rows)}"]
     )
     return kernel(run_source("slopes", source, {"back": back})["rows"])
-
-
-@kernel
-def _inverse_2(shift: float, m: Vector) -> Vector:
-    a = shift - m[0]
-    b = -m[1]
-    c = -m[2]
-    d = shift - m[3]
-    per = 1.0 / (a * d - b * c)
-    return per * d, -per * b, -per * c, per * a
 
 
 @kernel

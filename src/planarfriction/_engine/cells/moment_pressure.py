@@ -35,7 +35,7 @@ NARROW = 1e-8
 """Square of the ratio of width to length below which cells count as a line, across which a plane does not tilt them."""
 
 OVERSHOT = 0.5
-"""Slope along a Newton step at which it may end, as a share of the slope at its start."""
+"""Slope along a Newton step up to which it may end, as a share of the slope at its start."""
 
 REACH = 1e15
 """Distance [m] at which a centre of pressure may be asked for; a load of nearly nothing has one beyond. Its square
@@ -153,7 +153,7 @@ def _fitted(
 
 
 @kernel
-def _slopes(
+def _slope(
     x: Doubles,
     y: Doubles,
     w: Doubles,
@@ -162,22 +162,19 @@ def _slopes(
     s: Scaled,
     plane: Plane,
     step: Plane,
-) -> Vector:
-    """Return the slope of the dual along a step at a plane, and how the slope rises."""
+) -> float:
+    """Return the slope of the dual along a step at a plane."""
     slope = (
         SOFTNESS * (plane.x * step.x + plane.y * step.y)
         - step.height
         - step.x * s.x
         - step.y * s.y
     )
-    rise = SOFTNESS * (step.x * step.x + step.y * step.y)
     for i in range(n):
         level = _at(plane, s, x[i], y[i])
-        along = _at(step, s, x[i], y[i])
-        carried = w[i] / total * along if level > 0.0 else 0.0
-        slope = slope + carried * level
-        rise = rise + carried * along
-    return slope, rise
+        carried = w[i] / total * _at(step, s, x[i], y[i])
+        slope = slope + (carried * level if level > 0.0 else 0.0)
+    return slope
 
 
 @kernel
@@ -208,18 +205,16 @@ def _share_of(
     plane: Plane,
     step: Plane,
 ) -> float:
-    """Return the share of a step to go: all, or to about where the dual is least along the step."""
-    first = _slopes(x, y, w, n, total, s, plane, step)[0]
-    low = 0.0
-    high = 1.0
+    """Return the share of a step to go: all, or so little that the dual hardly rises there."""
     far = 1.0
-    for _ in range(SHORTENINGS):
-        slope, rise = _slopes(x, y, w, n, total, s, _stepped(plane, far, step), step)
-        if not (abs(slope) > OVERSHOT * abs(first)) or (far == 1.0 and slope < 0.0):
+    first = 0.0
+    for i in range(SHORTENINGS):
+        slope = _slope(x, y, w, n, total, s, _stepped(plane, far, step), step)
+        if i == 0 and slope > 0.0:
+            first = abs(_slope(x, y, w, n, total, s, plane, step))
+        if not slope > OVERSHOT * first:
             break
-        low, high = (low, far) if slope > 0.0 else (far, high)
-        next_one = far - slope / rise
-        far = next_one if low < next_one and next_one < high else 0.5 * (low + high)
+        far *= 0.5
     return far
 
 

@@ -54,6 +54,17 @@ def inverse(shift: float, m: Doubles) -> Vector:
 
 
 @kernel
+def inverse_2(shift: float, m: Vector) -> Vector:
+    """Return `(shift I - M)^-1` of a matrix [2, 2]."""
+    a = shift - m[0]
+    b = -m[1]
+    c = -m[2]
+    d = shift - m[3]
+    per = 1.0 / (a * d - b * c)
+    return per * d, -per * b, -per * c, per * a
+
+
+@kernel
 def _rotate(s: Doubles, q: Doubles, i: int, j: int) -> None:
     """Rotate the symmetric matrix s [3, 3], so that `s_ij = 0`; its axes are the columns of q."""
     off = s[3 * i + j]

@@ -26,6 +26,7 @@ from planarfriction._engine.coupled.steps import (
 )
 from planarfriction._engine.protocol import StepFunctions
 from planarfriction._engine.records.packed import PackedModel, driven, rates
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support.equality import by_parts
 from planarfriction.geometry import twist_at, wrench_at
 
@@ -150,19 +151,14 @@ class CompiledModel:
         return None if self.depends_on_load else self.with_all_states([None])
 
     def pressed(
-        self, load: np.ndarray, centre: np.ndarray | None = None
+        self, load: np.ndarray, pressure: Any = None
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """Yield rows of the flat batch, the model at the load of each row or at the one load of all, and offsets.
 
-        Pressures are about the centres `[..., 2]` [m], if given: patches whose pressure keeps its shape move by offsets
-        `[rows, 2]` [m], None else. Models of cells take a `Pressing` in place of centres. Rows without load may be left
-        out; their results are zero.
+        A pressure is a `Pressing` of cells, or its centres `[..., 2]` [m]: patches whose pressure keeps its shape move
+        by offsets `[rows, 2]` [m], None else. Rows without load may be left out; their results are zero.
         """
         raise NotImplementedError
-
-    def left(self, state: np.ndarray, pressure: Any) -> np.ndarray:
-        """Return the state that a new pressure leaves of one before: all of it, unless cells of a pad have come."""
-        return state
 
     def points(self) -> tuple[np.ndarray, int]:
         """Return the cells that share the load, `[n, 2]` [m], and the words of their record, or one point that has all.
@@ -306,14 +302,14 @@ class CompiledModel:
         state: np.ndarray,
         twist: np.ndarray,
         load: np.ndarray,
-        centre: np.ndarray | None = None,
+        pressure: Any = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rates of the states, and wrenches per unit load `[..., 3]`; `centre` as in `pressed`."""
+        """Return the rates of the states, and wrenches per unit load `[..., 3]`; `pressure` as in `pressed`."""
         z = state.reshape(-1, self._size)
         v = twist.reshape(-1, 3)
         rate = np.zeros(z.shape)
         unit = np.zeros(v.shape)
-        for rows, contact, offset in self.pressed(load, centre):
+        for rows, contact, offset in self.pressed(load, pressure):
             rate[rows], pull = rates(
                 contact,
                 z[rows],
@@ -328,16 +324,18 @@ class CompiledModel:
         twist: np.ndarray,
         load: np.ndarray,
         dt: np.ndarray,
-        centre: np.ndarray | None = None,
+        pressure: Any = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return new states and wrenches `[..., 3]`; `centre` as in `pressed`."""
-        z = self.left(state, centre).reshape(-1, self._size)
+        """Return new states and wrenches `[..., 3]`; `pressure` as in `pressed`."""
+        if isinstance(pressure, Pressing):
+            state = pressure.left(state, self.components)
+        z = state.reshape(-1, self._size)
         v = twist.reshape(-1, 3)
         f = load.reshape(-1)
         h = dt.reshape(-1)
         new = np.zeros(z.shape)
         wrench = np.zeros(v.shape)
-        for rows, contact, offset in self.pressed(load, centre):
+        for rows, contact, offset in self.pressed(load, pressure):
             end = np.empty_like(z[rows])
             pull = np.empty_like(v[rows])
             table = self.step_table(contact)
@@ -353,15 +351,16 @@ class CompiledModel:
         twist: np.ndarray,
         load: np.ndarray,
         dt: np.ndarray,
-        centre: np.ndarray | None = None,
+        pressure: Any = None,
     ) -> StepJacobians:
-        """Differentiate steps, with the pressure held; `centre` as in `pressed`."""
+        """Differentiate steps, with the pressure held; `pressure` as in `pressed`."""
         inputs = np.concatenate(
             [twist, load[..., None], dt[..., None]], axis=-1
         ).reshape(load.size, 5)
         z = state.reshape(-1, self._size)
         results = np.zeros((load.size, self._per_contact))
-        for rows, contact, offset in self.pressed(load, centre):
+        at = np.tile(np.eye(3), (load.size, 1, 1))
+        for rows, contact, offset in self.pressed(load, pressure):
             numbers = inputs[rows]
             numbers[:, :3] = _seen(numbers[:, :3], offset)
             result = np.empty(len(numbers) * self._per_contact + self._scratch)
@@ -371,39 +370,26 @@ class CompiledModel:
             results[rows] = result[: -self._scratch].reshape(
                 len(numbers), self._per_contact
             )
-            if offset is not None and len(offset) > 0:
-                self._move(results, rows, offset)
-        return StepJacobians(
+            if offset is not None:
+                at[rows, 0, 2] = -offset[:, 1]
+                at[rows, 1, 2] = offset[:, 0]
+        done = StepJacobians(
             *(
                 results[:, place].reshape(*load.shape, *shape)
                 for place, shape in self._derivatives
             )
         )
-
-    def _move(self, results: np.ndarray, rows: Any, offset: np.ndarray) -> None:
-        """Bring the derivatives of patches at an offset to the twist and the wrench about the origin, in place."""
-        at = np.tile(np.eye(3), (len(offset), 1, 1))
-        at[:, 0, 2] = -offset[:, 1]
-        at[:, 1, 2] = offset[:, 0]
+        if (at == np.eye(3)).all():
+            return done
+        # Of patches at an offset, by the twist and of the wrench about the origin.
+        at = at.reshape(*load.shape, 3, 3)
         back = at.mT
-        (_, state_twist, _, wrench_state, wrench_twist, wrench_load) = (
-            p for p, _ in self._derivatives
+        return done._replace(
+            state_twist=done.state_twist @ at,
+            wrench_state=back @ done.wrench_state,
+            wrench_twist=back @ done.wrench_twist @ at,
+            wrench_load=(back @ done.wrench_load[..., None])[..., 0],
         )
-        for place, left, right in (
-            (state_twist, None, at),
-            (wrench_state, back, None),
-            (wrench_twist, back, at),
-        ):
-            block = results[rows, place].reshape(
-                len(offset), *((-1, 3) if left is None else (3, -1))
-            )
-            block = block if right is None else block @ right
-            results[rows, place] = (block if left is None else left @ block).reshape(
-                len(offset), -1
-            )
-        results[rows, wrench_load] = (back @ results[rows, wrench_load][..., None])[
-            ..., 0
-        ]
 
     # ------------------------------------------------------------------ for the loops of others
 

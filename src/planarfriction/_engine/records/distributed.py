@@ -90,22 +90,19 @@ class CompiledDistributed(CompiledModel):
     # ------------------------------------------------------------------ at given loads
 
     def pressed(
-        self, load: np.ndarray, centre: np.ndarray | Pressing | None = None
+        self, load: np.ndarray, pressure: Any = None
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """See `CompiledModel`; all rows at once, each with its own weights."""
-        if isinstance(centre, Pressing):
-            yield slice(None), self.under(centre), None
+        if pressure is None and self.fixed is not None:
+            yield slice(None), self.fixed, None
             return
-        contact = self.fixed if centre is None else None
-        if contact is None:
+        if not isinstance(pressure, Pressing):
             weights = self.patch.weights(load.reshape(-1))
-            moved = (
-                weights
-                if centre is None
-                else tilted(self.patch.positions, weights, centre.reshape(-1, 2))
-            )
-            contact = self._packed(moved)
-        yield slice(None), contact, None
+            if pressure is not None:
+                centres = pressure.reshape(-1, 2)
+                weights = tilted(self.patch.positions, weights, centres)
+            pressure = Pressing(load, weights)
+        yield slice(None), self.under(pressure), None
 
     def under(self, given: Pressing) -> PackedModel:
         """Pack the cells under given loads, with numbers of their own if they move or their stiffness changes."""
@@ -130,29 +127,20 @@ class CompiledDistributed(CompiledModel):
         rows = rows_of(record, len(weights), **columns)
         return packed._replace(records=rows, keepalive=(weights, numbers))
 
-    def left(self, state: np.ndarray, pressure: Any) -> np.ndarray:
-        """See `CompiledModel`."""
-        if not isinstance(pressure, Pressing) or pressure.kept is None:
-            return state
-        left = state.reshape(len(pressure.kept), -1).copy()
-        bristles = left[:, : self.size * pressure.kept.shape[1]]
-        bristles *= np.tile(pressure.kept, self.size)
-        return left.reshape(state.shape)
-
     def step_jacobians(
         self,
         state: np.ndarray,
         twist: np.ndarray,
         load: np.ndarray,
         dt: np.ndarray,
-        centre: np.ndarray | Pressing | None = None,
+        pressure: Any = None,
     ) -> StepJacobians:
         """See `CompiledModel`; by the state before it was left."""
-        state = self.left(state, centre)
-        slopes = super().step_jacobians(state, twist, load, dt, centre)
-        if not isinstance(centre, Pressing) or centre.kept is None:
-            return slopes
-        kept = centre.kept.reshape(*load.shape, 1, 1, -1)
+        if not isinstance(pressure, Pressing) or pressure.kept is None:
+            return super().step_jacobians(state, twist, load, dt, pressure)
+        state = pressure.left(state, self.size)
+        slopes = super().step_jacobians(state, twist, load, dt, pressure)
+        kept = pressure.kept.reshape(*load.shape, 1, 1, -1)
         return slopes._replace(
             state_state=slopes.state_state * kept,
             wrench_state=slopes.wrench_state * kept,

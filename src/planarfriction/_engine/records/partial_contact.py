@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from typing import Any
 
 import numpy as np
 
 from planarfriction._engine.cells import edge_cells, following_cells
+from planarfriction._engine.cells.given_pressure import (
+    OWN,
+    GivenPressure,
+    Pressed,
+)
 from planarfriction._engine.cells.moment_pressure import NARROW
-from planarfriction._engine.compiler.memory import place_of, places_of, row_of, rows_of
+from planarfriction._engine.compiler.memory import places_of, row_of, rows_of
 from planarfriction._engine.protocol import calls_of
 from planarfriction._engine.records.distributed import CompiledDistributed
 from planarfriction._engine.records.packed import PackedModel
@@ -16,72 +23,6 @@ from planarfriction.errors import InvalidValueError
 
 SMALLEST = 1e-9
 """Least radius of the disc that a cell stands for [m]: a point without size is covered or not."""
-
-
-def under_edge(
-    compiled: CompiledDistributed, packed: PackedModel, outline: np.ndarray
-) -> PackedModel:
-    """Return packed cells that carry load where the body is above them, whose `outline` is `[M, 2]` [m].
-
-    Raises InvalidValueError for an outline around nothing.
-    """
-    (weights, cells) = packed.keepalive
-    chosen = packed.cells
-    patch = compiled.patch
-    x, y = np.ascontiguousarray(patch.positions[chosen].T)
-    # A disc of the same area.
-    sides = np.sqrt(patch.cell_extents()[chosen].prod(axis=1) / np.pi)
-    radii = np.maximum(
-        np.where(patch.radii[chosen] > 0.0, patch.radii[chosen], sides), SMALLEST
-    )
-    centre = np.array([x.mean(), y.mean()])
-    middle = np.append(centre, (np.hypot(x - centre[0], y - centre[1]) + radii).max())
-    # A corner may stand there twice.
-    outline = outline[(outline != np.roll(outline, 1, axis=0)).any(axis=1)]
-    ahead = np.roll(outline, -1, axis=0)
-    area = 0.5 * float(
-        (outline[:, 0] * ahead[:, 1] - outline[:, 1] * ahead[:, 0]).sum()
-    )
-    if area == 0.0:
-        raise InvalidValueError(
-            "outline", "enclose an area where a contact has an edge", "none"
-        )
-    corners = np.ascontiguousarray(outline if area > 0.0 else outline[::-1])
-    shapes = {"rate": packed.states, "by_place": (3, packed.states), "wrench": 3}
-    for name in ("held", "trial"):
-        shapes |= {f"{name}_weights": len(x), f"{name}_cells": cells.shape}
-    room = {name: np.zeros(shape) for name, shape in shapes.items()}
-    held, trial = (
-        row_of(compiled.record(room[f"{name}_cells"], room[f"{name}_weights"])[0])
-        for name in ("held", "trial")
-    )
-    arrays = {
-        "x": x,
-        "y": y,
-        "radii": radii,
-        "middle": middle,
-        "outline": corners,
-        "weights": weights,
-        "cells": cells,
-    }
-    arrays |= {"calls": calls_of(packed.functions), **room}
-    record = edge_cells.EdgeContact(
-        **arrays, count=len(x), numbers=len(cells), turned=patch.anisotropic, discs=compiled.size == 3,
-        corners=len(corners), whole=place_of(packed.records), held=place_of(held), trial=place_of(trial),
-        states=packed.states,
-    )  # fmt: skip
-    return packed._replace(
-        functions=edge_cells.FUNCTIONS,
-        records=rows_of(
-            record,
-            len(weights),
-            weights=places_of(weights),
-            whole=places_of(packed.records),
-        ),
-        workspace=edge_cells.OWN + packed.workspace,
-        keepalive=(*packed.keepalive, packed.records, held, trial, *arrays.values()),
-    )
-
 
 LAG = 1e-3
 """Time [s] with which the pressure follows the load: about a step of a simulator, whose patches follow the load
@@ -91,6 +32,37 @@ STATES = 2
 """States behind the bristles: how far the centre of pressure is from the centre of mass, along x and y [m]."""
 
 
+def under_edge(
+    compiled: CompiledDistributed, packed: PackedModel, outline: np.ndarray
+) -> PackedModel:
+    """Return packed cells that carry load where the body is above them, whose `outline` is `[M, 2]` [m].
+
+    Raises InvalidValueError for an outline around nothing.
+    """
+    cells = packed.keepalive[1]
+    patch = compiled.patch
+    positions = patch.positions[packed.cells]
+    # A disc of the same area.
+    sides = np.sqrt(patch.cell_extents().prod(axis=1) / np.pi)
+    radii = np.where(patch.radii > 0.0, patch.radii, sides)[packed.cells]
+    radii = np.maximum(radii, SMALLEST)
+    centre = positions.mean(axis=0)
+    reach = (np.hypot(*(positions - centre).T) + radii).max()
+    # A corner may stand there twice.
+    outline = outline[(outline != np.roll(outline, 1, axis=0)).any(axis=1)]
+    ahead = np.roll(outline, -1, axis=0)
+    area = float((outline[:, 0] * ahead[:, 1] - outline[:, 1] * ahead[:, 0]).sum())
+    if area == 0.0:
+        rule = "enclose an area where a contact has an edge"
+        raise InvalidValueError("outline", rule, "none")
+    corners = np.ascontiguousarray(outline if area > 0.0 else outline[::-1])
+    record = functools.partial(
+        edge_cells.EdgeContact, turned=patch.anisotropic, discs=compiled.size == 3, radii=radii,
+        middle=np.append(centre, reach), outline=corners, corners=len(corners), cells=cells,
+    )  # fmt: skip
+    return _packed(compiled, packed, edge_cells, record, {}, radius=reach)
+
+
 def following(
     compiled: CompiledDistributed,
     packed: PackedModel,
@@ -98,70 +70,60 @@ def following(
     height: float,
 ) -> PackedModel:
     """Return packed cells whose pressure follows a load at `centre` [m] in the contact frame, `height` [m] above it."""
-    (weights, numbers) = packed.keepalive
+    (weights, _) = packed.keepalive
     positions = compiled.patch.positions[packed.cells]
-    count = weights.shape[1]
-    (x, y) = np.ascontiguousarray(positions.T)
-    middle, slopes, radius = _statics_of(weights, positions)
-    size = packed.states + STATES
-    blanks = {
-        "pressed": count,
-        "trial": count,
-        "scratch": size,
-        "zero": size,
-        "rows": 12,
-    }
-    scratch = {name: np.zeros(length) for name, length in blanks.items()}
-    by_load = {
-        "weights": weights,
-        "middle": middle,
-        "slope_x": slopes[0],
-        "slope_y": slopes[1],
-    }
-    arrays: dict[str, Any] = (
-        {"x": x, "y": y, "calls": calls_of(packed.functions, change=True)}
-        | scratch
-        | by_load
-    )
-    cells, trial_cells = (
-        row_of(compiled.record(numbers, scratch[name])[0])
-        for name in ("pressed", "trial")
-    )
-    record = following_cells.FollowingContact(
-        **arrays, count=count, states=packed.states, cells=place_of(cells), trial_cells=place_of(trial_cells),
-        radius=radius, centre_x=centre[0], centre_y=centre[1], height=height, lag=LAG,
-    )  # fmt: skip
-    return packed._replace(
-        functions=following_cells.FUNCTIONS,
-        records=rows_of(
-            record,
-            len(weights),
-            **{name: places_of(each) for name, each in by_load.items()},
-        ),
-        states=size,
-        workspace=following_cells.OWN + packed.workspace,
-        state_scale=np.append(
-            packed.state_scale, np.full(STATES, radius / np.sqrt(count + 1))
-        ),
-        keepalive=(*packed.keepalive, *arrays.values(), cells, trial_cells),
-    )
-
-
-def _statics_of(
-    weights: np.ndarray, positions: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return the centres of pressure `[R, 2]` of rows of weights, their slopes by it `[2, R, n]`, and a radius [m].
-
-    A plane over cells along a line does not tilt them across it.
-    """
     middle = weights @ positions
     away = positions - middle[:, None]
-    spread = np.einsum("rn,rni,rnj->rij", weights, away, away)
-    slopes = np.einsum(
-        "rij,rnj->irn", np.linalg.pinv(spread, rcond=NARROW, hermitian=True), away
+    spread = away.mT * weights[:, None] @ away
+    trace = np.trace(spread, axis1=1, axis2=2)[:, None, None]
+    radius = math.sqrt(trace.max())
+    det = np.linalg.det(spread)[:, None, None]
+    # A plane over cells along a line does not tilt them across it.
+    narrow = det <= NARROW * trace**2
+    inverse = np.where(narrow, spread, trace * np.eye(2) - spread)
+    per = np.where(narrow, trace**2, det)
+    slopes = inverse / np.where(per > 0.0, per, 1.0) @ away.mT
+    record = functools.partial(
+        following_cells.FollowingContact, centre_x=centre[0], centre_y=centre[1]
     )
-    return (
-        middle,
-        np.ascontiguousarray(slopes),
-        float(np.sqrt(np.trace(spread, axis1=1, axis2=2).max())),
+    by_load = {"middle": middle, "slopes": np.ascontiguousarray(slopes)}
+    scale = np.full(STATES, radius / np.sqrt(weights.shape[1] + 1))
+    return _packed(
+        compiled, packed, following_cells, record, by_load, radius, height, LAG
+    )._replace(
+        states=packed.states + STATES,
+        state_scale=np.append(packed.state_scale, scale),
+    )
+
+
+def _packed(
+    compiled: CompiledDistributed, packed: PackedModel, source: Any, make: Any,
+    by_load: dict[str, np.ndarray], radius: float, height: float = 0.0, lag: float = 0.0,
+) -> PackedModel:  # fmt: skip
+    """Pack cells with a source, a module; `make` its record with what sources share and arrays with rows by load."""
+    (weights, cells) = packed.keepalive
+    n = packed.states
+    count = len(packed.records)
+    x, y = np.ascontiguousarray(compiled.patch.positions[packed.cells].T)
+
+    def room() -> Pressed:
+        own = weights[0].copy(), cells.copy()
+        return Pressed(row_of(compiled.record(own[1], own[0])[0]), *own)
+
+    calls = calls_of(packed.functions, change=lag > 0.0)
+    given = GivenPressure(
+        count=len(x), numbers=len(cells), states=n, calls=calls, x=x, y=y, whole=packed.records, weights=weights,
+        held=room(), trial=room(), acts=np.zeros(1), rate=np.zeros(n), wrench=np.zeros(3),
+        by_input=np.zeros((3, n)), zero=np.zeros(n), rows=np.zeros(12), radius=radius,
+        height=height, lag=lag,
+    )  # fmt: skip
+    at = {"whole": places_of(packed.records), "weights": places_of(weights)}
+    columns = {name: places_of(rows) for name, rows in by_load.items()}
+    columns["given"] = rows_of(given, count, **at)
+    record = make(given=columns["given"][0], **by_load)
+    return packed._replace(
+        functions=source.FUNCTIONS,
+        records=rows_of(record, count, **columns),
+        workspace=OWN + packed.workspace,
+        keepalive=(*packed.keepalive, given, record),
     )

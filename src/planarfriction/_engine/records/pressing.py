@@ -36,3 +36,12 @@ class Pressing(NamedTuple):
                 for each in self
             )
         )
+
+    def left(self, state: np.ndarray, components: int) -> np.ndarray:
+        """Return the state that this pressure leaves of one before: all of it, unless cells of a pad have come."""
+        if self.kept is None:
+            return state
+        left = state.reshape(len(self.kept), -1).copy()
+        kept = np.tile(self.kept, components)
+        left[:, : kept.shape[1]] *= kept
+        return left.reshape(state.shape)

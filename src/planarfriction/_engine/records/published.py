@@ -53,14 +53,16 @@ class CompiledPublished(CompiledModel):
             yield flat == value, self.shapes.shape_at(value)
 
     def pressed(
-        self, load: np.ndarray, centre: np.ndarray | None = None
+        self, load: np.ndarray, pressure: Any = None
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """See `CompiledModel`; the patch moves as a whole to the centre of pressure."""
         for rows, shape in self.shape_at_each_load(load):
             yield (
                 rows,
                 self._at(shape),
-                None if centre is None else centre.reshape(-1, 2)[rows] - shape.place,
+                pressure
+                if pressure is None
+                else pressure.reshape(-1, 2)[rows] - shape.place,
             )
 
     def points(self) -> tuple[np.ndarray, int]:

@@ -83,7 +83,7 @@ class CompiledSoft(CompiledDistributed):
         state: np.ndarray,
         twist: np.ndarray,
         load: np.ndarray,
-        centre: np.ndarray | None = None,
+        pressure: Any = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """See `CompiledModel`."""
         rule = "have no common compliance for rates, which depend on the time in which the face follows"
@@ -95,17 +95,17 @@ class CompiledSoft(CompiledDistributed):
         twist: np.ndarray,
         load: np.ndarray,
         dt: np.ndarray,
-        centre: np.ndarray | None = None,
+        pressure: Any = None,
     ) -> StepJacobians:
         """See `CompiledModel`: those of the pieces at the twist of the face, which moves with all inputs."""
         batch = load.shape
         soft = self.compliance
         h = (dt + self.lag)[..., None, None]
-        _, wrench = self.step(state, twist, load, dt, centre)
+        _, wrench = self.step(state, twist, load, dt, pressure)
         face = state[..., -3:]
         at_face = twist + (face + wrench @ soft.T) / h[..., 0]
         bristles = state[..., :-3].reshape(*batch, *self._pieces.state_shape)
-        pieces = self._pieces.step_jacobians(bristles, at_face, load, dt, centre)
+        pieces = self._pieces.step_jacobians(bristles, at_face, load, dt, pressure)
         n = state.shape[-1] - 3
         by_face = pieces.wrench_twist
         alone = np.concatenate(
