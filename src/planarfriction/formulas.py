@@ -185,11 +185,8 @@ DISC_C = 2.28646589
 UNEVEN = 1.2
 """Unevenness of the bristles inside a disc [-]: 1 for a rigid field, more takes off a small delay of slip."""
 
-FRESH = 10.0
-"""Growth of the unevenness of a disc whose bristles have more spin than its motion [-]."""
-
-WORN = 1.4
-"""Decline of the unevenness of a disc whose bristles have less spin than its motion [-]."""
+TURNED = 60.0
+"""Growth of that unevenness where bristles have more spin than the motion, as after a reversal [-]."""
 
 ACROSS_SPIN = 0.54
 """Share of its decay that a bristle across the sliding of a disc lacks in a pure spin [-]."""
@@ -241,16 +238,18 @@ def disc_slip_share(
 ) -> Any:
     """Share of the way from breakaway to full deflection, `(d E - s_ba)/(E - s_ba)`: the rim slips before the mean.
 
-    The breakaway ratio of a disc is `s_ba/E`, `E = 1 + max(0, c y (2 - 5 y/3) + max(10 x, 1.4 x))` with c = `UNEVEN`.
-    `y = r^2` is the square of the share r of spin in z: for c = 1 and x = 0, E is the evenness `<z^2>^2/<z^4>` of a
-    rigid field. `x = s (r - s)` with the share s of spin in u: 0 of a disc on which bristles bend for the first time,
-    below 0 of one that slides. ("Discs")
+    The breakaway ratio of a disc is `s_ba/E`, `E = 1 + c y (2 - 5 y/3) + 60 x^2/y` with c = `UNEVEN` and the square `y =
+    r^2` of the share r of spin in z: for c = 1 and x = 0, E is the evenness `<z^2>^2/<z^4>` of a rigid field. `x =
+    max(0, s (r - s))` with the share s of spin in u: 0 while a disc is loaded for the first time, or slides. ("Discs")
     """
     square = spin * spin
-    bent = spin_speed * (spin - spin_speed)
+    more = xp.maximum(spin_speed * (spin - spin_speed), 0.0)
     first = 1.0 + square * (2.0 * UNEVEN - (5.0 / 3.0 * UNEVEN) * square)
-    uneven = xp.maximum(xp.maximum(first + FRESH * bent, first + WORN * bent), 1.0)
-    return (deflection * uneven - breakaway_ratio) / (uneven - breakaway_ratio)
+    # Times y: one division does for both. Of a bristle without spin, nothing is 0/0, even in single precision.
+    per = square + 1e-15
+    uneven = first * per + TURNED * (more * more)
+    rest = breakaway_ratio * per
+    return (deflection * uneven - rest) / (uneven - rest)
 
 
 # ---------------------------------------------------------------------- derivatives of a step (docs/differentiable.md)

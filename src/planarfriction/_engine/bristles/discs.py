@@ -31,6 +31,9 @@ KAPPA = math.sqrt(0.5)
 STILL = 1e-100
 """Speed [m/s] up to which the ratio of two speeds has its value at rest: the slopes leave the range of numbers."""
 
+LONG = 1e60
+"""Decay over a step [-] beyond which the prediction no longer depends on it: its cube stays in the range of numbers."""
+
 
 @kernel
 def sliding(u: Vector) -> tuple[float, float, float, float, Vector]:
@@ -75,12 +78,18 @@ class _Drive(NamedTuple):
 
 
 @kernel
+def _moving(speed: float) -> float:
+    """Return a speed; 0 up to `STILL`."""
+    return xp.where(speed > STILL, speed, 0.0)
+
+
+@kernel
 def _drive(law: LawNumbers, u: Vector, slid: tuple) -> _Drive:
     """Return the motion of a disc from its velocity and its `sliding`."""
     c_t, c_s, across, speed, pull = slid
     across = across * xp.where(law.elasto_plastic > 0.0, 1.0, formulas.PLAIN_ACROSS)
     both = 1.0 / (c_t * c_s)
-    size = norm(pull)
+    size = _moving(norm(pull))
     n_s = ratio(pull[2], size)
     return _Drive(
         u,
@@ -91,8 +100,8 @@ def _drive(law: LawNumbers, u: Vector, slid: tuple) -> _Drive:
         ratio(across, size),
         speed,
         inverse_deflection(law, speed),
-        xp.where(size > STILL, ratio(speed, size), 1.0),
-        ratio(u[2], norm(u)),
+        xp.where(size > 0.0, ratio(speed, size), 1.0),
+        ratio(u[2], _moving(norm(u))),
         (ratio(pull[0], size), ratio(pull[1], size), n_s),
     )
 
@@ -194,7 +203,7 @@ def moved(law: LawNumbers, z: Vector, u: Vector, dt: float) -> tuple[Vector, Vec
     drive = _drive(law, u, sliding(u))
     deflection, cosine, spin = _seen(drive, z)
     start = _decay(law, drive, deflection, cosine, spin)
-    ahead = _ahead(drive, z, start * dt, dt)
+    ahead = _ahead(drive, z, xp.minimum(start * dt, LONG), dt)
     end = _decay(law, drive, *_seen(drive, ahead))
     free = _relaxed(drive, z, formulas.mean_decay(start, end, dt) * dt, dt)
     far, cosine, spin = _seen(drive, free)
