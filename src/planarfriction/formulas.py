@@ -238,9 +238,9 @@ def disc_slip_share(
 ) -> Any:
     """Share of the way from breakaway to full deflection, `(d E - s_ba)/(E - s_ba)`: the rim slips before the mean.
 
-    The breakaway ratio of a disc is `s_ba/E`, `E = 1 + c y (2 - 5 y/3) + 60 x^2/y` with c = `UNEVEN` and the square `y =
-    r^2` of the share r of spin in z: for c = 1 and x = 0, E is the evenness `<z^2>^2/<z^4>` of a rigid field. `x =
-    max(0, s (r - s))` with the share s of spin in u: 0 while a disc is loaded for the first time, or slides. ("Discs")
+    The breakaway ratio of a disc is `s_ba/E`, `E = 1 + c y (2 - 5 y/3) + 60 x^2/y`. c is `UNEVEN`, y the square of the
+    share r of spin in z: for c = 1 and x = 0, E is the evenness `<z^2>^2/<z^4>` of a rigid field. `x = max(0, s (r -
+    s))` with the share s of spin in u: 0 while a disc is loaded for the first time, or slides. ("Discs")
     """
     square = spin * spin
     more = xp.maximum(spin_speed * (spin - spin_speed), 0.0)
