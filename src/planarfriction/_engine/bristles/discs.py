@@ -31,8 +31,8 @@ KAPPA = math.sqrt(0.5)
 STILL = 1e-100
 """Speed [m/s] up to which the ratio of two speeds has its value at rest: the slopes leave the range of numbers."""
 
-LONG = 1e60
-"""Decay over a step [-] beyond which the prediction no longer depends on it: its cube stays in the range of numbers."""
+LONG = 1e12
+"""Decay over a step [-] from which the prediction has slid fully; its cube stays in range, in single precision too."""
 
 
 @kernel
