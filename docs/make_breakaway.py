@@ -208,14 +208,17 @@ def two_pads(name: str) -> dict[str, float]:
 
 
 def driven(shape: str) -> dict[str, list[list[float]]]:
-    """Return by number of discs the largest and the rms error of the force of each driven motion, over `mu_c f_N`."""
+    """Return by number of discs the largest errors of force and torque and the rms of the force of each driven motion.
+
+    In units of `mu_c f_N`, the torque times the radius of gyration.
+    """
     patch = few.SHAPES[shape]()
     models = {str(n): discs(n)(patch) for n in COUNTS if n < patch.cells}
     models |= {"a disc a cell": discs(patch.cells)(patch), "all cells": pf.DistributedModel(patch, LAW),
                "published": pf.ReducedModelPublished(patch, LAW)}  # fmt: skip
     found = few.driven(patch, models, few.stopping, SEEDS)
     return {
-        name: [[float(each[0]), float(each[2])] for each in errors]
+        name: [[float(number) for number in each[:3]] for each in errors]
         for name, errors in found.items()
     }
 
@@ -363,7 +366,9 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
             "step",
             "largest error of the force: median run",
             "worst run",
-            "rms, median run",
+            "of the torque: median run",
+            "worst run",
+            "rms of the force, median run",
         ]
     ]
     for name in (*map(str, COUNTS), "a disc a cell", "all cells", "published"):
@@ -373,14 +378,15 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
             for shape in few.SHAPES
             if name in kept[f"driven {shape}"]
         ]
-        largest, rms = 100 * np.concatenate(runs).T
+        largest, torque, rms = 100 * np.concatenate(runs).T
         words = {
             str(DEFAULT): f"**{DEFAULT}**",
             "all cells": "none: a point a cell",
             "published": "none: published",
         }
         rows.append([words.get(name, name), f"{price['states']:.0f}", f"{price['step']:.2g}",
-                     f"{np.median(largest):.2g} %", f"{largest.max():.2g} %", f"{np.median(rms):.2g} %"])  # fmt: skip
+                     f"{np.median(largest):.2g} %", f"{largest.max():.2g} %", f"{np.median(torque):.2g} %",
+                     f"{torque.max():.2g} %", f"{np.median(rms):.2g} %"])  # fmt: skip
     return rows
 
 

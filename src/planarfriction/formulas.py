@@ -185,24 +185,36 @@ DISC_C = 2.28646589
 UNEVEN = 1.2
 """Unevenness of the bristles inside a disc [-]: 1 for a rigid field, more takes off a small delay of slip."""
 
+TURNED = 60.0
+"""Growth of that unevenness where bristles have more spin than the motion, as after a reversal [-]."""
+
+ACROSS_SPIN = 0.54
+"""Share of its decay that a bristle across the sliding of a disc lacks in a pure spin [-]."""
+
+ACROSS = 1.70
+"""Coefficient of that share where a disc slides [-]: 1.71 is exact where it hardly spins."""
+
+PLAIN_ACROSS = 0.5
+"""Factor of both for plain bristles [-]."""
 
 DISC_REST = 1e-37
 """Fourth power of a speed, 0.6 nm/s [m^4/s^4], below which the surface of a disc is replaced by that at rest: an
 ellipsoid with `m = 1/4`. Even in single precision it leaves nothing to divide by zero."""
 
 
-def disc_friction(xp: Any, slide: Any, spin: Any) -> tuple[Any, Any, Any]:
-    """Sliding friction of a disc, `c_t`, `c_s` and `m` [-], from `p = |u|^2` of its centre and `o = (a omega)^2`.
+def disc_friction(xp: Any, slide: Any, spin: Any) -> tuple[Any, Any, Any, Any]:
+    """Sliding friction of a disc, `c_t`, `c_s`, `m` and l [-], from `p = |u|^2` of its centre and `o = (a omega)^2`.
 
     The mean speed of the disc is `S = sqrt(p + m o)`, with `m = 1/4 + 7/36 (e_1 + A e_2)` and `(e_1, e_2, e_3) = (o^2,
     p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of sliding are `W/S`, and W is S times the gradient of S:
     `W = (c_t u, c_s kappa a omega)`, `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)` and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A
-    C e_3)`. Within 0.0085 of the exact disc. ("Discs")
+    C e_3)`. Within 0.0085 of the exact disc. A bristle across W decays more slowly, by the share `l = 0.54 e_1 + 1.70
+    e_2`. ("Discs")
     """
     return disc_friction_above(slide, spin, DISC_REST)
 
 
-def disc_friction_above(slide: Any, spin: Any, rest: Any) -> tuple[Any, Any, Any]:
+def disc_friction_above(slide: Any, spin: Any, rest: Any) -> tuple[Any, Any, Any, Any]:
     """`disc_friction` with p and o in any unit, that of their squares for `rest`, in which it takes `DISC_REST`."""
     pp = slide * slide
     po = slide * spin
@@ -217,22 +229,27 @@ def disc_friction_above(slide: Any, spin: Any, rest: Any) -> tuple[Any, Any, Any
         - (7.0 / 36.0 * DISC_A * DISC_C) * e_3
     )
     m = 0.25 + 7.0 / 36.0 * e_1 + (7.0 / 36.0 * DISC_A) * e_2
-    return 1.0 + h * e_1, 2.0 * (m - h * e_2), m
+    across = ACROSS_SPIN * e_1 + ACROSS * e_2
+    return 1.0 + h * e_1, 2.0 * (m - h * e_2), m, across
 
 
-def disc_deflection(
-    xp: Any, deflection: Any, spin_share: Any, breakaway_ratio: Any
+def disc_slip_share(
+    xp: Any, deflection: Any, spin: Any, spin_speed: Any, breakaway_ratio: Any
 ) -> Any:
-    """Deflection [-] at which a single bristle slips as much as a disc does, whose rim slips before its mean.
+    """Share of the way from breakaway to full deflection, `(d E - s_ba)/(E - s_ba)`: the rim slips before the mean.
 
-    The breakaway ratio of a disc is `s_ba/E`, `E = 1 + c y (2 - 5 y/3)`, where y is the share of spin in `|z|^2` and
-    c = `UNEVEN`: for c = 1 that is the evenness `<z^2>^2/<z^4>` of a rigid field. The share of the way from breakaway
-    to full deflection is then `(d E - s_ba)/(E - s_ba)`, and a bristle of ratio s_ba has it at the deflection returned.
-    ("Discs")
+    The breakaway ratio of a disc is `s_ba/E`, `E = 1 + c y (2 - 5 y/3) + 60 x^2/y`. c is `UNEVEN`, y the square of the
+    share r of spin in z: for c = 1 and x = 0, E is the evenness `<z^2>^2/<z^4>` of a rigid field. `x = max(0, s (r -
+    s))` with the share s of spin in u: 0 while a disc is loaded for the first time, or slides. ("Discs")
     """
-    uneven = 1.0 + UNEVEN * spin_share * (2.0 - (5.0 / 3.0) * spin_share)
-    share = (deflection * uneven - breakaway_ratio) / (uneven - breakaway_ratio)
-    return breakaway_ratio + (1.0 - breakaway_ratio) * share
+    square = spin * spin
+    more = xp.maximum(spin_speed * (spin - spin_speed), 0.0)
+    first = 1.0 + square * (2.0 * UNEVEN - (5.0 / 3.0 * UNEVEN) * square)
+    # Times y: one division does for both. Of a bristle without spin, nothing is 0/0, even in single precision.
+    per = square + 1e-15
+    uneven = first * per + TURNED * (more * more)
+    rest = breakaway_ratio * per
+    return (deflection * uneven - rest) / (uneven - rest)
 
 
 # ---------------------------------------------------------------------- derivatives of a step (docs/differentiable.md)

@@ -207,7 +207,7 @@ _TWIST = "v[0]", "v[1]", "v[2]"
 
 def _sliding(u: Any) -> Any:
     """Return what `discs.sliding` does, of a point."""
-    return 1.0, 1.0, norm(u), u
+    return 1.0, 1.0, 0.0, norm(u), u
 
 
 def _sliding_of_disc(u: Any) -> Any:
@@ -215,10 +215,11 @@ def _sliding_of_disc(u: Any) -> Any:
     slide = u[0] * u[0] + u[1] * u[1]
     spin = 2.0 * u[2] * u[2]
     per = 1.0 / (slide + spin + math.sqrt(formulas.DISC_REST))
-    c_t, c_s, m = formulas.disc_friction_above(
+    c_t, c_s, m, across = formulas.disc_friction_above(
         per * slide, per * spin, formulas.DISC_REST * per * per
     )
-    return c_t, c_s, math.sqrt(slide + m * spin), (c_t * u[0], c_t * u[1], c_s * u[2])
+    pull = c_t * u[0], c_t * u[1], c_s * u[2]
+    return c_t, c_s, across, math.sqrt(slide + m * spin), pull
 
 
 def _with(function: Any, **others: Any) -> Any:
@@ -293,7 +294,7 @@ def _distributed(model: DistributedModel, precision: str, count: int) -> Pieces:
     def steady(trace: Trace) -> Any:
         own, found, u = given(trace, "normal_force")
         found = found.law if kind.pad else found
-        speed, pull = twin(sliding)(u)[2:]
+        speed, pull = twin(sliding)(u)[3:]
         z = twin(times)(
             twin(ratio)(1.0, speed * twin(inverse_deflection)(found, speed)), pull
         )

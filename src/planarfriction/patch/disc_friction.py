@@ -17,5 +17,5 @@ def disc_friction(slide: Any, spin: Any) -> tuple[np.ndarray, np.ndarray, np.nda
     total = np.asarray(slide + spin)
     # Shares of the sum keep in range.
     per = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
-    c_t, c_s, m = formulas.disc_friction(np, slide * per, spin * per)
+    c_t, c_s, m, _ = formulas.disc_friction(np, slide * per, spin * per)
     return c_t, c_s, np.sqrt(slide + m * spin)

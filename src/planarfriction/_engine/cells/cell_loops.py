@@ -46,7 +46,7 @@ class Element(NamedTuple):
 
 
 POINT = Element("points", 2, points.evaluate, points.step, slopes=(2, 0))
-DISC = Element("discs", 3, discs.evaluate, discs.step)
+DISC = Element("discs", 3, discs.evaluate, discs.step, forward=(17, 0))
 LEANING_POINT = Element(
     "leaning points",
     2,
@@ -58,11 +58,14 @@ LEANING_DISC = Element(
     3,
     asymmetric_cells.evaluate_disc,
     asymmetric_cells.step_disc,
+    forward=(17, 0),
 )
 """Elements whose law is a `Leaning`; the asymmetry stands behind the numbers of the lever."""
 
 PAD_POINT = Element("points of a pad", 2, elastic.evaluate, elastic.step)
-PAD_DISC = Element("discs of a pad", 3, elastic.evaluate_disc, elastic.step_disc)
+PAD_DISC = Element(
+    "discs of a pad", 3, elastic.evaluate_disc, elastic.step_disc, forward=(17, 0)
+)
 """Elements whose law is an `Elastic`; `Elastic.stiff` stands behind the numbers of the lever."""
 
 

@@ -52,7 +52,7 @@ _MOST_STEPS = 60
 @kernel
 def _pull(u):
     """Return the friction `W/S` of a disc; without a spin that of a point, `u/|u|`."""
-    _, _, speed, pull = sliding(u)
+    _, _, _, speed, pull = sliding(u)
     return times(1.0 / speed, pull)
 
 
