@@ -51,7 +51,7 @@ from planarfriction.adapters.mujoco.loops.responses import (
     respond,
 )
 
-PASSES = 10
+PASSES = 30
 """Largest number of solutions of a step, again after it has activated other constraints."""
 
 SHORTENINGS = 4
@@ -185,7 +185,10 @@ def _begin(own, far):
 
 @kernel
 def _solve(own, patches, m, d, nefc):
-    """Solve for wrenches that fit the step, into the problem and the passive forces; return iterations and passes."""
+    """Solve for wrenches that fit the step, into the problem and the passive forces.
+
+    Return iterations, passes, and True if all constraints stay in the ranges for which the last pass solved.
+    """
     host = own.host
     problem = own.problem
     sparse = is_sparse(own.host, m)
@@ -211,19 +214,19 @@ def _solve(own, patches, m, d, nefc):
         if problem.iterations[0] < 0.0:
             clear(problem.wrench, 3 * host.count)
             _apply(own, d, problem.wrench)
-            return problem.iterations[0], passes
+            return problem.iterations[0], passes, False
         iterations += problem.iterations[0]
         _add(own, d)
         _apply(own, d, problem.wrench)
-        if passes >= PASSES or not leaves_range(host, m, d, own.scratch, sparse, nefc):
-            break
+        settled = not leaves_range(host, m, d, own.scratch, sparse, nefc)
+        if settled or passes >= PASSES:
+            return iterations, passes, settled
         _set_out(own)
         first = _slope(own, patches)
         shortenings = 0
         far = 1.0
         _begin(own, far)
         _accelerate(host, m, d)
-    return iterations, passes
 
 
 @kernel
@@ -240,7 +243,7 @@ def _forget(host, kept, d):
 
 
 @kernel
-def _remember(own, m, iterations, passes):
+def _remember(own, m, iterations, passes, settled):
     """Store the result of the step in the user data."""
     host = own.host
     kept = own.kept
@@ -260,7 +263,7 @@ def _remember(own, m, iterations, passes):
     kept.iterations[0] = iterations
     kept.passes[0] = passes
     kept.residual[0] = problem.residual[0]
-    kept.converged[0] = problem.converged[0] if valid else 0.0
+    kept.converged[0] = problem.converged[0] if settled else 0.0
 
 
 @kernel
@@ -326,8 +329,8 @@ def plan(place_of_host: Place, m: Place, d: Place) -> None:
         _accelerate(host, m, d)
         follow_centres(host, m, d, s, nefc, patches.radius, problem, kept)
         copy(problem.guess, problem.wrench, 3 * host.count)
-        iterations, passes = _solve(own, patches, m, d, nefc)
-        _remember(own, m, iterations, passes)
+        iterations, passes, settled = _solve(own, patches, m, d, nefc)
+        _remember(own, m, iterations, passes, settled)
     call_c(host.functions.mj_freeStack, (d,))
 
 
