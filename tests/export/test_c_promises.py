@@ -45,7 +45,7 @@ STEP_STACK = 6144
 BODY_STACK = 11264
 """Stack of the step of a body with derivatives of its patches [bytes]."""
 
-FACE_STACK = 7680
+FACE_STACK = 9216
 """Stack of the step of a pad whose face is looked for [bytes]."""
 
 SLOPES_STACK = 6144

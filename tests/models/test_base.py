@@ -176,7 +176,7 @@ def test_reduced_steady_state(kind, polar, azimuth, speed):
         model.wrench(state, twist, LOAD),
     ):
         # Rounding, as above, through the offset.
-        assert got == pytest.approx(expected, abs=1e-11 + 1e-12 * speed)
+        assert got == pytest.approx(expected, abs=1e-11 * (1.0 + speed))
 
 
 def test_pre_sliding_stiffness():

@@ -103,7 +103,7 @@ def test_the_solver_agrees_with_a_fine_explicit_integration(patch, ratio):
         [0.0, 0.02, 0.04, 0.06, 0.08, 0.1], [1.5, 2.5, 0.4, 1.6, 0.5, 1.2], "linear"
     )
     pull = np.array([0.7, 0.1, 3e-3])
-    wanted = _explicit(model, body, load, pull, t_end, 10_000)
+    wanted = _explicit(model, body, load, pull, t_end, 20_000)
     data = simulate(
         Scene(
             body,
