@@ -189,7 +189,7 @@ def test_a_part_of_the_motion_at_a_time_gives_the_same(monkeypatch):
         ("ellipsoid", 1e-4, 1e-5),
         ("table", 1e-5, 1e-4),
         ("reduced", 1e-4, 1e-5),
-        ("fixed reduced", 1e-4, 3e-4),
+        ("fixed reduced", 2e-5, 1e-4),
     ],
 )
 def test_derivatives_are_central_differences(kind, h, rtol):
