@@ -1,4 +1,4 @@
-"""The few numbers that are recorded, in `tests/golden.json`: of one motion of every kind of model, to 1e-9 (pads: 1e-6).
+"""Few numbers that are recorded, in `tests/golden.json`: of one motion of every kind of model, to 1e-9 (pads: 1e-6).
 
 Closed forms, differences and other backends judge these models elsewhere; this file notices that a change of the
 code's form changes their numbers. After a change that is meant, `python -m tests.test_golden` writes it again.
