@@ -25,9 +25,11 @@ demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
 
 # Two processes, each test file in one of them: results that the tests of a file share are computed once. They begin with
-# the files that compile longest. Linear algebra keeps to the processor of its process.
+# the files that compile longest. Linear algebra keeps to the processor of its process, and so does XLA, which else hands
+# the many small operations of a step from thread to thread: 4 ms become 300, and seconds where others work too.
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
+export NPROC := 1
 
 # A process that crashes ends the run and names its test; replaced, it makes pytest-xdist 3.8 wait forever at the end
 # (pytest-dev/pytest-xdist#1378).

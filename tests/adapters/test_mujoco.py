@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from planarfriction.adapters.mujoco import (  # noqa: E402
     PatchContact,
     prepare,
 )
+from planarfriction.adapters.mujoco.loops import step  # noqa: E402
 from planarfriction_studies.bench import mujoco_scenes  # noqa: E402
 from tests.support.mujoco_misfit import misfit, step_checked, twists_and_loads  # noqa: E402
 
@@ -581,3 +583,19 @@ def test_new_pairs_have_what_their_geoms_say_and_old_ones_what_they_say():
     pair = '<contact><pair geom1="block" geom2="pad left" solref="0.03 1" condim="4"/></contact></mujoco>'
     m, _, _ = _made(text.replace("</mujoco>", pair), patches)
     assert m.npair == 1 and m.pair_solref[0, 0] == 0.03 and m.pair_dim[0] == 1
+
+
+@pytest.mark.parametrize("settled", [True, False])
+def test_a_solved_step_is_converged_only_if_the_constraints_settled(
+    settled, monkeypatch
+):
+    monkeypatch.setattr(step, "copy", lambda source, target, count: None)
+    rows = dict.fromkeys(("wrench", "new", "twist", "load", "after"))
+    numbers = {name: np.zeros(1) for name in ("iterations", "passes", "residual")}
+    own = SimpleNamespace(
+        host=SimpleNamespace(count=0, states=0),
+        kept=SimpleNamespace(**rows, **numbers, converged=np.zeros(1)),
+        problem=SimpleNamespace(**rows, **numbers, converged=np.ones(1)),
+    )
+    step._remember.py_func(own, None, 3.0, 30, settled)
+    assert bool(own.kept.converged[0]) is settled

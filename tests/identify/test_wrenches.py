@@ -1,6 +1,7 @@
 """Identification from logs of twist and wrench: what went in comes out, errors are honest, gaps are named."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from planarfriction.identify.parameters import (
 from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import covariance
 from planarfriction.identify.verdicts import speed_gap
+from planarfriction.identify.wrenches import BEATEN, _like
 from tests.support.identification_logs import (
     LAW,
     LOAD,
@@ -420,3 +422,22 @@ def test_discs_grow_and_move_with_their_patch():
         pf.DistributedModel(scaled, law), None, twists, loads, 2e-3
     ).wrenches
     np.testing.assert_allclose(wrenches, expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("cost", [1.0, 0.999 * BEATEN, 1.001 * BEATEN])
+@pytest.mark.parametrize("near", [True, False])
+def test_bristles_that_lost_in_discs_are_not_fitted_in_cells(cost, near):
+    """Only if the better ones explain the data; bristles that were not tried have nothing to begin from."""
+
+    def fit(law, cost, own_radius=False):
+        kind = SimpleNamespace(own_radius=own_radius)
+        problem = SimpleNamespace(law=law, pad=None, kind=kind)
+        return SimpleNamespace(
+            fit=SimpleNamespace(problem=problem, cost=cost, near=near)
+        )
+
+    plain, better, elsewhere = fit("a", cost), fit("b", 1.0), fit("a", 0.1, True)
+    candidates = [elsewhere, plain, better]
+    for each, loses in ((plain, near and cost > BEATEN), (better, False)):
+        assert _like(each.fit.problem, candidates) == (each.fit, loses)
+    assert _like(fit("c", 1.0).fit.problem, candidates) == (None, False)

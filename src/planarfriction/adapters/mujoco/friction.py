@@ -53,6 +53,7 @@ class Report(NamedTuple):
     residual: float
     """Residual of the step in contact space [m/s]."""
     converged: bool
+    """True if the residual is below its tolerance and MuJoCo's constraints stayed as the last pass assumed them."""
 
 
 class Friction:
