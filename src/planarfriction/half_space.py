@@ -46,7 +46,7 @@ def stuck(
     moved[0, :, 2] = -places[:, 1]
     moved[1, :, 2] = places[:, 0]
     moved = moved.reshape(-1, 3)
-    soft = _compliances(places, sides, poisson_ratio) / (2.0 * math.pi * shear_modulus)
+    soft = compliances(places, places, sides, shear_modulus, poisson_ratio)
     tractions = np.linalg.solve(soft, moved)
     stiffness = moved.T @ (np.tile(whole, 2)[:, None] * tractions)
     x, y = tractions.reshape(2, -1, 3).transpose(0, 2, 1)
@@ -67,10 +67,13 @@ def _rectangles(positions: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     return np.unique(place.astype(int), axis=0, return_inverse=True)[1].reshape(-1)
 
 
-def _compliances(places: np.ndarray, sides: np.ndarray, nu: float) -> np.ndarray:
-    """Return `2 pi G` times the displacements at the middles of n rectangles by unit tractions on them, `[2n, 2n]`."""
-    x = places[:, None, 0] - places[:, 0]
-    y = places[:, None, 1] - places[:, 1]
+def compliances(
+    points: np.ndarray, places: np.ndarray, sides: np.ndarray, shear_modulus: float, poisson_ratio: float
+) -> np.ndarray:  # fmt: skip
+    """Return displacements of P points, x then y, by unit tractions on rectangles at n places, `[2P, 2n]` [m/Pa]."""
+    nu = poisson_ratio
+    x = points[:, None, 0] - places[:, 0]
+    y = points[:, None, 1] - places[:, 1]
     along = np.zeros_like(x)
     across = np.zeros_like(x)
     mixed = np.zeros_like(x)
@@ -86,7 +89,8 @@ def _compliances(places: np.ndarray, sides: np.ndarray, nu: float) -> np.ndarray
     # int 1/d is the sum of the first two.
     xx = (1.0 - nu) * along + across
     yy = along + (1.0 - nu) * across
-    return np.block([[xx, nu * mixed], [nu * mixed, yy]])
+    shears = np.block([[xx, nu * mixed], [nu * mixed, yy]])
+    return shears / (2.0 * math.pi * shear_modulus)
 
 
 def _weighed(u: np.ndarray, v: np.ndarray) -> np.ndarray:

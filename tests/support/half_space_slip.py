@@ -17,8 +17,8 @@ class SlippingHalfSpace:
         self.positions = positions
         self.area = sides[0] * sides[1]
         sizes = np.broadcast_to(sides, positions.shape)
-        soft = half_space._compliances(positions, sizes, poisson_ratio)
-        self.soft = soft / (2.0 * np.pi * shear_modulus)
+        alike = positions, sizes, shear_modulus, poisson_ratio
+        self.soft = half_space.compliances(positions, *alike)
         self.steepest = np.linalg.eigvalsh(self.soft)[-1]
 
     def tractions(self, shift, load, tractions=None, displacement=None):

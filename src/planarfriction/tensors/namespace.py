@@ -54,7 +54,7 @@ class Namespace:
 
     def __init__(self, library: Any, **own: Any) -> None:
         self._where = library.where
-        vars(self).update({name: getattr(library, name) for name in _SAME}, **own)
+        vars(self).update({name: getattr(library, name, None) for name in _SAME}, **own)
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"the array namespace has no {name}")

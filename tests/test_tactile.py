@@ -1,0 +1,173 @@
+"""Fields over a contact: they add up to its wrench, and deform as elastic bodies do."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction import half_space, tactile
+from tests.support.half_space_slip import SlippingHalfSpace
+from tests.support.refusals import refused
+
+LAW = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_1=0.4, sigma_2=0.1, elasto_plastic=0.9)
+SPRINGS = pf.LuGre(mu_c=0.8, sigma_1=0.0, elasto_plastic=0.9)
+SQUARE = pf.ContactPatch.rectangle(0.02, cells=8)
+METRIC = SQUARE.with_friction_metric(pf.friction_metric(0.4, 0.6, 1.0))
+ONE_WAY = SQUARE.with_friction_metric(np.eye(2), (0.2, 0.1))
+FINGER = pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(c=0.006, k=0.33))
+HALF_SPACE = pf.Pad.half_space(shear_modulus=0.2e6)
+LAYER = pf.Pad.layer(shear_modulus=0.2e6, thickness=3e-3)
+
+MODELS = {
+    "cells": pf.DistributedModel(SQUARE, LAW),
+    "discs": pf.ReducedModel(SQUARE, LAW),
+    "metric": pf.ReducedModel(METRIC, LAW),
+    "asymmetric": pf.DistributedModel(ONE_WAY, LAW),
+    "layer": pf.DistributedModel(SQUARE, LAW, pad=LAYER),
+    "soft finger": pf.ReducedModel(FINGER, LAW),
+}
+
+
+def moved(model, seed, batch=3):
+    """States, twists and loads of contacts that slid and stuck at random."""
+    rng = np.random.default_rng(seed)
+    state = model.rest(batch)
+    twist = np.zeros((batch, 3))
+    load = rng.uniform(1.0, 5.0, batch)
+    for _ in range(5):
+        twist = rng.normal(size=(batch, 3)) * [0.01, 0.01, 1.0]
+        state, _ = model.step(state, twist, load, 10.0 ** rng.uniform(-4, -1, batch))
+    return state, twist, load
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_forces_of_cells_add_up_to_the_wrench(name):
+    model = MODELS[name]
+    inputs = moved(model, 1)
+    patch = model.reduction.patch
+    found = tactile.forces(model, *inputs)
+    wrench = np.einsum("nia,...in->...a", patch.levers(), found)
+    expected = model.wrench(*inputs)
+    np.testing.assert_allclose(wrench, expected, rtol=0, atol=1e-12 * 5.0)
+    spread = np.einsum(
+        "n,nia,...in->...a",
+        patch.areas,
+        patch.levers(),
+        tactile.tractions(model, *inputs),
+    )
+    np.testing.assert_allclose(spread, expected, rtol=0, atol=1e-12 * 5.0)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_slip_ratios_are_0_at_rest_and_1_in_steady_sliding(name):
+    model = MODELS[name]
+    patch = model.reduction.patch
+    twist, load = np.array([0.02, 0.01, 2.0]), np.array([2.0, 0.0])
+    if not patch.asymmetric:
+        assert not tactile.slip_ratio(model, model.rest(2), np.zeros(3), load).any()
+    state = model.rest(2)
+    for _ in range(20):
+        state, _ = model.step(state, twist, load, 1.0)
+    pressed = patch.weights(2.0) > 0.0
+    ratio = tactile.slip_ratio(model, state, twist, load)
+    np.testing.assert_allclose(ratio[0, pressed], 1.0, rtol=1e-6)
+    assert not ratio[0, ~pressed].any() and not ratio[1].any()
+    slipping = tactile.slipping_area(model, state, twist, load)
+    np.testing.assert_allclose(slipping, [patch.areas[pressed].sum(), 0.0], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "pad",
+    [None, LAYER, pf.Pad.measured(4e3, common=0.4)],
+    ids=["law", "layer", "common"],
+)
+def test_a_face_that_sticks_moves_as_a_whole(pad):
+    """Displacement `-(d + phi x rho)` for shift d and turn phi far below those of slip, also between the cells."""
+    model = pf.DistributedModel(SQUARE, SPRINGS, pad=pad)
+    shift = np.array([1e-7, -2e-7, 1e-5])
+    state = model.rest()
+    for _ in range(200):
+        state, _ = model.step(state, shift / 200, 2.0, 1.0)
+    points = np.array([[0.0, 0.0], [7e-3, -3e-3], [9e-3, 9e-3]])
+    expected = -(shift[:2] + shift[2] * np.stack([-points[:, 1], points[:, 0]], 1))
+    found = tactile.displacement(model, state, tactile.markers(model, points))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-3 * 2e-7)
+
+
+@pytest.mark.parametrize("shift", [(0.1, 0, 0), (0.6, 0, 0), (0, 0, 0.5)])
+def test_the_face_of_a_half_space_bends_as_the_boundary_element_method_says(shift):
+    """In shares of the largest displacement: 0.035 in the mean square, 0.1 at a corner."""
+    pad = pf.Pad.half_space(0.2e6, 0.49)
+    model = pf.DistributedModel(SQUARE, SPRINGS, pad=pad)
+    sides = SQUARE.cell_extents()[0]
+    truth = SlippingHalfSpace(SQUARE.positions, sides, 0.2e6, 0.49)
+    load = 3.0
+    full = 1.5 * 0.8 * load / pad._stuck(SQUARE).stiffness[0, 0]
+    path = np.array(shift) * full * [1.0, 1.0, 150.0]
+    around = np.array([[0.015, 0.0], [0.0, -0.02]])
+    points = np.concatenate([SQUARE.positions, around])
+    tractions = truth.tractions(path, 0.8 * load * SQUARE.weights())
+    soft = half_space.compliances(
+        points, SQUARE.positions, np.broadcast_to(sides, (SQUARE.cells, 2)), 0.2e6, 0.49
+    )
+    expected = -(soft @ tractions.T.ravel()).reshape(2, -1).T
+    state = model.rest()
+    for _ in range(50):
+        state, _ = model.step(state, path, load, 1 / 50)
+    for _ in range(5):
+        state, _ = model.step(state, np.zeros(3), load, 0.01)
+    found = tactile.displacement(model, state, tactile.markers(model, points))
+    error = (found - expected) / np.hypot(*expected.T).max()
+    assert np.abs(error).max() < 0.1
+    assert np.sqrt((error**2).sum(1).mean()) < 0.04
+    assert np.abs(error[-2:]).max() < 0.03
+
+
+@pytest.mark.parametrize("pad", [None, LAYER], ids=["law", "layer"])
+def test_tensors_have_the_same_fields_and_their_derivatives(front, pad):
+    law = dataclasses.replace(LAW, sigma_1=0.0)
+    plain = pf.ReducedModel(SQUARE, law, cells=6, pad=pad)
+    model = front.model(SQUARE, law, "ReducedModel", cells=6, pad=pad)
+    state, twist, load = moved(plain, 2)
+    arrays = front.arrays(state, twist, load)
+    marks = tactile.markers(plain, [[1e-3, 2e-3], [-4e-3, 0.0]])
+    for field in (tactile.forces, tactile.slip_ratio):
+        found = front.plain(field(model, *arrays))
+        np.testing.assert_allclose(
+            found, field(plain, state, twist, load), rtol=1e-9, atol=1e-12
+        )
+    face = front.plain(tactile.displacement(model, arrays[0], marks))
+    np.testing.assert_allclose(
+        face, tactile.displacement(plain, state, marks), rtol=1e-9, atol=1e-18
+    )
+    one = front.arrays(state[0], twist[0], load[0])
+    slope = front.plain(
+        front.grad(lambda z: tactile.slip_ratio(model, z, *one[1:]).sum())(one[0])
+    )
+    by = np.zeros_like(state[0])
+    for index in np.ndindex(by.shape):
+        change = np.zeros_like(by)
+        change[index] = 1e-4 * np.abs(state[0]).max()
+        ends = [
+            tactile.slip_ratio(plain, state[0] + sign * change, twist[0], load[0]).sum()
+            for sign in (1.0, -1.0)
+        ]
+        by[index] = (ends[0] - ends[1]) / (2.0 * change[index])
+    np.testing.assert_allclose(slope, by, rtol=0, atol=1e-6 * np.abs(by).max())
+
+
+def test_a_field_needs_cells():
+    published = pf.ReducedModelPublished(SQUARE, LAW)
+    with refused("model .* cells or discs"):
+        tactile.forces(published, published.rest(), np.zeros(3), 1.0)
+    line = pf.DistributedModel(pf.ContactPatch.line(0.02, cells=5), LAW)
+    with refused("patch .* one line"):
+        tactile.markers(line, [[0.0, 0.0]])
+    model = MODELS["cells"]
+    with refused("points"):
+        tactile.markers(model, [0.0, 0.0, 0.0])
+    with refused("above .* between 0 and 1"):
+        tactile.slipping_area(model, model.rest(), np.zeros(3), 1.0, above=1.0)
