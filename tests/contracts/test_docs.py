@@ -326,11 +326,11 @@ def test_equations_say_where_they_are_in_the_code(name):
         assert "$$" not in section or any(map(resolve, named)), section.splitlines()[0]
 
 
-def test_scenes_page_names_every_key_and_every_member():
+def test_scene_files_page_names_every_key_and_every_member():
     from planarfriction import SoftFinger
     from planarfriction.scenes import files
 
-    page = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "scene-files.md").read_text(encoding="utf-8")
     keys = {*files.SCENE_KEYS, *files.BODY_KEYS, *files.CONTACT_KEYS}
     keys |= {field.name for field in dataclasses.fields(SoftFinger)}
     parts = families.LAWS, families.PADS, families.SHAPES
