@@ -344,9 +344,13 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
     return rows
 
 
+SHOWN = {"default": "24 discs (default)", "published": "3-state model"}
+"""Model -> its heading in the table of creep."""
+
+
 def table_of_creep(kept: dict[str, Any]) -> Rows:
-    """Rows: largest creep per cycle [nm] of all shapes, by level and model, without finer cells."""
-    rows = [["largest load", *MODELS]]
+    """Rows: maximum creep per cycle [nm] of all shapes, by level and model, without finer cells."""
+    rows = [["maximum wrench / limit", *(SHOWN.get(name, name) for name in MODELS)]]
     for level in LEVELS:
         found = [kept[f"shaken {shape} {level}"] for shape in SHAKEN]
         cells = []
@@ -364,11 +368,11 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
             "discs",
             "states",
             "step",
-            "largest error of the force: median run",
+            "maximum force error: median run",
             "worst run",
-            "of the torque: median run",
+            "maximum torque error: median run",
             "worst run",
-            "rms of the force, median run",
+            "RMS force error, median run",
         ]
     ]
     for name in (*map(str, COUNTS), "a disc a cell", "all cells", "published"):
@@ -381,8 +385,9 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
         largest, torque, rms = 100 * np.concatenate(runs).T
         words = {
             str(DEFAULT): f"**{DEFAULT}**",
-            "all cells": "none: a point a cell",
-            "published": "none: published",
+            "a disc a cell": "one disc per cell",
+            "all cells": "none: one point per cell",
+            "published": "none: 3-state model",
         }
         rows.append([words.get(name, name), f"{price['states']:.0f}", f"{price['step']:.2g}",
                      f"{np.median(largest):.2g} %", f"{largest.max():.2g} %", f"{np.median(torque):.2g} %",
