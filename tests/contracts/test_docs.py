@@ -290,11 +290,11 @@ def test_code_of_a_page_is_not_cut_off(page):
 
 EXPLANATION = (
     "physics",
+    "discs",
     "exact-surfaces",
-    "reduced-model",
+    "pads",
     "solver",
     "embedding",
-    "anisotropy",
 )
 """Pages that give equations and say which code holds them."""
 
