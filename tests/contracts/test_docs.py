@@ -37,7 +37,7 @@ OPTIONAL = (
 """Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
 RECIPES = ("pybullet", "genesis", "newton")
 """Hosts that a page has recipes for, and no extra of ours installs."""
-SLOW_PAGES = ("mjx-and-warp.md",)
+SLOW_PAGES = ("mjx-and-warp.md", "warp-kernels.md")
 """Pages whose hosts compile for a minute."""
 FAMILIES = (
     families.LAWS,
