@@ -1,4 +1,4 @@
-"""Count the words of prose of the pages: `python docs/count_words.py`.
+"""Count the words of prose of the pages: `python docs/count_words.py`; `make docs` prints them.
 
 Prose is text outside code blocks, tables, display equations and HTML comments; a link counts by its text.
 """
@@ -27,13 +27,12 @@ def words(text: str) -> int:
     return len(re.findall(r"[^\W_][\w.,'-]*", NOT_PROSE.sub(" ", text)))
 
 
-def main() -> None:
-    """Print the words of each page and their sum."""
+def report() -> list[str]:
+    """Return a line with the number of words of each page, and one with their sum."""
     counts = {page: words(page.read_text(encoding="utf-8")) for page in PAGES}
-    for page, count in counts.items():
-        print(f"{count:6}  {page.relative_to(ROOT)}")
-    print(f"{sum(counts.values()):6}  words of prose on {len(counts)} pages")
+    lines = [f"{n:6}  {page.relative_to(ROOT)}" for page, n in counts.items()]
+    return [*lines, f"{sum(counts.values()):6}  words of prose on {len(counts)} pages"]
 
 
 if __name__ == "__main__":
-    main()
+    print("\n".join(report()))
