@@ -50,6 +50,9 @@ MODELS: dict[str, tuple[Callable[[pf.ContactPatch], Any], str]] = {
 }
 """Models by the words of the tables: how they are made, and their colour."""
 
+TITLES = {"published": "3 states"}
+"""Names of models on the page and in the picture, if they differ."""
+
 PRICED: dict[str, Callable[[pf.ContactPatch], Any]] = {
     name: make for name, (make, _) in MODELS.items()
 }
@@ -316,9 +319,9 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
             "states",
             "step",
             "gradient",
-            "load of slip: median error",
-            "largest error",
-            "slip of two pads",
+            "slip-onset load: median error",
+            "maximum error",
+            "slip between two pads",
         ]
     ]
     for name in MODELS:
@@ -334,7 +337,7 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
         )
         rows.append(
             [
-                name,
+                TITLES.get(name, name),
                 *cost,
                 f"{np.median(errors):.3f} %",
                 f"{errors.max():.2f} %",
@@ -412,14 +415,14 @@ def draw(kept: dict[str, Any]) -> style.PlotFigure:
             color=colour,
             ms=3.5,
             alpha=0.7,
-            label=name,
+            label=TITLES.get(name, name),
         )
         price = kept["prices"][name]["step"]
         worst = max(each.max() for each in errors)
         right.plot(price, worst, "o", color=colour, ms=8)
     left.set_xticks(range(len(SHAPES)), [shape.replace(" ", "\n") for shape in SHAPES])
-    left.set(yscale="log", ylabel="error of the load of slip [%]")
-    right.set(xscale="log", xlabel="time of a step / published model's")
+    left.set(yscale="log", ylabel="error of the slip-onset load [%]")
+    right.set(xscale="log", xlabel="time of a step / 3-state model")
     right.set_title("largest of all", fontsize="medium", loc="left")
     right.annotate(
         "better",

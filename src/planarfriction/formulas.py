@@ -292,7 +292,7 @@ def turning_mean(xp: Any, angle: Any) -> tuple[Any, Any]:
 
     A velocity v that turns by the vector `a` in a step has the mean `v + (1 - cos a)/a^2 a x v + (a - sin a)/a^3 a x
     (a x v)`: its point goes along the chord of an arc. Below `a = 0.1` the second is its series, exact to 1e-13 there,
-    where the difference would cancel. (mujoco.md, "What is held on anything that turns")
+    where the difference would cancel. (docs/rotating-supports.md)
     """
     far = angle > 0.1
     square = angle * angle
