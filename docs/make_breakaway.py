@@ -347,13 +347,9 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
     return rows
 
 
-SHOWN = {"default": "24 discs (default)", "published": "3-state model"}
-"""Model -> its heading in the table of creep."""
-
-
 def table_of_creep(kept: dict[str, Any]) -> Rows:
     """Rows: maximum creep per cycle [nm] of all shapes, by level and model, without finer cells."""
-    rows = [["maximum wrench / limit", *(SHOWN.get(name, name) for name in MODELS)]]
+    rows = [["maximum wrench / limit", *(TITLES.get(name, name) for name in MODELS)]]
     for level in LEVELS:
         found = [kept[f"shaken {shape} {level}"] for shape in SHAKEN]
         cells = []
@@ -390,7 +386,7 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
             str(DEFAULT): f"**{DEFAULT}**",
             "a disc a cell": "one disc per cell",
             "all cells": "none: one point per cell",
-            "published": "none: 3-state model",
+            "published": "none: 3 states",
         }
         rows.append([words.get(name, name), f"{price['states']:.0f}", f"{price['step']:.2g}",
                      f"{np.median(largest):.2g} %", f"{largest.max():.2g} %", f"{np.median(torque):.2g} %",
