@@ -34,7 +34,7 @@ COST = {
     "step.published.loop": "one step of the published reduced model, compiled loop",
     "step.reduced.loop": "one step of `ReducedModel`, compiled loop, random twists",
     "step.distributed.loop": "one step of the distributed model, compiled loop",
-    "gradient.published": "value and gradient of a 2,000-step rollout with respect to parameters, twists, normal forces",
+    "gradient.published": "value and gradient of a 2,000-step rollout: all parameters, twists, normal forces",
     "gradient.reduced": "the same of `ReducedModel`",
     "import": "`import planarfriction`",
 }

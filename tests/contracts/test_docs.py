@@ -363,15 +363,20 @@ def test_pictures_are_small_and_used():
         assert f"images/{picture.name}" in used, picture.name
 
 
+def readme_rows():
+    """Return the cells behind the words of each row of README's table of errors."""
+    text = PAGES[0].read_text(encoding="utf-8")
+    table = text.partition("| error against")[2].partition("\n\n")[0]
+    rows = re.findall(r"^\| (.+) \|$", table, re.MULTILINE)
+    return [row.split(" | ")[1:] for row in rows]
+
+
 def test_readme_is_short_and_its_table_mixes_no_units():
     """Rows against what people use today, each in one unit; `make_referee` fills them, from the stored run."""
     text = PAGES[0].read_text(encoding="utf-8")
     assert text.count("\n") <= 120
     assert len(LINK.findall(prose(PAGES[0]))) <= 20
-    table = text.partition("| error against")[2].partition("\n\n")[0]
-    rows = [
-        row.split(" | ")[1:] for row in re.findall(r"^\| (.+) \|$", table, re.MULTILINE)
-    ]
+    rows = readme_rows()
     assert len(rows) == 3
     assert all(len({re.sub(r"[\d.]", "", cell) for cell in row}) == 1 for row in rows)
 
@@ -393,6 +398,18 @@ def test_readme_cites_what_the_citation_file_holds():
     )
     assert len(values) == 8
     assert [value for value in values if value not in plain] == []
+
+
+def test_numbers_of_the_prepared_paper_stand_on_pages():
+    """Those of README's first row and of its cases, and the errors of the slip-onset load."""
+    paper = (ROOT / "paper.md").read_text(encoding="utf-8")
+    first, _, cases = readme_rows()
+    numbers = [cell.removesuffix("°") for cell in first]
+    numbers += [cell.partition(" of ")[0] for cell in cases]
+    page = (ROOT / "docs" / "which-model-when.md").read_text(encoding="utf-8")
+    errors = re.findall(r"([\d.]+ %)[^|]*\| [\d.]+ mm", page)
+    assert [each for each in numbers if not re.search(rf"\b{each}\b", paper)] == []
+    assert [each for each in re.findall(r"[\d.]+ %", paper) if each not in errors] == []
 
 
 def test_the_first_page_links_every_page():
