@@ -8,9 +8,10 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE / "extensions"))
+sys.path[:0] = [str(HERE / "extensions"), str(HERE)]
 os.environ.setdefault("PYTHONHASHSEED", "0")
 
+import count_words  # noqa: E402
 import matplotlib  # noqa: E402
 
 matplotlib.use("Agg")
@@ -141,11 +142,9 @@ copybutton_prompt_text = "$ "
 
 
 def count(app, failed):
-    """Say how much there is to read."""
-    pages = [page.read_text(encoding="utf-8").split() for page in HERE.glob("*.md")]
-    logging.getLogger("planarfriction").info(
-        "%d pages of %d words", len(pages), sum(map(len, pages))
-    )
+    """Print the words of prose of each page, as `docs/count_words.py` counts them."""
+    for line in count_words.report():
+        logging.getLogger("planarfriction").info(line)
 
 
 def setup(app):

@@ -50,6 +50,9 @@ MODELS: dict[str, tuple[Callable[[pf.ContactPatch], Any], str]] = {
 }
 """Models by the words of the tables: how they are made, and their colour."""
 
+TITLES = {"published": "3 states"}
+"""Names of models on the page and in the picture, if they differ."""
+
 PRICED: dict[str, Callable[[pf.ContactPatch], Any]] = {
     name: make for name, (make, _) in MODELS.items()
 }
@@ -316,9 +319,9 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
             "states",
             "step",
             "gradient",
-            "load of slip: median error",
-            "largest error",
-            "slip of two pads",
+            "slip-onset load: median error",
+            "maximum error",
+            "slip between two pads",
         ]
     ]
     for name in MODELS:
@@ -334,7 +337,7 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
         )
         rows.append(
             [
-                name,
+                TITLES.get(name, name),
                 *cost,
                 f"{np.median(errors):.3f} %",
                 f"{errors.max():.2f} %",
@@ -345,8 +348,8 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
 
 
 def table_of_creep(kept: dict[str, Any]) -> Rows:
-    """Rows: largest creep per cycle [nm] of all shapes, by level and model, without finer cells."""
-    rows = [["largest load", *MODELS]]
+    """Rows: maximum creep per cycle [nm] of all shapes, by level and model, without finer cells."""
+    rows = [["maximum wrench / limit", *(TITLES.get(name, name) for name in MODELS)]]
     for level in LEVELS:
         found = [kept[f"shaken {shape} {level}"] for shape in SHAKEN]
         cells = []
@@ -364,11 +367,11 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
             "discs",
             "states",
             "step",
-            "largest error of the force: median run",
+            "maximum force error: median run",
             "worst run",
-            "of the torque: median run",
+            "maximum torque error: median run",
             "worst run",
-            "rms of the force, median run",
+            "RMS force error, median run",
         ]
     ]
     for name in (*map(str, COUNTS), "a disc a cell", "all cells", "published"):
@@ -381,8 +384,9 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
         largest, torque, rms = 100 * np.concatenate(runs).T
         words = {
             str(DEFAULT): f"**{DEFAULT}**",
-            "all cells": "none: a point a cell",
-            "published": "none: published",
+            "a disc a cell": "one disc per cell",
+            "all cells": "none: one point per cell",
+            "published": "none: 3 states",
         }
         rows.append([words.get(name, name), f"{price['states']:.0f}", f"{price['step']:.2g}",
                      f"{np.median(largest):.2g} %", f"{largest.max():.2g} %", f"{np.median(torque):.2g} %",
@@ -407,14 +411,14 @@ def draw(kept: dict[str, Any]) -> style.PlotFigure:
             color=colour,
             ms=3.5,
             alpha=0.7,
-            label=name,
+            label=TITLES.get(name, name),
         )
         price = kept["prices"][name]["step"]
         worst = max(each.max() for each in errors)
         right.plot(price, worst, "o", color=colour, ms=8)
     left.set_xticks(range(len(SHAPES)), [shape.replace(" ", "\n") for shape in SHAPES])
-    left.set(yscale="log", ylabel="error of the load of slip [%]")
-    right.set(xscale="log", xlabel="time of a step / published model's")
+    left.set(yscale="log", ylabel="error of the slip-onset load [%]")
+    right.set(xscale="log", xlabel="time of a step / 3-state model")
     right.set_title("largest of all", fontsize="medium", loc="left")
     right.annotate(
         "better",

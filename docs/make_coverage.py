@@ -1,4 +1,4 @@
-"""Count how often intervals contain the true value, for the table of identification.md: `python docs/make_coverage.py`.
+"""Count how often intervals contain the true value: `python docs/make_coverage.py` fills identification-diagnostics.md.
 
 The counts are kept in the file given by `--kept`, so that an interrupted run can be continued.
 """
@@ -16,7 +16,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction.identify import FitOptions, Log, identify_lugre
 
-PAGE = Path(__file__).parent / "identification.md"
+PAGE = Path(__file__).parent / "identification-diagnostics.md"
 MARK = re.compile(r"<!-- coverage -->\n\n(?:\|.*\n)+")
 
 NAMES = (

@@ -1,4 +1,4 @@
-"""Put the table and the picture of followed pushes into docs/pushing.md: `python docs/make_pushing.py`."""
+"""Put the table of pushes that are followed into docs/measured.md, and draw one: `python docs/make_pushing.py`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from planarfriction.plots.planning import draw_push
 from planarfriction_studies.measured import replayed_pushes
 from planarfriction_studies.measured.scores import drawings, interval, mean
 
-PAGE = Path(__file__).parent / "pushing.md"
+PAGE = Path(__file__).parent / "measured.md"
 MARK = re.compile(r"<!-- followed pushes -->\n\n(?:\|.*\n)+")
 SURFACES = {
     "exact surface": pf.LimitSurfaceExact,
@@ -23,7 +23,7 @@ BOARDS = {
     "hardboard": "feet on hardboard",
     "plywood": "feet on plywood",
     "flat": "flat face",
-    "in time": "in time",
+    "in time": "push trajectories",
 }
 
 

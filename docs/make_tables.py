@@ -34,7 +34,7 @@ COST = {
     "step.published.loop": "one step of the published reduced model, compiled loop",
     "step.reduced.loop": "one step of `ReducedModel`, compiled loop, random twists",
     "step.distributed.loop": "one step of the distributed model, compiled loop",
-    "gradient.published": "gradient of a 2,000-step rollout to all parameters, twists, loads, with its value",
+    "gradient.published": "value and gradient of a 2,000-step rollout: all parameters, twists, normal forces",
     "gradient.reduced": "the same of `ReducedModel`",
     "import": "`import planarfriction`",
 }
@@ -162,7 +162,7 @@ def costs(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                     f"`{name}`",
                 )
             )
-    headings = ("what", "cost", "baseline, in the same run", "ratio", "name")
+    headings = ("quantity", "cost", "baseline, in the same run", "ratio", "name")
     return {"Cost": {"headings": headings, "rows": rows}} if rows else {}
 
 

@@ -113,7 +113,7 @@ def test_names_are_known_without_loading_anything():
 
 
 def test_the_tables_of_the_docs_are_those_of_the_families():
-    page = (DOCS / "scenes.md").read_text(encoding="utf-8")
+    page = (DOCS / "scene-files.md").read_text(encoding="utf-8")
     for family in (families.MODELS, families.SURFACES):
         for name in family:
             assert f"\n| `{name}` | {family.words(name)}" in page

@@ -44,6 +44,7 @@ SUBJECTS = {
         (
             "patch",
             "laws",
+            "pads",
             "limit_surface",
             "models",
             "extend",
@@ -59,7 +60,7 @@ SUBJECTS = {
         ("scenes", "solvers", "sweeps", "plots", "warm"),
     ),
     "Embed": (
-        "Friction inside other simulators, in loops of your own, or in C.",
+        "Friction inside simulators, in a time-stepping loop, or in C.",
         "state, wrench = model.step(model.rest(), (0.01, 0.0, 1.0), normal_force=2.0, dt=1e-3)",
         ("sliding_body", "coupling", "environments", "export", "adapters", "warp"),
     ),
@@ -74,7 +75,7 @@ SUBJECTS = {
         ("identify", "joints"),
     ),
     "Plan": (
-        "Grips that hold, turn or slide a part, pushes, and controllers that do not know the friction.",
+        "Grip forces, in-hand motions, pushes, and controllers for parts of unknown friction.",
         "force = pf.planning.holding_load((0.0, -1.0, 0.0), patch, mu=0.8)",
         ("planning", "online"),
     ),

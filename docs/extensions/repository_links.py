@@ -22,6 +22,7 @@ DRESSED = {
     r"\[([^\]]+)\]\(\.\./examples/(gallery|notebooks)\)": r"{doc}`\1 <\2/index>`",
     r"\[([^\]]+)\]\(\.\./examples/((?:gallery|notebooks)/[\w/]+)\.py\)": r"{doc}`\1 <\2>`",
     r"\[([^\]]+)\]\(\.\./src/planarfriction\)": r"{doc}`\1 <api/index>`",
+    r"\[([^\]]+)\]\(\.\./src/planarfriction/[\w/]+\.py#L\d+\)": r"\1",
     r"<!-- cards -->": "{.cards}",
     r"<!-- cards pictures -->": "{.cards .pictures}",
     r"<!-- commands -->": "```{eval-rst}\n.. click:: planarfriction.cli.app:app\n"

@@ -129,7 +129,7 @@ def mean_decay(start: Any, end: Any, dt: Any) -> Any:
 
     Half and half for short steps (second order), all on the end for steps much longer than the bristle's memory,
     whose result is then the steady state of k at the end; the share of the start, `1/(2 + x + x^2)` of `x = k dt`,
-    leads over. ("A step at a held twist")
+    leads over. ("Step at constant twist")
     """
     x = 0.5 * (start + end) * dt
     return end + (start - end) / (2.0 + x + x * x)
@@ -141,7 +141,7 @@ def relaxation(xp: Any, decay_dt: Any) -> tuple[Any, Any]:
     `z(dt) = exp(-x) z + (1 - exp(-x))/x u dt`. Plain LuGre has a constant k and this is its step. Elasto-plastic
     bristles take `mean_decay` of k at the start and at a predicted end, `z_p = (z + u dt)/(1 + k dt)`: second order,
     stable at any dt. Below `x = 1e-3` the quotient is its series, exact to 1e-16 there, where the difference would
-    cancel. ("A step at a held twist")
+    cancel. ("Step at constant twist")
     """
     # e^-300 is nothing beside 1, and products with less leave the range in which processors are fast
     remaining = xp.where(decay_dt < 300.0, xp.exp(xp.maximum(-decay_dt, -300.0)), 0.0)
@@ -159,7 +159,7 @@ def reachable_deflection(xp: Any, deflection: Any, law: Any) -> Any:
     """Largest `|z|/z_max` that a step may end with: an elasto-plastic bristle never grows past `max(|z|, z_max)`.
 
     The exact solution stays in that ball, so bringing a step back onto it cannot enlarge the error. Plain LuGre needs
-    no bound: its step is exact. ("A step at a held twist")
+    no bound: its step is exact. ("Step at constant twist")
     """
     return xp.where(law.elasto_plastic > 0.0, xp.maximum(deflection, 1.0), math.inf)
 
@@ -209,7 +209,7 @@ def disc_friction(xp: Any, slide: Any, spin: Any) -> tuple[Any, Any, Any, Any]:
     p o, p^2)/(o^2 + B p o + C p^2)`. Force and scaled torque of sliding are `W/S`, and W is S times the gradient of S:
     `W = (c_t u, c_s kappa a omega)`, `c_t = 1 + h e_1`, `c_s = 2 (m - h e_2)` and `h = 7/36 ((A - B) e_1 - 2 C e_2 - A
     C e_3)`. Within 0.0085 of the exact disc. A bristle across W decays more slowly, by the share `l = 0.54 e_1 + 1.70
-    e_2`. ("Discs")
+    e_2`. (docs/discs.md)
     """
     return disc_friction_above(slide, spin, DISC_REST)
 
@@ -240,7 +240,7 @@ def disc_slip_share(
 
     The breakaway ratio of a disc is `s_ba/E`, `E = 1 + c y (2 - 5 y/3) + 60 x^2/y`. c is `UNEVEN`, y the square of the
     share r of spin in z: for c = 1 and x = 0, E is the evenness `<z^2>^2/<z^4>` of a rigid field. `x = max(0, s (r -
-    s))` with the share s of spin in u: 0 while a disc is loaded for the first time, or slides. ("Discs")
+    s))` with the share s of spin in u: 0 while a disc is loaded for the first time, or slides. (docs/discs.md)
     """
     square = spin * spin
     more = xp.maximum(spin_speed * (spin - spin_speed), 0.0)
@@ -292,7 +292,7 @@ def turning_mean(xp: Any, angle: Any) -> tuple[Any, Any]:
 
     A velocity v that turns by the vector `a` in a step has the mean `v + (1 - cos a)/a^2 a x v + (a - sin a)/a^3 a x
     (a x v)`: its point goes along the chord of an arc. Below `a = 0.1` the second is its series, exact to 1e-13 there,
-    where the difference would cancel. (mujoco.md, "What is held on anything that turns")
+    where the difference would cancel. (docs/rotating-supports.md)
     """
     far = angle > 0.1
     square = angle * angle

@@ -1,6 +1,7 @@
 """Distributions that `make dist` refuses: files missing or too many, another version, a wheel that grows."""
 
 import io
+import json
 import re
 import tarfile
 import tomllib
@@ -110,6 +111,8 @@ def test_the_version_is_the_same_everywhere():
     assert f"\nversion: {planarfriction.__version__}\n" in (
         ROOT / "CITATION.cff"
     ).read_text(encoding="utf-8")
+    deposit = json.loads((ROOT / ".zenodo.json").read_text(encoding="utf-8"))
+    assert deposit["version"] == planarfriction.__version__
     newest = re.search(
         r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE
     )

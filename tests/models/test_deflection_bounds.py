@@ -1,4 +1,4 @@
-"""Largest deflections of the bristles after steps of any length (docs/physics.md, "A step at a held twist")."""
+"""Largest deflections of the bristles after steps of any length (docs/physics.md, "Step at constant twist")."""
 
 import numpy as np
 import pytest

@@ -32,7 +32,7 @@ class DistributedModel(FrictionModel):
     zdot_i + sigma_2 v_i)`. State: bristle deflections `[2, N]` [m], x then y.
 
     A patch of discs (`ContactPatch.discs`) has a third bristle in every cell, that of its spin: cells see `u = (v_i,
-    kappa a_i omega)`, and the state is `[3, N]` [m]. They slide as discs do (docs/physics.md, "Discs").
+    kappa a_i omega)`, and the state is `[3, N]` [m]. They slide as discs do (docs/discs.md).
 
     With a friction metric, `u_i = L_i v_i` replaces `v_i`, and `L_i t_i` replaces `t_i`. With asymmetric friction the
     bristle decays towards `a_i g/sigma_0` instead of zero, `zdot_i = u_i - k_i (z_i - a_i g/sigma_0)`, `k_i = beta

@@ -87,7 +87,7 @@ class Contact(ByValue):
     pressure: Literal["fixed", "follows"] = checked(
         validation.choice, ("fixed", "follows"), default="fixed"
     )
-    """Pressure that is "fixed" to the patch, or "follows" the load (docs/physics.md, "Pressure that follows the load").
+    """Pressure that is "fixed" to the patch, or "follows" the load (docs/physics.md, "Moment-dependent pressure").
 
     It follows weight, applied forces and inertia, which act at the centre of mass, and friction, which acts below it,
     with a lag of 1 ms. The patch is fixed to the body, which has no other contact, and its model has bristles on cells.

@@ -1,8 +1,8 @@
 """Cells whose friction forwards and backwards is not the same: bristles that decay towards `c = a g(|u|)/sigma_0`.
 
 At a constant twist c is constant, so `z - c` moves as the bristle of a cell without asymmetry, whose traction less
-`sigma_0 c` is the traction (docs/anisotropy.md, "Asymmetric friction"). The speed of a disc is its mean; spin does not
-lean.
+`sigma_0 c` is the traction (docs/physics.md, "Direction-dependent friction"). The speed of a disc is its mean; spin
+does not lean.
 """
 
 from __future__ import annotations

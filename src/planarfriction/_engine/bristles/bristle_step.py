@@ -5,7 +5,7 @@ A bristle `z` driven by `u` steps by
     start = k(z),   p = z + u dt,   end = k(p / (1 + start dt)),   x = mean_decay(start, end, dt) dt,
     n = back (exp(-x) z + (1 - exp(-x))/x dt u),   k(n)
 
-(docs/physics.md, "A step at a held twist"). `k` sees the deflection `|z| q/h` and `along = z/|z| . u/h`, with the
+(docs/physics.md, "Step at constant twist"). `k` sees the deflection `|z| q/h` and `along = z/|z| . u/h`, with the
 inverse deflection `q`, the speed `v` and `h = |u|/v`. `codegen.derivatives` writes the derivatives.
 
 At the kinks: the slope of a norm at zero is zero, and `along` of no bristle is constant. A minimum or maximum of equal

@@ -7,7 +7,7 @@ along `W(u)`, and with the mean speed S (see `formulas.disc_friction`)
     z_ss = g(S)/sigma_0 W/S,     z_t' = (1 - l k z.W/|W|^2) u_t - (1 - l) (k/c_t) z_t,     z_s' = u_s - (k/c_s) z_s,
 
 where what lies across W lacks the share l of its decay, and k is the decay of a single bristle with the deflection
-`|z|/|z_ss|` and the cosine of z and W (docs/physics.md, "Discs"). A disc without a radius is the bristle of a point.
+`|z|/|z_ss|` and the cosine of z and W (docs/discs.md). A disc without a radius is the bristle of a point.
 Derivatives and loops are written from a trace of its functions.
 """
 

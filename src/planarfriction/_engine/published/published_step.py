@@ -1,7 +1,7 @@
 """The step of the published reduced model with its derivatives.
 
 In scaled coordinates, `V_S = S V` at the centre of pressure with `S = diag(1, 1, r)`, the bristle `S^-1 z` steps as in
-`bristle_step`, driven by `u = h(V) |V_S|` with `h = |u|/|V_S|` (docs/physics.md, "The published reduced model").
+`bristle_step`, driven by `u = h(V) |V_S|` with `h = |u|/|V_S|` (docs/physics.md, "The 3-state model").
 `derivatives` writes the derivatives, and the limit surface gives `du/dV_S`; its numbers are held fixed: r acts through
 `V_S` alone.
 """

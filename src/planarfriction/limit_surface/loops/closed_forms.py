@@ -361,7 +361,7 @@ def _ratio(v, q):
 
 @kernel
 def disc_sum(discs, x, y, s):
-    """Compute as `element_sum` for evenly loaded discs, in closed form (docs/physics.md, "Exact limit surfaces")."""
+    """Compute as `element_sum` for evenly loaded discs, in closed form (docs/exact-surfaces.md, "Uniform disc")."""
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(discs.radii.shape[0]):
         radius = discs.radii[k]

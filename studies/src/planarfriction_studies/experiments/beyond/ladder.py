@@ -61,7 +61,7 @@ MOVED = {
     "published": "published reduced",
     "8 discs": "ReducedModel, 8 discs",
     "reduced": f"ReducedModel, {DEFAULT} discs",
-    ALL: "ReducedModel, a disc a cell",
+    ALL: "ReducedModel, one disc per cell",
     "full": "distributed, 21 x 21",
 }
 """Model of the ladder -> its name in the report."""
