@@ -70,9 +70,9 @@ SUBJECTS = {
         ("derivatives", "torch", "jax"),
     ),
     "Measure": (
-        "Logs of motion and force give the parameters of a contact.",
+        "Logs of motion and force give the parameters of a contact; models give what a tactile sensor would measure.",
         'found = pf.identify.identify_lugre(pf.Log.from_csv("log.csv"), patch)',
-        ("identify", "joints"),
+        ("identify", "joints", "tactile"),
     ),
     "Plan": (
         "Grip forces, in-hand motions, pushes, and controllers for parts of unknown friction.",

@@ -19,6 +19,7 @@ from . import plots as plots
 from . import scenes as scenes
 from . import solvers as solvers
 from . import sweeps as sweeps
+from . import tactile as tactile
 from .coupling import HostStep as HostStep
 from .derivatives import rollout as rollout
 from .environments import randomise as randomise

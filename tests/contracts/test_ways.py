@@ -36,6 +36,7 @@ ROOMS = {
         "scenes",
         "solvers",
         "sweeps",
+        "tactile",
         "tensors",
         "torch",
         "warp",

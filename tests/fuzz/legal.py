@@ -23,6 +23,16 @@ TWISTS = np.linspace([0.0, 0.0, 0.1], [0.01, 0.005, 1.0], 20)
 TIMES = np.linspace(0.0, 0.19, 20)
 SQUARE = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)]
 
+TACTILE = (
+    "forces",
+    "tractions",
+    "slip_ratio",
+    "slipping_area",
+    "markers",
+    "displacement",
+)
+"""Functions of `tactile`."""
+
 SKIPPED = {
     "warm_up": "compiles for minutes",
     **{
@@ -51,7 +61,7 @@ RECORDS = """
     Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     GridError LimitSurface FrictionLaw RateLaw FrictionModel Pressure HostStep Measurement Estimate
-    JointFit
+    JointFit Markers
 """
 """Classes that the library makes itself, bases of families, and `HostStep` and `Measurement`, which
 are checked where they are used."""
@@ -205,6 +215,18 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "wrench": (0.0, 0.0, 0.0),
         "angle": 0.1,
         "support_velocity": (0.0, 0.1, 0.2),
+    },
+    **{
+        f"tactile.{name}": {
+            "model": DISCS,
+            "state": np.zeros(DISCS.state_shape),
+            "twist": (0.01, 0.0, 0.1),
+            "normal_force": 1.0,
+            "above": 0.9,
+            "points": [[0.0, 0.001]],
+            "markers": Fresh(lambda: pf.tactile.markers(DISCS, [[0.0, 0.001]])),
+        }
+        for name in TACTILE
     },
     "Spring": {"stiffness": 10.0, "anchor": (0.0, 0.0, 0.0), "at": (0.0, 0.0)},
     "Slider": {"outline": SQUARE},
