@@ -16,6 +16,7 @@ from planarfriction import formulas, half_space
 from planarfriction._engine.bristles import discs, elastic
 from planarfriction._engine.cells.cell_loops import KINDS
 from planarfriction._support import validation
+from planarfriction._support.described import described
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws.base import refuse_rate_law
 from planarfriction.models import DistributedModel, FrictionModel
@@ -43,6 +44,7 @@ NUMPY = Namespace(
 """The array namespace of NumPy."""
 
 
+@described
 class Markers(NamedTuple):
     """Points on the face of a pad whose displacement is asked for (see `markers`)."""
 
