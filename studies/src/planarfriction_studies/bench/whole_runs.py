@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 import subprocess
 import sys
+import time
 from typing import Any, Literal
 
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
@@ -24,31 +26,29 @@ WINDOW = 0.1
 """Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
 
 
-def _solver_times(
+def _run_times(
     *scenes: Scene, repeats: int, **options: Any
-) -> tuple[list[float], tuple[Solution, ...]]:
-    """Return the least time in the solver [s] of each scene, in turns, and their last solutions."""
-    for scene in scenes:
-        simulate(scene, **{**options, "t_end": 0.02})
-    rounds = [
-        tuple(simulate(scene, **options) for scene in scenes) for _ in range(repeats)
-    ]
-    times = [
-        min(solution.statistics.wall_time for solution in solutions)
-        for solutions in zip(*rounds, strict=True)
-    ]
-    return times, rounds[-1]
+) -> tuple[list[float], list[Solution]]:
+    """Return the least processor time of `simulate` [s] for each scene, in turns, and their last solutions."""
+    solutions = [simulate(scene, **{**options, "t_end": 0.02}) for scene in scenes]
+    least = [math.inf] * len(scenes)
+    for _ in range(repeats):
+        for i, scene in enumerate(scenes):
+            begin = time.process_time()
+            solutions[i] = simulate(scene, **options)
+            least[i] = min(least[i], time.process_time() - begin)
+    return least, solutions
 
 
 def distributed(full: bool) -> Measurement:
     """Measure the distributed model on 21 x 21 cells."""
     scene = in_hand(DistributedModel(disc(), law()))
-    (value,), _ = _solver_times(scene, repeats=5)
+    (value,), _ = _run_times(scene, repeats=5)
     if full:
         return line(
             value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end)
         )
-    (ours,), _ = _solver_times(scene, repeats=5, t_end=WINDOW)
+    (ours,), _ = _run_times(scene, repeats=5, t_end=WINDOW)
     theirs = lsoda_time(scene, WINDOW)
     words = f"SciPy LSODA over the first {WINDOW} s (the ratio is to the {ours * 1e3:.2g} ms of that window here)"
     return line(value, "s", words, theirs, theirs / ours)
@@ -58,12 +58,12 @@ def distributed_101(full: bool) -> Measurement:
     """Measure the distributed model on 101 x 101 cells, per cell and step."""
     patches = disc(101), disc(21)
     scenes = (in_hand(DistributedModel(patch, law())) for patch in patches)
-    times, solutions = _solver_times(*scenes, repeats=3, t_end=WINDOW)
+    times, solutions = _run_times(*scenes, repeats=3, t_end=WINDOW)
     ours, theirs = (
-        time
+        taken
         / (solution.statistics.steps + solution.statistics.rejections)
         / patch.cells
-        for time, solution, patch in zip(times, solutions, patches, strict=True)
+        for taken, solution, patch in zip(times, solutions, patches, strict=True)
     )
     unit = "ns per loaded cell and step"
     return line(1e9 * ours, unit, "the same on 21 x 21 cells", 1e9 * theirs)
@@ -74,7 +74,7 @@ def published(full: bool, load: Literal[1, 2] = 1) -> Measurement:
     scene = in_hand(
         ReducedModelPublished(disc(), law()), normal_force=in_hand_load(load)
     )
-    (value,), _ = _solver_times(scene, repeats=9)
+    (value,), _ = _run_times(scene, repeats=9)
     return line(
         value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end)
     )
@@ -83,7 +83,7 @@ def published(full: bool, load: Literal[1, 2] = 1) -> Measurement:
 def reduced(full: bool) -> Measurement:
     """Measure `ReducedModel`."""
     models = ReducedModel(disc(), law()), ReducedModelPublished(disc(), law())
-    (value, theirs), _ = _solver_times(*map(in_hand, models), repeats=9)
+    (value, theirs), _ = _run_times(*map(in_hand, models), repeats=9)
     return line(value, "s", "the published reduced model", theirs)
 
 
@@ -102,7 +102,7 @@ def reduced_load_dependent(full: bool) -> Measurement:
         soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid
     )
     scenes = (in_hand(ReducedModel(patch, law())) for patch in (soft, fixed))
-    (value, theirs), _ = _solver_times(*scenes, repeats=9)
+    (value, theirs), _ = _run_times(*scenes, repeats=9)
     return line(value, "s", "the same with a fixed shape", theirs)
 
 
