@@ -9,7 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.planning import holding_load, plan_grip
+from planarfriction.planning import grip, holding_load, plan_grip
 from planarfriction.planning.grip import (
     Aim,
     Grips,
@@ -138,8 +138,12 @@ def test_the_worst_friction_misses_by_less_where_that_is_the_aim():
     assert np.hypot(*worst.slide) < 4e-3
 
 
-def test_slopes_of_ends_are_differences():
-    """Central differences over 1e-3 N, right to 1e-3 of the largest; speed, slide and angle of a plate that moves."""
+def test_slopes_of_ends_are_differences(monkeypatch):
+    """Central differences over 1e-3 N, right to 1e-3 of the largest; speed, slide and angle of a plate that moves.
+
+    At 1e-4, a third of the tolerance of searches.
+    """
+    monkeypatch.setattr(grip, "LOOSE", 1e-4)
     scene = dataclasses.replace(plate(), t_end=0.2)
     grips = Grips(scene, 0, [1.0])
     times = np.array([0.0, 0.08, 0.15])

@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 import planarfriction as pf
 from planarfriction._engine.body import body, rosenbrock
 from planarfriction._engine.body.body import right_hand_side
+from planarfriction._engine.cells.cell_blocks import LANES
 from planarfriction._engine.compiler.calls import call
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes.packing import MOST_PIECES, SegmentBatches
@@ -76,10 +77,19 @@ def driven_scene():
     return pf.scenes.driven(pf.DistributedModel(SMALL, ELASTIC), twist=twist, t_end=1.0)
 
 
+def discs_scene():
+    """More discs than a block of cells has places."""
+    patch = pf.ContactPatch.disc(0.01, cells=11)
+    model = pf.ReducedModel(patch, ELASTIC, cells=patch.cells)
+    assert model.state_shape[1] > LANES
+    body = pf.Body(0.3, 4e-4, velocity=(0.1, -0.05, 2.0))
+    return pf.Scene(body, pf.Contact(model, 2.0, position=(0.03, -0.02)), 1.0)
+
+
 @pytest.mark.parametrize(
     "scene",
-    [free_scene(), moving_scene(), driven_scene()],
-    ids=["free", "on what moves", "prescribed"],
+    [free_scene(), moving_scene(), driven_scene(), discs_scene()],
+    ids=["free", "on what moves", "prescribed", "many discs"],
 )
 def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
     packed = SegmentBatches(scene, 1.0, most=MOST_PIECES)

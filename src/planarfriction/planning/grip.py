@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,7 +27,7 @@ from planarfriction.scenes.start import contact_map
 TIGHT = 1e-5
 """Relative tolerance of the motions that are planned with [-]."""
 
-LOOSE = 1e-4
+LOOSE = 3e-4
 """Relative tolerance of derivatives and of motions to start from [-]."""
 
 ANGLE = 3e-4
@@ -110,13 +109,13 @@ class Grips:
         held = scene.start == "equilibrium"
         self.first = scene.contacts[contact].normal_force(0.0) if held else None
         """Normal force that holds the body at first [N]; None where it may be any."""
-        self._simulated: list[int] = []  # of several threads
+        self._ends: dict[Any, np.ndarray] = {}
         self.jacobians = 0
 
     @property
     def simulations(self) -> int:
         """Number of simulations so far."""
-        return sum(self._simulated)
+        return len(self._ends)
 
     def scene_of(self, profile: Signal, factor: float = 1.0) -> Scene:
         """Return the scene with the profile in place."""
@@ -128,15 +127,18 @@ class Grips:
     def ends(
         self, profile: Signal, factors: Sequence[float], rtol: float | None = TIGHT
     ) -> list[np.ndarray]:
-        """Return the end `[6]` of the motion under each friction."""
-        self._simulated.append(len(factors))
+        """Return the end `[6]` of the motion under each friction; of one that was simulated, as it was."""
+        known = profile.times.tobytes(), profile.values.tobytes(), rtol
 
         def one(factor: float) -> np.ndarray:
-            scene = self.scene_of(profile, factor)
-            histories = simulate(scene, rtol=rtol, save_every=scene.t_end).histories
-            last = np.array([histories[name].values[-1] for name in STATES])
-            slide = slide_of(scene, self.index, last[3:])
-            return np.array([*last[:3], *slide, last[5] - scene.body.angle])
+            if (factor, *known) not in self._ends:
+                scene = self.scene_of(profile, factor)
+                histories = simulate(scene, rtol=rtol, save_every=scene.t_end).histories
+                last = np.array([histories[name].values[-1] for name in STATES])
+                slide = slide_of(scene, self.index, last[3:])
+                end = np.array([*last[:3], *slide, last[5] - scene.body.angle])
+                self._ends[factor, *known] = end
+            return self._ends[factor, *known]
 
         return threads.each(one, factors)
 
@@ -473,7 +475,7 @@ class _ProfileSearch:
         profiles = [values for _, values in found if values is not None]
         if not profiles:
             return -np.inf
-        cost = lambda values: (self._residuals(values) ** 2).sum()
+        cost = lambda values: (self._residuals(values, LOOSE) ** 2).sum()
         costs = threads.each(cost, profiles)
         best = np.argmin(costs)
         self._values = profiles[best]
@@ -496,18 +498,22 @@ class _ProfileSearch:
             held = np.interp(times, [until, until + rise], [0.0, 1.0])
             return self._inside(low + (hold - low) * held)
 
-        @functools.cache
-        def missing(until: float) -> float:
-            (end,) = self._grips.ends(self._signal(released(until)), [1.0], rtol=LOOSE)
-            off = self._aim.progress(end) - 1.0
-            return off if abs(off) > NEAR else 0.0
-
         earliest = times[0] - rise
         latest = times[-1] - rise
-        most = missing(latest)
-        if most <= 0.0:
-            return most + 1.0, None
-        return most + 1.0, released(float(brentq(missing, earliest, latest, xtol=1e-4)))  # pyright: ignore
+
+        def progress(until: float) -> float:
+            (end,) = self._grips.ends(self._signal(released(until)), [1.0], rtol=LOOSE)
+            return self._aim.progress(end)
+
+        def missing(until: float) -> float:
+            """Return what is missing in the root of the progress, which grows with the time: the load accelerates."""
+            share = max(progress(until), 0.0) if until > earliest else 0.0
+            return share**0.5 - 1.0 if abs(share - 1.0) > NEAR else 0.0
+
+        most = progress(latest)
+        if most <= 1.0:
+            return most, None
+        return most, released(float(brentq(missing, earliest, latest, xtol=1e-4)))  # pyright: ignore
 
     def bent(self) -> Signal:
         """Return the profile after a search that begins at that of the start."""
@@ -545,17 +551,17 @@ class _ProfileSearch:
     def _signal(self, values: np.ndarray) -> Signal:
         return Signal.sampled(self._times, values, "linear")
 
-    def _misses(self, values: np.ndarray) -> np.ndarray:
+    def _misses(self, values: np.ndarray, rtol: float = TIGHT) -> np.ndarray:
         """Return the misses `[F, 6]` with each friction."""
-        ends = self._grips.ends(self._signal(values), self._factors)
+        ends = self._grips.ends(self._signal(values), self._factors, rtol)
         return self._aim.misses(np.array(ends))
 
     def _inside(self, values: np.ndarray) -> np.ndarray:
         inside = 1e-2 * np.minimum(self._highest - self._low, self._holding)
         return np.clip(values, self._low + inside, self._highest - inside)
 
-    def _residuals(self, values: np.ndarray) -> np.ndarray:
-        misses = self._weights[:, None] ** 0.5 * self._misses(values)
+    def _residuals(self, values: np.ndarray, rtol: float = TIGHT) -> np.ndarray:
+        misses = self._weights[:, None] ** 0.5 * self._misses(values, rtol)
         return np.concatenate([misses.ravel(), self._bend @ values])
 
     def _slopes(self, values: np.ndarray) -> np.ndarray:

@@ -17,6 +17,9 @@ _LONG = 1e6
 _BALANCED = 1e-9
 """Share of the load that an equilibrium may leave unbalanced: far below what the solver sees at any tolerance."""
 
+_CLOSE = 1e-13
+"""Share of the load that Newton's method may leave unbalanced; else the energy is minimised."""
+
 _NEAR = 1e-3
 """Share of the load that the search of the least energy leaves unbalanced where it has found it."""
 
@@ -61,10 +64,7 @@ def first_slopes(
         cells.levers,
         np.where(fixed, longer, bent),
     )
-    stiff = np.einsum(
-        "n,nia,nij,njb->ab", cells.stiffness, cells.levers, slope, cells.levers
-    )
-    motions = np.linalg.lstsq(stiff, (d_pull - held).T, rcond=None)[0]
+    motions = np.linalg.lstsq(cells.stiff(slope), (d_pull - held).T, rcond=None)[0]
     moved = np.einsum("nij,njb,bk->kni", slope, cells.levers, motions)
     moved = moved + share[:, :, None] * np.where(fixed, longer, 0.0)
     return _states(scene, shaped, moved, sizes)
@@ -157,6 +157,11 @@ class _BristleField(NamedTuple):
     def load(self, deflections: np.ndarray) -> np.ndarray:
         """Return the load on the body `[3]` that deflections `[n, 3]` hold."""
         return np.einsum("n,nij,ni->j", self.stiffness, self.levers, deflections)
+
+    def stiff(self, slope: np.ndarray) -> np.ndarray:
+        """Return the stiffness `[3, 3]` against the motion if bristles bend by `slope` `[n, 3, 3]` of a stretch."""
+        forces = self.stiffness[:, None, None] * (slope @ self.levers)
+        return np.tensordot(self.levers, forces, axes=((0, 1), (0, 1)))
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:
@@ -260,21 +265,24 @@ def _bent_to_the_end(
 
     def curvature(x: np.ndarray) -> np.ndarray:
         bend = cells.bent(unit * scale * x)[1]
-        inner = np.einsum(
-            "n,nia,nij,njb->ab", cells.stiffness, cells.levers, bend, cells.levers
-        )
-        return inner * np.outer(scale, scale)
+        return cells.stiff(bend) * np.outer(scale, scale)
 
+    start = motion / (unit * scale)
+    load = np.abs(scale * pull).max() / unit
+    # The energy is convex: where its slope vanishes, it is least.
+    found = root(slope, start, jac=curvature, tol=_CLOSE)
+    if np.abs(found.fun).max() < _CLOSE * load:
+        return unit * scale * found.x
     options = {"gtol": 1e-13, "maxiter": 100, "max_trust_radius": 1e6}
     found = minimize(
         energy,
-        motion / (unit * scale),
+        start,
         method="trust-exact",
         jac=slope,
         hess=curvature,
         options=options,
     )
-    close = np.abs(found.jac).max() < _NEAR * np.abs(scale * pull).max() / unit
+    close = np.abs(found.jac).max() < _NEAR * load
     x = found.x
     if close:  # the energy hides in its own rounding how close this is
         closer = root(slope, x, jac=curvature)

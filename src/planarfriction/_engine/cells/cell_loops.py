@@ -46,7 +46,9 @@ class Element(NamedTuple):
 
 
 POINT = Element("points", 2, points.evaluate, points.step, slopes=(2, 0))
-DISC = Element("discs", 3, discs.evaluate, discs.step, forward=(17, 0))
+DISC = Element(
+    "discs", 3, discs.evaluate, discs.step, forward=(17, 0), rate=(8, 0), slopes=(1, 2)
+)
 LEANING_POINT = Element(
     "leaning points",
     2,

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from planarfriction._engine.bristles.law import traction
+from planarfriction._engine.cells.cell_blocks import LANES, scratch
 from planarfriction._engine.cells.cells import Lever
 from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.ratios import ratio
@@ -18,6 +19,7 @@ from planarfriction._engine.codegen.small_matrices import inverse, inverse_2
 from planarfriction._engine.codegen.source import run_source, text_of
 from planarfriction._engine.codegen.vectors import (
     Vector,
+    copy,
     dot,
     matrix_applied,
     matrix_applied_back,
@@ -54,6 +56,9 @@ C = 3
 
 E = 4
 """Place of the matrix dt/du: slope of the traction by the velocity."""
+
+OF_DISCS = 9 * LANES
+"""Numbers of the inverses of D of a block of discs."""
 
 
 class CellSlopes(NamedTuple):
@@ -130,17 +135,24 @@ def _matrix(bristle: Bristle, lin: Doubles, which: int, i: int, n: int) -> Vecto
     return bristle.matrix(lin, which * bristle.size * bristle.size * n + i, n)
 
 
-def factor(
-    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles, *, lever: Lever, bristle: Bristle,
-    read: Any,
-) -> None:  # fmt: skip
-    """Invert D, write `sum w B' (C D^-1 F + E) B`."""
-    record = read(contact)
+@kernel
+def _factored(
+    record: Any,
+    shift: float,
+    lin: Doubles,
+    first: int,
+    end: int,
+    out: Doubles,
+    stride: int,
+    lever: Lever,
+    bristle: Bristle,
+) -> Vector:
+    """Invert D of the cells from `first` to `end` into rows of `stride`; return the sums of `factor` over these."""
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     n = record.count
-    for i in range(n):
+    for i in range(first, end):
         inverse = bristle.inverse(shift, _matrix(bristle, lin, A, i, n))
-        scatter(lin, INVERSE * bristle.size * bristle.size * n + i, n, inverse)
+        scatter(out, i - first, stride, inverse)
         driven = matrix_product(inverse, _matrix(bristle, lin, F, i, n))
         if bristle.linear:
             pull = record.law.sigma_0 + record.law.sigma_1 * shift
@@ -154,6 +166,33 @@ def factor(
         total = plus(
             total, record.weights[i], lever.around(lever.read(record.cells, i, n), p)
         )
+    return total
+
+
+def factor(
+    contact: Place, z: Doubles, shift: float, lin: Doubles, stiffness: Doubles, *, lever: Lever, bristle: Bristle,
+    read: Any,
+) -> None:  # fmt: skip
+    """Invert D, write `sum w B' (C D^-1 F + E) B`."""
+    record = read(contact)
+    n = record.count
+    square = bristle.size * bristle.size
+    inverses = at(lin, INVERSE * square * n)
+    if bristle.size == 2:
+        put_all(
+            stiffness,
+            _factored(record, shift, lin, 0, n, inverses, n, lever, bristle),
+        )
+        return
+    # Of discs it becomes vector code only if it writes to memory apart from what it reads.
+    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    block = scratch(OF_DISCS)
+    for first in range(0, n, LANES):
+        end = min(first + LANES, n)
+        some = _factored(record, shift, lin, first, end, block, LANES, lever, bristle)
+        total = plus(total, 1.0, some)
+        for m in range(square):
+            copy(at(block, m * LANES), at(inverses, m * n + first), end - first)
     put_all(stiffness, total)
 
 
