@@ -155,8 +155,9 @@ class CompiledModel:
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """Yield rows of the flat batch, the model at the load of each row or at the one load of all, and offsets.
 
-        A pressure is a `Pressing` of cells, or its centres `[..., 2]` [m]: patches whose pressure keeps its shape move
-        by offsets `[rows, 2]` [m], None else. Rows without load may be left out; their results are zero.
+        A pressure is a `Pressing` of cells, cells that are packed, or its centres `[..., 2]` [m]: patches whose
+        pressure keeps its shape move by offsets `[rows, 2]` [m], None else. Rows without load may be left out; their
+        results are zero.
         """
         raise NotImplementedError
 
