@@ -151,18 +151,19 @@ def vjp(path: Path, bars: Any, state_bar: Any, differentiate: Any) -> tuple[Any,
     return z_bar, twist_bar, load_bar, rows_bar, cells_bar
 
 
-def jvp(path: Path, tangent: Any, differentiate: Any) -> tuple[np.ndarray, np.ndarray]:
+def jvp(
+    path: Path, tangent: Any, heavier: Any, differentiate: Any
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the changes of the state and of the wrenches; `differentiate` is `rollouts.push`."""
     batch = path.load.shape[:-1]
     inner = path.bristles.inner
     rows = *batch, len(path.bristles.family.names)
-    cells = *path.load.shape, inner[-1]
-    sizes = path.state.shape, path.twist.shape, path.load.shape, rows, cells
+    sizes = path.state.shape, path.twist.shape, path.load.shape, rows
     names = [f"tangent.{name}" for name in tangent._fields]
-    changes = map(validation.filled, names, tangent, sizes)
-    z_dot, twist_dot, load_dot, rows_dot, cells_dot = changes
+    z_dot, twist_dot, load_dot, rows_dot = map(validation.filled, names, tangent, sizes)
     wrenches_dot = np.zeros(path.wrenches.shape)
-    shapes = (*batch, *inner), (*batch, 1, 3), (*batch, 1), rows, (*batch, 1, inner[-1])
+    shapes = (*batch, *inner), (*batch, 1, 3), (*batch, 1), rows
+    cells_dot = None
     for t in range(len(path.dt)):
         inputs, h, loaded = path.at(t)
         changes = [np.zeros((4, *shape)) for shape in shapes]
@@ -170,12 +171,12 @@ def jvp(path: Path, tangent: Any, differentiate: Any) -> tuple[np.ndarray, np.nd
         changes[1][:] = DIRECTIONS.reshape(4, *[1] * len(batch), 1, 3)
         changes[2][0] = load_dot[..., t : t + 1]
         changes[3][0] = rows_dot
-        changes[4][0] = cells_dot[..., t : t + 1, :]
-        changed = type(tangent)(*changes)
-        if path.given is None:
-            changed = changed._replace(loads=0.0)
-        given = path.pressed(t)
-        found = differentiate(path.bristles, *inputs, changed, given=given)
+        if heavier is not None:
+            cells_dot = np.zeros((4, *batch, 1, inner[-1]))
+            cells_dot[0] = heavier[..., t : t + 1, :]
+        found = differentiate(
+            path.bristles, *inputs, type(tangent)(*changes), cells_dot, given=path.pressed(t)
+        )  # fmt: skip
         pulls = found.wrenches_dot[..., 0, :]
         slopes = np.moveaxis(pulls[1:], 0, -1)
         b_dot = z_dot[..., -3:]

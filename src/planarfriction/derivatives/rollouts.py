@@ -86,11 +86,9 @@ class RolloutTangent(NamedTuple):
     twist: Any = 0.0
     """Changes of the twists `[..., T, 3]`."""
     normal_force: Any = 0.0
-    """Changes of the loads `[..., T]` [N]."""
+    """Changes of the loads `[..., T]` [N], or of those of cells `[..., T, N]` where `loads` are given."""
     parameters: Any = 0.0
     """Changes of the parameters `[..., P]`."""
-    loads: Any = 0.0
-    """Changes of the loads of cells `[..., T, N]` [N], where these are given."""
 
 
 @by_parts
@@ -115,12 +113,10 @@ class RolloutVJP(NamedTuple):
     """Gradient with respect to the state before the first step, of its shape [1/unit of the state]."""
     twist: np.ndarray
     """Gradient with respect to the twists, `[..., T, 3]` [s/m, s/m, s/rad]."""
-    normal_force: np.ndarray | None
-    """Gradient with respect to the loads, of their shape [1/N]; None beside loads of cells."""
+    normal_force: np.ndarray
+    """Gradient with respect to the loads, of their shape [1/N]: of `loads` that are given, that of those of steps."""
     parameters: np.ndarray
     """Gradient with respect to the parameters, `[..., P]` [1/unit of each]."""
-    loads: np.ndarray | None = None
-    """Gradient with respect to the loads of cells, of the shape of those of the steps [1/N]; None without them."""
 
 
 def rollout(
@@ -237,7 +233,7 @@ def _by_cell(found: RolloutVJP, model: Any, loads: Any, by_disc: Any) -> Rollout
     """Return gradients with those of loads of cells, from those of discs `[..., T, n]`."""
     loads = in_time(loads)[1]
     by_loads = model._bearing(loads).spread(by_disc)
-    return found._replace(normal_force=None, loads=sum_to(np.shape(loads), by_loads))
+    return found._replace(normal_force=sum_to(np.shape(loads), by_loads))
 
 
 def gradient(
@@ -353,57 +349,46 @@ def rollout_jvp(
 
     Computed forward in time, at several times the cost of `rollout_vjp`: it gives `J x` where that gives `J' x`.
 
-    Raises `InvalidValueError` as `rollout_vjp` does, and for changes of `loads` that are not given.
+    Raises `InvalidValueError` as `rollout_vjp` does.
     """
     tangent = RolloutTangent() if tangent is None else tangent
     validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
     given = given_loads(model, twist, normal_force, loads, cover)
+    heavier = None
     if given is not None:
-        changes = validation.finite_numbers("tangent.loads", tangent.loads)
-        shape = np.shape(in_time(loads)[1])[-2:]
-        axes = changes.shape[:-2], changes.shape[-2:]
-        changes = validation.filled("tangent.loads", changes, (*axes[0], *shape))
-        tangent = tangent._replace(loads=model._bearing(changes).loads(changes))
-    elif np.any(tangent.loads):
-        rule = "be 0 without loads of cells"
-        raise InvalidValueError("tangent.loads", rule, np.shape(tangent.loads))
+        name = "tangent.normal_force"
+        changes = validation.finite_numbers(name, tangent.normal_force)
+        shape = *changes.shape[:-2], *np.shape(in_time(loads)[1])[-2:]
+        changes = validation.filled(name, changes, shape)
+        heavier = model._bearing(changes).loads(changes)
+        tangent = tangent._replace(normal_force=0.0)
     if faces.hangs(model, parameters):
         more = [
             np.shape(each)[: max(np.ndim(each) - count, 0)]
-            for each, count in zip(tangent, (1, 2, 1, 1, 2), strict=True)
+            for each, count in zip((*tangent, heavier), (1, 2, 1, 1, 2), strict=True)
         ]
         path = faces.path_of(model, state, twist, normal_force, dt, given, more)
-        changes = faces.jvp(path, tangent, push)
+        changes = faces.jvp(path, tangent, heavier, push)
         return RolloutJVP(path.state, path.wrenches, *changes)
-    return push(
-        model,
-        state,
-        twist,
-        normal_force,
-        dt,
-        tangent,
-        parameters=parameters,
-        given=given,
-    )
+    inputs = model, state, twist, normal_force, dt
+    return push(*inputs, tangent, heavier, parameters=parameters, given=given)
 
 
 def push(
-    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, tangent: RolloutTangent, *,
+    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, tangent: RolloutTangent, heavier: Any, *,
     parameters: Any = None, given: Pressing | None = None,
 ) -> RolloutJVP:  # fmt: skip
-    """Return what `rollout_jvp` does at a `given` pressure, for changes of the loads of the model's cells."""
+    """Return what `rollout_jvp` does at a `given` pressure, for changes of the loads of the model's cells, or None."""
     packed = pack(model, parameters)
     family = packed.family
     turned = packed.turned
     steps = validation.numbers("twist", twist).shape[-2:-1]
-    names = [f"tangent.{name}" for name in tangent._fields]
-    cells = steps if given is not None else (0,)
-    inner = (
-        packed.inner, (*steps, 3), steps, (len(family.names),), (*cells, packed.inner[-1]),
-    )  # fmt: skip
+    heavier = np.zeros((0, packed.inner[-1])) if heavier is None else heavier
+    names = [f"tangent.{name}" for name in tangent._fields] + ["loads"]
+    inner = packed.inner, (*steps, 3), steps, (len(family.names),), heavier.shape[-2:]
     changes = [
         validation.finite_numbers(name, value)
-        for name, value in zip(names, tangent, strict=True)
+        for name, value in zip(names, (*tangent, heavier), strict=True)
     ]
     more = [
         value.shape[: max(value.ndim - len(shape), 0)]

@@ -158,7 +158,7 @@ class CompiledDistributed(CompiledModel):
         rows, n = pressure.weights.shape
         numbers = self.numbers_under(pressure).swapaxes(1, 2)
         numbers = np.broadcast_to(numbers, (rows, *numbers.shape[1:]))
-        numbers = numbers.reshape(rows * n, -1, 1)
+        numbers = np.ascontiguousarray(numbers).reshape(rows * n, -1, 1)
         weights = np.ones((rows * n, 1))
         contact = self._anew(self._packed(pressure.weights), numbers, weights)
         contact = contact._replace(states=self.size)
