@@ -39,7 +39,7 @@ class ContactSolve(NamedTuple):
     """Moments of the normal forces at W_0, about the patches' origins, [2k] (see `following`)."""
     support: Doubles
     """Rectangle that bears each patch whose pressure follows: centre, cosine and sine of its first axis, half widths,
-    and width of the margin over which cells leave it, [7k]; half widths of 0 for all of it."""
+    [6k]; half widths of 0 for all of it."""
     follows: Doubles
     """1 of patches whose pressure follows these, -1 of those that keep that of the last solution, else 0, [k]."""
     state: Doubles
@@ -132,7 +132,7 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     shapes |= dict.fromkeys(("moments", "shift"), 2 * k) | {
         "weights": points,
         "copies": copies,
-        "support": 7 * patches,
+        "support": 6 * patches,
     }
     shapes |= dict.fromkeys(("state", "new"), states) | {"host": 12 * k}
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(
@@ -150,6 +150,8 @@ class Followers(NamedTuple):
     x: Doubles
     """Coordinates of the points of all patches [m]."""
     y: Doubles
+    width: Doubles
+    """Widths of the cells, over which an edge uncovers them [m]."""
     firsts: Integers
     """First point of each patch, and behind the last the count of all, [k + 1]."""
     words: Integers

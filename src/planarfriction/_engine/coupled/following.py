@@ -16,15 +16,14 @@ from planarfriction._engine.coupled.coupling_rows import ContactSolve, Patches
 
 @kernel
 def _borne(
-    x: Doubles, y: Doubles, w: Doubles, n: int, support: Doubles, out: Doubles
-) -> None:
+    x: Doubles, y: Doubles, width: Doubles, w: Doubles, n: int, support: Doubles, out: Doubles
+) -> None:  # fmt: skip
     """Write the weights that lie on the rectangle of the support, with their total unchanged; all if none does."""
     copy(w, out, n)
     if not support[4] > 0.0:
         return
     total = 0.0
     borne = 0.0
-    far = support[6]
     for i in range(n):
         dx = x[i] - support[0]
         dy = y[i] - support[1]
@@ -33,7 +32,8 @@ def _borne(
             (support[4], abs(support[2] * dx + support[3] * dy)),
             (support[5], abs(support[2] * dy - support[3] * dx)),
         ):
-            share *= xp.minimum(xp.maximum(0.5 + (half - off) / far, 0.0), 1.0)
+            covered = 0.5 + (half - off) / width[i]
+            share *= xp.minimum(xp.maximum(covered, 0.0), 1.0)
         total = total + w[i]
         borne = borne + w[i] * share
         out[i] = w[i] * share
@@ -57,7 +57,9 @@ def _press(
     elif p.records[k] != 0:
         record = integers(p.records[k])
         copied = 0
-        _borne(x, y, doubles(record[words - 1]), n, at(p.support, 7 * k), out)
+        width = at(patches.followers.width, first)
+        weights = doubles(record[words - 1])
+        _borne(x, y, width, weights, n, at(p.support, 6 * k), out)
         tilt(x, y, out, n, cx, cy, out)
         for j in range(k):
             copied += patches.followers.words[j]

@@ -162,7 +162,9 @@ class CompiledModel:
         raise NotImplementedError
 
     def points(self) -> tuple[np.ndarray, int]:
-        """Return the cells that share the load, `[n, 2]` [m], and the words of their record, or one point that has all.
+        """Return the cells that share the load, and the words of their record, or one point that has all.
+
+        Cells `[n, 3]` have places x and y and a width [m].
 
         The last word is the address of the weights of cells; a point, which has none, moves as a whole. There is no
         point where it would change with the load: such a patch cannot follow moments in `coupling`.

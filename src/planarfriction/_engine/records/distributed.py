@@ -29,6 +29,9 @@ from planarfriction._engine.records.packed import (
 from planarfriction._engine.records.pressing import Pressing
 from planarfriction.formulas import LIGHTEST
 
+SHORTEST = 1e-9
+"""Least width of a cell over which an edge uncovers it [m]."""
+
 LOAD_STEP = 1e-5
 """Step of the central differences of weights by the load, as a share of the load [-]; their relative error is 1e-10."""
 
@@ -198,7 +201,8 @@ class CompiledDistributed(CompiledModel):
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
         size = size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
-        return self.patch.positions, size
+        widths = np.maximum(np.sqrt(self.patch.areas), SHORTEST)
+        return np.column_stack([self.patch.positions, widths]), size
 
     def linearisation(
         self, state: np.ndarray, twist: np.ndarray, load: np.ndarray

@@ -48,9 +48,9 @@ def packed_patches(
         [0 if each is None else each.records.shape[1] for each in fixed], np.int64
     )
     places, words = zip(*(each.points() for each in inner), strict=True)
-    x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
+    columns = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
     followers = Followers(
-        x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64)
+        *columns, np.cumsum([0, *map(len, places)]), np.array(words, np.int64)
     )
     bounds = np.cumsum([0, *(math.prod(each.state_shape) for each in models)])
     rows = layout(
