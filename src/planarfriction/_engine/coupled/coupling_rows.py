@@ -108,6 +108,8 @@ class ContactSolve(NamedTuple):
     """Weights of the points of all patches that can follow."""
     copies: Integers
     """Records of the patches among these whose points are cells."""
+    moved: Doubles
+    """Numbers of the discs of these."""
 
 
 Offsets = offsets_of(ContactSolve)
@@ -117,8 +119,11 @@ INVALID = -1.0
 """Stands in place of a number of iterations."""
 
 
-def layout(patches: int, states: int, points: int, copies: int) -> Layout:
-    """Return the layout of rows for k patches, of so many `points` to share loads, and words of records to copy."""
+def layout(
+    patches: int, states: int, points: int = 0, copies: int = 0, moved: int = 0
+) -> Layout:
+    """Return the layout of rows for k patches, of so many `points` to share loads, words of records to copy, and
+    numbers of discs that move."""
     k = patches
     n = 3 * patches
     shapes = dict.fromkeys(ContactSolve._fields, n)
@@ -132,6 +137,7 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     shapes |= dict.fromkeys(("moments", "shift"), 2 * k) | {
         "weights": points,
         "copies": copies,
+        "moved": moved,
         "support": 6 * patches,
     }
     shapes |= dict.fromkeys(("state", "new"), states) | {"host": 12 * k}
@@ -157,6 +163,8 @@ class Followers(NamedTuple):
     words: Integers
     """Words of the record of a patch whose points are cells, of which the last is the address of the weights; 0 of one
     that moves as a whole, [k]."""
+    moves: Integers
+    """Numbers of each disc of a patch, as `CompiledModel.moves`, [k]."""
 
 
 class Patches(NamedTuple):

@@ -95,6 +95,8 @@ class CompiledModel:
 
     rollouts: Any = None
     """The model as the loops of rollouts see it, once `derivatives` has packed it."""
+    moves = 0
+    """Numbers of each disc, the first of which are its place and kappa times its radius; 0 of what cannot move."""
     behind = 0
     """Numbers behind a wrench that steps need as scratch."""
 

@@ -54,6 +54,8 @@ class CompiledDistributed(CompiledModel):
         if pad is not None:
             self.stiff = pad.pieces(patch, law) / law.numbers.sigma_0
             self.of_pad = True
+        if self.size == 3 and not patch.anisotropic:
+            self.moves = 3 + (pad is not None)
         self._contact, functions = self._functions()
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
