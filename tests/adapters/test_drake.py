@@ -266,7 +266,8 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
         own[run.friction._parts[name]] for name in ("bristles", "wrenches", "force")
     ]
     run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
-    rest = given, own[run.friction._parts["axes"]], own[run.friction._parts["answers"]]
+    parts = run.friction._parts
+    rest = given, *(own[parts[name]] for name in ("axes", "answers", "covers"))
     asked = run.friction._asking.step(np.zeros(6), *before, *rest)
     # Pulled back, but for what bristles give.
     np.testing.assert_allclose(asked.twists, -given, atol=2e-6)
@@ -288,6 +289,7 @@ def test_answers_that_lead_away_are_forgotten():
         np.zeros(3),
         own[parts["axes"]],
         answers,
+        np.zeros(0),
     )
     passes, _, _, misfit, _ = asked.report
     assert passes < 10 and misfit <= MISFIT
@@ -654,11 +656,11 @@ def test_a_disc_over_an_edge_acts_with_the_part_that_is_borne(few):
     kind = pf.ReducedModel if few else pf.DistributedModel
     shape = Cylinder(0.05, 0.02)
     torque, load, _ = spun(shape, 0.01, kind(patch, COULOMB), -0.02, 0.02)
-    places = pf.ContactPatch.disc(0.05, cells=101).positions
+    places = pf.ContactPatch.disc(0.05, cells=201).positions
     places = places[places[:, 0] < 0.02]
     pressed = load * pf.ContactPatch.points(places).weights(1.0, moments=(0.0, 0.0))
     arms = np.hypot(*places.T)
-    assert torque == pytest.approx(-0.3 * (pressed * arms).sum(), rel=0.02)
+    assert torque == pytest.approx(-0.3 * (pressed * arms).sum(), rel=0.03)
 
 
 def test_contact_surfaces_press_cells_alone():

@@ -91,14 +91,14 @@ class Asking:
         force: np.ndarray,
         owed: np.ndarray,
         axes: np.ndarray,
-        covers: np.ndarray,
         answers: np.ndarray,
+        covers: np.ndarray,
     ) -> Asked:
         """Take a step from the state of the shadow, under generalized forces `applied` and friction.
 
         From `bristles`, the `wrench` of each patch in the last step, the generalized `force` that these were, the
-        twists that bristles are `owed` (those that they saw in the last step were off by them), its x `axes`, the
-        `covers` of its cells, and its `answers`.
+        twists that bristles are `owed` (those that they saw in the last step were off by them), its x `axes`, its
+        `answers`, and the `covers` of its cells.
         """
         row = self._row
         row.held = {}

@@ -248,8 +248,8 @@ class Friction(LeafSystem):
                 "force",
                 "owed",
                 "axes",
-                "covers",
                 "answers",
+                "covers",
             )
         )
         asked = self._asking.step(applied, *before)
