@@ -249,9 +249,8 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
     monkeypatch.setattr("planarfriction.adapters.drake.coupled_step.MISFIT", 1.0)
     shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
-    asked = asking.step(
-        np.zeros(6), *before, given, own[parts["axes"]], own[parts["answers"]]
-    )
+    rest = [own[parts[name]] for name in ("axes", "answers", "covers")]
+    asked = asking.step(np.zeros(6), *before, given, *rest)
     came_out = asking._twists(shadow.step(asked.force))
     assert abs(asked.owed).max() > 1e-5
     np.testing.assert_allclose(asked.twists, came_out, atol=1e-9)
@@ -266,9 +265,8 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
         own[run.friction._parts[name]] for name in ("bristles", "wrenches", "force")
     ]
     run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
-    parts = run.friction._parts
-    rest = given, *(own[parts[name]] for name in ("axes", "answers", "covers"))
-    asked = run.friction._asking.step(np.zeros(6), *before, *rest)
+    rest = [own[run.friction._parts[name]] for name in ("axes", "answers", "covers")]
+    asked = run.friction._asking.step(np.zeros(6), *before, given, *rest)
     # Pulled back, but for what bristles give.
     np.testing.assert_allclose(asked.twists, -given, atol=2e-6)
 
