@@ -16,7 +16,7 @@ from planarfriction._support import validation
 from planarfriction.derivatives.parameters import PackedRollout, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
-from planarfriction.models.base import BESIDE
+from planarfriction.models.base import BESIDE, FrictionModel
 from planarfriction.models.cell_loads import in_time, sequence_of
 
 _WORTH_A_THREAD = 20_000
@@ -89,6 +89,7 @@ def given_loads(
         raise InvalidValueError("normal_force", BESIDE, normal_force)
     if loads is None:
         raise InvalidValueError("loads", "be given with a cover", "None")
+    validation.instance("model", model, FrictionModel, "a friction model")
     steps = np.shape(twist)[-2:-1]
     cells = model._bearing(in_time(loads)[1])
     sizes = *steps, cells.count

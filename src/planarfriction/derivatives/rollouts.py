@@ -224,7 +224,7 @@ def rollout_vjp(
         return found if given is None else _by_cell(found, model, loads, by_disc)
     found, by_disc = gradient(
         model, state, twist, normal_force, dt, wrenches_bar, state_bar,
-        parameters=parameters, states=states, given=given,
+        parameters=parameters, states=states, given=given, cells=given is not None,
     )  # fmt: skip
     return found if given is None else _by_cell(found, model, loads, by_disc)
 
