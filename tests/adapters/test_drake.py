@@ -605,20 +605,20 @@ def test_without_drake_the_extra_is_named(monkeypatch):
 
 
 def spun(shape, height, model, beyond=0.0, hint=0.005, **options):
-    """Return torque, load, and contact surface of a shape of 0.2 kg that spins in place, `beyond` an edge in x."""
+    """Return torque, load, covers and contact surface of a shape of 0.2 kg that spins, `beyond` an edge in y."""
     builder, plant, scene_graph = bare(2e-3)
     inertia = SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidSphere(0.05))
     body = plant.AddRigidBody("body", inertia)
     compliant = material("hydroelastic")
     compliant.UpdateProperty("hydroelastic", "resolution_hint", hint)
     plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "solid", compliant)
-    table = RigidTransform([-0.2, 0, -0.05]), Box(0.4, 0.4, 0.1), "table"
+    table = RigidTransform([0, -0.2, -0.05]), Box(0.4, 0.4, 0.1), "table"
     rigid = material("hydroelastic", rigid=True)
     plant.RegisterCollisionGeometry(plant.world_body(), *table, rigid)
     bottom = RigidTransform([0, 0, -height])
     plant.AddFrame(FixedOffsetFrame("bottom", body.body_frame(), bottom))
     plant.Finalize()
-    start = RigidTransform([beyond, 0, height - 1e-5])
+    start = RigidTransform([0, beyond, height - 1e-5])
     plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName("body"), start)
     contact = {"frame": "bottom", "geometries": ("body", "table"), **options}
     patches = [PatchContact(model, pressure="surface", **contact)]
@@ -633,7 +633,7 @@ def spun(shape, height, model, beyond=0.0, hint=0.005, **options):
     results = plant.get_contact_results_output_port().Eval(run.context)
     surface = results.hydroelastic_contact_info(0).contact_surface()
     assert friction.GetReport(run.own).converged
-    return torque, load, surface
+    return torque, load, friction._read(run.own, "covers"), surface
 
 
 def test_a_ball_presses_as_its_contact_surface_does():
@@ -642,7 +642,7 @@ def test_a_ball_presses_as_its_contact_surface_does():
     patch = pf.ContactPatch.rectangle(0.02, cells=24)
     model = pf.DistributedModel(patch, law)
     where = {"beyond": -0.2, "centre": "contact"}
-    torque, load, surface = spun(Sphere(0.05), 0.05, model, **where)
+    torque, load, _, surface = spun(Sphere(0.05), 0.05, model, **where)
     radius = np.sqrt(surface.total_area() / np.pi)
     assert torque == pytest.approx(-8.0 / 15.0 * 0.3 * load * radius, rel=0.01)
 
@@ -653,9 +653,11 @@ def test_a_disc_over_an_edge_acts_with_the_part_that_is_borne(few):
     patch = pf.ContactPatch.disc(0.05, cells=21)
     kind = pf.ReducedModel if few else pf.DistributedModel
     shape = Cylinder(0.05, 0.02)
-    torque, load, _ = spun(shape, 0.01, kind(patch, COULOMB), -0.02, 0.02)
+    torque, load, covers, _ = spun(shape, 0.01, kind(patch, COULOMB), -0.02, 0.02)
+    assert covers[patch.positions[:, 1] > 0.023].max() == 0.0
+    assert covers[abs(patch.positions[:, 1]) < 0.01].min() > 0.5
     places = pf.ContactPatch.disc(0.05, cells=201).positions
-    places = places[places[:, 0] < 0.02]
+    places = places[places[:, 1] < 0.02]
     pressed = load * pf.ContactPatch.points(places).weights(1.0, moments=(0.0, 0.0))
     arms = np.hypot(*places.T)
     assert torque == pytest.approx(-0.3 * (pressed * arms).sum(), rel=0.03)

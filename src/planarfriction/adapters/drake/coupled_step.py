@@ -52,9 +52,9 @@ class Asked(NamedTuple):
     """x axes of the patches in their frames; 0 before the first contact."""
     twists: np.ndarray
     loads: np.ndarray
-    touching: list[bool]
     covers: np.ndarray
     """Pressed shares of the cells of patches under contact surfaces; 0 without contact."""
+    touching: list[bool]
     answers: np.ndarray
     """Reaction of twists and loads to wrenches at the end, from which the next step starts."""
     velocities: np.ndarray
@@ -175,8 +175,8 @@ class Asking:
             axes,
             twist - owed,
             load,
-            self._touching,
             pressed,
+            self._touching,
             answers,
             velocity,
             report,
