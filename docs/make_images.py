@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from matplotlib import pyplot as plt
 from matplotlib.patches import Circle, Rectangle
 
 import planarfriction as pf
@@ -54,6 +55,7 @@ def figures() -> dict[str, plots.style.PlotFigure]:
         "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
         "concept-motions": motions(),
         "concept-bristle": bristle(),
+        "over-an-edge": over_an_edge(),
     }
 
 
@@ -161,6 +163,62 @@ def bristle() -> plots.style.PlotFigure:
     )
     plots.style.tidy(axes)
     return figure
+
+
+def over_an_edge() -> plots.style.PlotFigure:
+    """A layer under a box over the edge of a table, pulled with 0.6 of its friction and turned: pressure, and slip."""
+    side = 0.02
+    square = pf.ContactPatch.rectangle(side, cells=40)
+    law = pf.LuGre(mu_c=0.8, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+    layer = pf.Pad.layer(shear_modulus=0.2e6, thickness=3e-3)
+    model = pf.DistributedModel(square, law, pad=layer)
+    stiffness = layer.pieces(square, law)
+    load = 2.0
+    fig, axes = plt.subplots(2, 3, figsize=(7.5, 5.0), layout="constrained")
+    for column, off in zip(axes.T, (0.0, 5e-3, 8e-3), strict=True):
+        ends = 0.5 * side - off - square.positions[:, 0]
+        cover = np.clip(ends * 40 / side + 0.5, 0.0, 1.0)
+        borne = cover > 0.0
+        pressed = pf.ContactPatch.points(square.positions[borne], cover[borne])
+        loads = np.zeros(square.cells)
+        loads[borne] = load * pressed.weights(load, moments=(0.0, 0.0))
+        state = model.rest()
+        force = 0.0
+        while force < 0.6 * law.mu_c * load:
+            state, wrench = model.step(
+                state, [1e-3, 0.0, 0.08], None, 2e-4, loads=(loads, loads), cover=cover
+            )
+            force = -wrench[0]
+        limit = law.mu_c * np.maximum(loads, 1e-9)
+        used = stiffness * cover * np.hypot(*state[:2]) / limit
+        pressure = 1e-3 * loads / square.areas
+        maps = [
+            (pressure, "viridis", 30.0),
+            (np.where(loads > 0.0, used, 0.0), "magma", 1.0),
+        ]
+        drawn = []
+        for ax, (values, colours, most) in zip(column, maps, strict=True):
+            shown = np.where(borne, values, np.nan).reshape(40, 40)
+            extent = np.array([-1.0, 1.0, -1.0, 1.0]) * 500.0 * side
+            drawn.append(
+                ax.imshow(
+                    shown,
+                    origin="lower",
+                    extent=extent,
+                    cmap=colours,
+                    vmin=0.0,
+                    vmax=most,
+                )
+            )
+            ax.axvline(1e3 * (0.5 * side - off), color="0.4", linewidth=1.0)
+            ax.set_xlabel("x [mm]")
+        column[0].set_title(f"{1e3 * off:.0f} mm over the edge")
+    for row, image, label in zip(
+        axes, drawn, ("pressure [kPa]", "traction over limit"), strict=True
+    ):
+        row[0].set_ylabel("y [mm]")
+        fig.colorbar(image, ax=row, label=label, shrink=0.85)
+    return fig
 
 
 def small_cycles(

@@ -15,11 +15,17 @@ pytest.importorskip(
 )
 
 from pydrake.common.value import Value
-from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, Sphere
+from pydrake.geometry import (
+    Box,
+    CollisionFilterDeclaration,
+    Cylinder,
+    GeometrySet,
+    Sphere,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import CoulombFriction, ExternallyAppliedSpatialForce
-from pydrake.multibody.tree import SpatialInertia, UnitInertia
+from pydrake.multibody.tree import FixedOffsetFrame, SpatialInertia, UnitInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import EventStatus
 from pydrake.systems.primitives import (
@@ -37,6 +43,7 @@ from tests.support.drake_scenes import (
     bare,
     gripped,
     gripper,
+    material,
     on_the_floor,
     running,
     sliding,
@@ -242,9 +249,8 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
     monkeypatch.setattr("planarfriction.adapters.drake.coupled_step.MISFIT", 1.0)
     shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
-    asked = asking.step(
-        np.zeros(6), *before, given, own[parts["axes"]], own[parts["answers"]]
-    )
+    rest = [own[parts[name]] for name in ("axes", "answers", "covers")]
+    asked = asking.step(np.zeros(6), *before, given, *rest)
     came_out = asking._twists(shadow.step(asked.force))
     assert abs(asked.owed).max() > 1e-5
     np.testing.assert_allclose(asked.twists, came_out, atol=1e-9)
@@ -259,8 +265,8 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
         own[run.friction._parts[name]] for name in ("bristles", "wrenches", "force")
     ]
     run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
-    rest = given, own[run.friction._parts["axes"]], own[run.friction._parts["answers"]]
-    asked = run.friction._asking.step(np.zeros(6), *before, *rest)
+    rest = [own[run.friction._parts[name]] for name in ("axes", "answers", "covers")]
+    asked = run.friction._asking.step(np.zeros(6), *before, given, *rest)
     # Pulled back, but for what bristles give.
     np.testing.assert_allclose(asked.twists, -given, atol=2e-6)
 
@@ -281,6 +287,7 @@ def test_answers_that_lead_away_are_forgotten():
         np.zeros(3),
         own[parts["axes"]],
         answers,
+        np.zeros(0),
     )
     passes, _, _, misfit, _ = asked.report
     assert passes < 10 and misfit <= MISFIT
@@ -592,3 +599,71 @@ def test_without_drake_the_extra_is_named(monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     with refused(r"pip install 'planarfriction\[drake\]'", MissingExtraError):
         importlib.import_module("planarfriction.adapters.drake")
+
+
+# ---------------------------------------------------------------------- pressures of contact surfaces
+
+
+def spun(shape, height, model, beyond=0.0, hint=0.005, **options):
+    """Return torque, load, covers and contact surface of a shape of 0.2 kg that spins, `beyond` an edge in y."""
+    builder, plant, scene_graph = bare(2e-3)
+    inertia = SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidSphere(0.05))
+    body = plant.AddRigidBody("body", inertia)
+    compliant = material("hydroelastic")
+    compliant.UpdateProperty("hydroelastic", "resolution_hint", hint)
+    plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "solid", compliant)
+    table = RigidTransform([0, -0.2, -0.05]), Box(0.4, 0.4, 0.1), "table"
+    rigid = material("hydroelastic", rigid=True)
+    plant.RegisterCollisionGeometry(plant.world_body(), *table, rigid)
+    bottom = RigidTransform([0, 0, -height])
+    plant.AddFrame(FixedOffsetFrame("bottom", body.body_frame(), bottom))
+    plant.Finalize()
+    start = RigidTransform([0, beyond, height - 1e-5])
+    plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName("body"), start)
+    contact = {"frame": "bottom", "geometries": ("body", "table"), **options}
+    patches = [PatchContact(model, pressure="surface", **contact)]
+    prepare(plant, scene_graph, patches)
+    friction = Friction.AddToBuilder(builder, plant, scene_graph, patches)
+    run = running(builder, plant, friction)
+    run.to(0.1)
+    plant.SetVelocities(run.context, [0, 0, 20.0, 0, 0, 0])
+    run.to(0.102)
+    torque = friction.get_wrenches_output_port().Eval(run.own)[2]
+    load = friction.get_loads_output_port().Eval(run.own)[0]
+    results = plant.get_contact_results_output_port().Eval(run.context)
+    surface = results.hydroelastic_contact_info(0).contact_surface()
+    assert friction.GetReport(run.own).converged
+    return torque, load, friction._read(run.own, "covers"), surface
+
+
+def test_a_ball_presses_as_its_contact_surface_does():
+    """Its pressure falls as 1 - (r/a)^2: the mean arm of a spin is 8/15 a."""
+    law = dataclasses.replace(COULOMB, sigma_0=1e6)
+    patch = pf.ContactPatch.rectangle(0.02, cells=24)
+    model = pf.DistributedModel(patch, law)
+    where = {"beyond": -0.2, "centre": "contact"}
+    torque, load, _, surface = spun(Sphere(0.05), 0.05, model, **where)
+    radius = np.sqrt(surface.total_area() / np.pi)
+    assert torque == pytest.approx(-8.0 / 15.0 * 0.3 * load * radius, rel=0.01)
+
+
+@pytest.mark.parametrize("few", [False, True])
+def test_a_disc_over_an_edge_acts_with_the_part_that_is_borne(few):
+    """As a disc does that is pressed by a plane, within what Drake's pressure at the rim is off."""
+    patch = pf.ContactPatch.disc(0.05, cells=21)
+    kind = pf.ReducedModel if few else pf.DistributedModel
+    shape = Cylinder(0.05, 0.02)
+    torque, load, covers, _ = spun(shape, 0.01, kind(patch, COULOMB), -0.02, 0.02)
+    assert covers[patch.positions[:, 1] > 0.023].max() == 0.0
+    assert covers[abs(patch.positions[:, 1]) < 0.01].min() > 0.5
+    places = pf.ContactPatch.disc(0.05, cells=201).positions
+    places = places[places[:, 1] < 0.02]
+    pressed = load * pf.ContactPatch.points(places).weights(1.0, moments=(0.0, 0.0))
+    arms = np.hypot(*places.T)
+    assert torque == pytest.approx(-0.3 * (pressed * arms).sum(), rel=0.03)
+
+
+def test_contact_surfaces_press_cells_alone():
+    model = pf.ReducedModelPublished(pf.ContactPatch.disc(0.05), COULOMB)
+    with refused("loads.*without cells"):
+        spun(Sphere(0.05), 0.05, model)

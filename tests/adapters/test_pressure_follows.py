@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import planarfriction as pf
 from tests.support.plate import GRAVITY, Plate
 from tests.support.refusals import refused
 
@@ -18,14 +19,13 @@ BOX = f"""<inertial pos="{PLATE.centre_of_mass} 0 {PLATE.height - 0.02}" mass="{
 TABLE = '<geom name="table" type="plane" size="2 2 0.1"/>'
 
 
-def made(body=BOX, table=TABLE, joint="<freejoint/>", **options):
+def made(body=BOX, table=TABLE, joint="<freejoint/>", model=None, **options):
     """Model, data after the box has come to rest, and friction."""
     spec = mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{DT}" integrator="implicitfast"/><worldbody>
         {table}<body name="box" pos="0 0 0.02">{joint}{body}<site name="under" pos="0 0 -0.02"/></body>
         </worldbody></mujoco>""")
-    patches = [
-        PatchContact(PLATE.model(), site="under", geoms=("table", "box"), **options)
-    ]
+    model = model or PLATE.model()
+    patches = [PatchContact(model, site="under", geoms=("table", "box"), **options)]
     prepare(spec, patches)
     m = spec.compile()
     d = mujoco.MjData(m)
@@ -150,32 +150,43 @@ def test_a_box_tips_over_the_edge_of_a_table_as_with_mujocos_own_contacts():
     assert ends[0][0] == pytest.approx(ends[1][0], rel=0.05)
 
 
-@pytest.mark.parametrize("beyond", [0.0, 0.035])
-def test_a_patch_over_the_edge_acts_with_the_part_that_is_borne(beyond):
+EDGE = '<geom name="table" type="box" size="0.3 0.3 0.05" pos="0 0 -0.05"/>'
+PLAIN = '<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3"/>'
+
+
+@pytest.mark.parametrize("few", [False, True])
+@pytest.mark.parametrize("beyond", [0.0, 0.023, 0.035])
+def test_a_patch_over_the_edge_acts_with_the_part_that_is_borne(beyond, few):
     """Spun in place, the box is braked as by the cells on the table, pressed by a plane with their centre below it."""
-    edge = '<geom name="table" type="box" size="0.3 0.3 0.05" pos="0 0 -0.05"/>'
     slides = "".join(
         f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1")
     )
     turns = '<joint axis="1 0 0"/><joint axis="0 1 0"/><joint axis="0 0 1"/>'
-    _, d, friction = made(
-        '<geom name="box" type="box" size="0.05 0.03 0.02" mass="0.3"/>',
-        edge,
-        slides + turns,
-    )
+    cells = PLATE.model()
+    model = pf.ReducedModel(cells.patch, cells.law) if few else cells
+    _, d, friction = made(PLAIN, EDGE, slides + turns, model)
     d.qpos[0] = 0.25 + beyond
     for _ in range(100):
         friction.step(d)
     d.qvel[5] = 5.0
     for _ in range(3):
         friction.step(d)
-    patch = PLATE.model().patch.refined(4)
-    (x, y) = patch.positions.T
-    load = 0.3 * GRAVITY
-    on = x < 0.05 - beyond
-    assert on.all() == (beyond == 0.0)
-    cells = type(patch).points(patch.positions[on], patch.weights()[on])
-    pressed = load * cells.weights(1.0, moments=(0.0, 0.0))
-    torque = PLATE.mu * (pressed * np.hypot(x[on], y[on])).sum()
-    # a cell counts where its centre does: the edge is up to half a cell off
-    assert friction.wrenches(d)[0, 2] == pytest.approx(-torque, rel=0.05)
+    n = 1000
+    columns = (np.arange(n) + 0.5) * (0.1 - beyond) / n - 0.05
+    rows = (np.arange(60) + 0.5) * 1e-3 - 0.03
+    points = np.stack(np.meshgrid(columns, rows), -1).reshape(-1, 2)
+    cells = pf.ContactPatch.points(points)
+    pressed = 0.3 * GRAVITY * cells.weights(1.0, moments=(0.0, 0.0))
+    torque = PLATE.mu * (pressed * np.hypot(*points.T)).sum()
+    off = 0.02 if few else 0.01
+    assert friction.wrenches(d)[0, 2] == pytest.approx(-torque, rel=off)
+
+
+@pytest.mark.parametrize("share", [0.495, 0.505])
+def test_a_box_tips_where_half_of_it_is_over_the_edge(share):
+    _, d, friction = made(PLAIN, EDGE)
+    d.qpos[0] = 0.25 + 0.1 * share
+    for _ in range(200):
+        friction.step(d)
+    tilt = 2.0 * np.arcsin(d.qpos[5])
+    assert tilt > 0.2 if share > 0.5 else abs(tilt) < 0.01

@@ -7,6 +7,14 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.coupling import CoupledPatches, HostStep
+from planarfriction.derivatives import (
+    RolloutTangent,
+    rollout,
+    rollout_jacobian,
+    rollout_jvp,
+    rollout_states,
+    rollout_vjp,
+)
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=1.0, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
@@ -318,3 +326,107 @@ def test_bodies_and_coupled_patches_step_as_the_model_at_their_new_twist(name):
         body.step(flat, twist, 1.0, 1e-3, **given)
     with refused("loads.*list of 2"):
         patches.step(patches.rest(3), host._replace(loads=loads), 1e-3)
+
+
+def rolled(model, rng, scale):
+    """Return state, twists, and what was pressed before and in each step of two contacts."""
+    steps = 5
+    cells = model.patch.cells
+    state = scale * drawn(model, 2, rng)[0]
+    twist = rng.normal(size=(2, steps, 3)) * [0.003, 0.003, 0.3]
+    loads = rng.exponential(3.0 / cells, (2, steps, cells))
+    loads = loads * (rng.random(loads.shape) > 0.3)
+    first = rng.exponential(3.0 / cells, cells)
+    cover = np.where(loads > 0.0, rng.uniform(0.2, 1.0, loads.shape), 0.0)
+    return state, twist, {"loads": (first, loads), "cover": (np.ones(cells), cover)}
+
+
+ROLLED = {"discs": 1.0, "discs of a layer": 20.0, "common compliance": 20.0}
+"""Models, and sizes of the first state, in 3 um: pads are to slip."""
+
+
+@pytest.mark.parametrize("name", ROLLED)
+def test_a_rollout_under_a_row_of_loads_is_its_steps(name):
+    model = MODELS[name]
+    state, twist, given = rolled(model, np.random.default_rng(7), ROLLED[name])
+    end, wrenches, states = rollout_states(model, state, twist, None, 1e-3, **given)
+    (before, loads), (covered, cover) = given.values()
+    before, covered = (np.tile(each, (2, 1)) for each in (before, covered))
+    for t in range(twist.shape[1]):
+        np.testing.assert_allclose(states[:, t], state, rtol=1e-9, atol=1e-15)
+        pair = {"loads": (before, loads[:, t]), "cover": (covered, cover[:, t])}
+        state, wrench = model.step(state, twist[:, t], None, 1e-3, **pair)
+        np.testing.assert_allclose(wrenches[:, t], wrench, rtol=1e-9, atol=1e-12)
+        before, covered = loads[:, t], cover[:, t]
+    np.testing.assert_allclose(end, state, rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ROLLED)
+def test_derivatives_by_loads_are_those_of_differences(name):
+    """Forwards, backwards, and of one step, along changes of state, twists and loads."""
+    model = MODELS[name]
+    rng = np.random.default_rng(8)
+    state, twist, given = rolled(model, rng, ROLLED[name])
+    (first, loads), cover = given.values()
+    change = RolloutTangent(
+        3e-3 * state * rng.normal(size=state.shape),
+        3e-3 * twist * rng.normal(size=twist.shape),
+        loads * rng.normal(size=loads.shape),
+    )
+
+    def moved(far):
+        inputs = state + far * change.state, twist + far * change.twist, None, 1e-3
+        pair = first, loads + far * change.normal_force
+        return rollout(model, *inputs, loads=pair, cover=cover)
+
+    ends = zip(moved(1e-5), moved(-1e-5), strict=True)
+    new, pulls = ((one - other) / 2e-5 for one, other in ends)
+    inputs = model, state, twist, None, 1e-3
+    found = rollout_jvp(*inputs, change, **given)
+    np.testing.assert_allclose(found.wrenches_dot, pulls, atol=1e-6 * abs(pulls).max())
+    np.testing.assert_allclose(found.state_dot, new, atol=1e-6 * abs(new).max())
+    bars = rng.normal(size=pulls.shape)
+    end = rng.normal(size=new.shape) / abs(new).max()
+    back = rollout_vjp(*inputs, bars, end, **given)
+    pairs = zip(back[:3], change[:3], strict=True)
+    total = sum((one * other).sum() for one, other in pairs)
+    wanted = (bars * found.wrenches_dot).sum() + (end * found.state_dot).sum()
+    assert total == pytest.approx(wanted, rel=1e-9)
+    by_law = rollout_jacobian(*inputs, **given).d_wrenches
+    wanted = np.einsum("btd,btdp->p", bars, by_law)
+    back = rollout_vjp(*inputs, bars, **given).parameters
+    np.testing.assert_allclose(back, wanted, atol=1e-9 * abs(wanted).max())
+    one = {"loads": (np.tile(first, (2, 1)), loads[:, 0])}
+    slopes = model.step_jacobians(state, twist[:, 0], None, 1e-3, **one)
+    pressed = RolloutTangent(normal_force=change.normal_force[:, :1])
+    pair = {"loads": (first, loads[:, :1])}
+    wanted = rollout_jvp(model, state, twist[:, :1], None, 1e-3, pressed, **pair)
+    got = np.einsum("bdn,bn->bd", slopes.wrench_load, change.normal_force[:, 0])
+    wrench = wanted.wrenches_dot[:, 0]
+    np.testing.assert_allclose(got, wrench, atol=1e-9 * abs(wrench).max())
+    discs = model._bearing(loads).loads(change.normal_force[:, 0])
+    axes = "bsn,bn->bs" if state.ndim == 2 else "ban,bn->ban"
+    got = np.einsum(axes, slopes.state_load, discs)
+    scale = abs(wanted.state_dot).max()
+    np.testing.assert_allclose(got, wanted.state_dot, atol=1e-9 * scale)
+
+
+def test_rows_of_loads_that_make_no_sense_are_refused():
+    model = MODELS["discs"]
+    loads = np.ones((3, model.patch.cells))
+    twist = np.zeros((3, 3))
+    for given, words in (
+        ({"loads": loads[:2]}, r"loads.*\[..., 3, 384\], the steps of the rollout"),
+        ({"loads": loads[:, 1:]}, r"loads.*\[..., 3, 384\]"),
+        ({"loads": -loads}, "loads.*>= 0"),
+        ({"loads": loads * np.nan}, "loads.*finite"),
+        ({"loads": (loads[0, 1:], loads)}, "loads.*"),
+        ({"cover": loads}, "loads.*be given"),
+    ):
+        with refused(words):
+            rollout(model, None, twist, None, 1e-3, **given)
+    with refused("normal_force.*None beside loads"):
+        rollout(model, None, twist, 1.0, 1e-3, loads=loads)
+    change = RolloutTangent(normal_force=np.ones((3, 7)))
+    with refused("tangent.normal_force.*shape"):
+        rollout_jvp(model, None, twist, None, 1e-3, change, loads=loads)

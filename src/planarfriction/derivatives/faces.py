@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
-from planarfriction.derivatives.inputs import sequences
+from planarfriction.derivatives.inputs import sequences, step_at
 from planarfriction.derivatives.parameters import PackedRollout, bristles_of
 from planarfriction.errors import InvalidValueError
 
@@ -47,6 +48,8 @@ class Path(NamedTuple):
     soft: np.ndarray
     """Common compliance `[3, 3]`."""
     lag: float
+    given: Pressing | None
+    """Pressure of the steps, if it is given."""
 
     def at(self, t: int) -> tuple[Any, Any, Any]:
         """Return the inputs of the bristles' step t, four times, the time h, and 1 or 0 by the load."""
@@ -58,19 +61,25 @@ class Path(NamedTuple):
         inputs = (
             np.broadcast_to(state, (4, *state.shape)),
             np.broadcast_to(face[..., None, :], (*batch, 1, 3)),
-            np.broadcast_to(self.load[..., t : t + 1], (*batch, 1)),
+            None
+            if self.given
+            else np.broadcast_to(self.load[..., t : t + 1], (*batch, 1)),
             self.dt[t],
         )
         return inputs, h, (self.load[..., t] > 0.0)[..., None] * 1.0
 
+    def pressed(self, t: int) -> Pressing | None:
+        """Return the pressure of step t, if it is given."""
+        return None if self.given is None else self.given.at([t])
+
 
 def path_of(
-    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, more: Any = ()
-) -> Path:
+    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, given: Pressing | None, more: Any = (),
+) -> Path:  # fmt: skip
     """Step a model, which checks the numbers; `more` are batch axes of other arrays that belong to it."""
     model = model.reduction
     state = model.rest() if state is None else validation.numbers("state", state)
-    twist, load, dt = sequences(twist, normal_force, dt)
+    twist, load, dt = sequences(twist, normal_force, dt, given)
     axes = state.shape[:-1], twist.shape[:-2], load.shape[:-1], *more
     batch = validation.common_shape("state, twist and normal_force", axes)
     steps = len(dt)
@@ -81,11 +90,12 @@ def path_of(
     wrenches = np.empty((*batch, steps, 3))
     for t in range(steps):
         states[..., t, :] = state
-        state, wrenches[..., t, :] = model.step(
-            state, twist[..., t, :], load[..., t], dt[t]
+        state, wrenches[..., t, :] = step_at(
+            model, state, twist[..., t, :], load, dt[t], given, t
         )
     own = bristles_of(model), np.array(state), wrenches, states
-    return Path(*own, twist, load, dt, model.compiled.compliance, model.compiled.lag)
+    soft = model.compiled
+    return Path(*own, twist, load, dt, soft.compliance, soft.lag, given)
 
 
 def _sum(found: np.ndarray, shares: np.ndarray, inner: int) -> np.ndarray:
@@ -96,7 +106,10 @@ def _sum(found: np.ndarray, shares: np.ndarray, inner: int) -> np.ndarray:
 
 
 def vjp(path: Path, bars: Any, state_bar: Any, differentiate: Any) -> tuple[Any, ...]:
-    """Return gradients by state, twists, loads and parameters; `differentiate` is `rollouts.rollout_vjp`."""
+    """Return gradients by state, twists, loads, parameters and loads of the cells of the model `[..., T, n]`.
+
+    `differentiate` is `rollouts.gradient`.
+    """
     batch = path.load.shape[:-1]
     none = 0.0 if state_bar is None else state_bar
     z_bar = validation.filled("state_bar", none, path.state.shape)
@@ -107,15 +120,16 @@ def vjp(path: Path, bars: Any, state_bar: Any, differentiate: Any) -> tuple[Any,
     rows_bar = np.zeros((*batch, len(rows)))
     values = np.broadcast_to(rows, (4, *rows_bar.shape))
     inner = path.bristles.inner
+    cells_bar = np.zeros((*path.load.shape, inner[-1]))
     for t in reversed(range(len(path.dt))):
         inputs, h, loaded = path.at(t)
         b_bar = loaded * z_bar[..., -3:]
         new_bar = np.zeros((4, *batch, *inner))
         new_bar[0] = z_bar[..., :-3].reshape(*batch, *inner)
         each = DIRECTIONS.reshape(4, *[1] * len(batch), 1, 3)
-        found = differentiate(
+        found, by_cell = differentiate(
             path.bristles, *inputs, np.broadcast_to(each, (4, *batch, 1, 3)), new_bar,
-            parameters=values,
+            parameters=values, given=path.pressed(t),
         )  # fmt: skip
         by_face = found.twist[..., 0, :]
         soft = path.soft / h
@@ -123,7 +137,9 @@ def vjp(path: Path, bars: Any, state_bar: Any, differentiate: Any) -> tuple[Any,
         slopes = np.moveaxis(by_face[1:], 0, -1)
         pull = np.linalg.solve(np.eye(3) - soft @ slopes, pull[..., None])[..., 0]
         twist_bar[..., t, :] = _sum(by_face, pull, 1)
-        load_bar[..., t] = _sum(found.normal_force[..., 0], pull, 0)
+        cells_bar[..., t, :] = _sum(by_cell[..., 0, :], pull, 1)
+        if path.given is None:
+            load_bar[..., t] = _sum(found.normal_force[..., 0], pull, 0)
         rows_bar += _sum(found.parameters, pull, 1)
         z_bar = np.concatenate(
             [
@@ -132,11 +148,13 @@ def vjp(path: Path, bars: Any, state_bar: Any, differentiate: Any) -> tuple[Any,
             ],
             axis=-1,
         )
-    return z_bar, twist_bar, load_bar, rows_bar
+    return z_bar, twist_bar, load_bar, rows_bar, cells_bar
 
 
-def jvp(path: Path, tangent: Any, differentiate: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the changes of the state and of the wrenches; `differentiate` is `rollouts.rollout_jvp`."""
+def jvp(
+    path: Path, tangent: Any, heavier: Any, differentiate: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the changes of the state and of the wrenches; `differentiate` is `rollouts.push`."""
     batch = path.load.shape[:-1]
     inner = path.bristles.inner
     rows = *batch, len(path.bristles.family.names)
@@ -145,6 +163,7 @@ def jvp(path: Path, tangent: Any, differentiate: Any) -> tuple[np.ndarray, np.nd
     z_dot, twist_dot, load_dot, rows_dot = map(validation.filled, names, tangent, sizes)
     wrenches_dot = np.zeros(path.wrenches.shape)
     shapes = (*batch, *inner), (*batch, 1, 3), (*batch, 1), rows
+    cells_dot = None
     for t in range(len(path.dt)):
         inputs, h, loaded = path.at(t)
         changes = [np.zeros((4, *shape)) for shape in shapes]
@@ -152,7 +171,12 @@ def jvp(path: Path, tangent: Any, differentiate: Any) -> tuple[np.ndarray, np.nd
         changes[1][:] = DIRECTIONS.reshape(4, *[1] * len(batch), 1, 3)
         changes[2][0] = load_dot[..., t : t + 1]
         changes[3][0] = rows_dot
-        found = differentiate(path.bristles, *inputs, type(tangent)(*changes))
+        if heavier is not None:
+            cells_dot = np.zeros((4, *batch, 1, inner[-1]))
+            cells_dot[0] = heavier[..., t : t + 1, :]
+        found = differentiate(
+            path.bristles, *inputs, type(tangent)(*changes), cells_dot, given=path.pressed(t)
+        )  # fmt: skip
         pulls = found.wrenches_dot[..., 0, :]
         slopes = np.moveaxis(pulls[1:], 0, -1)
         b_dot = z_dot[..., -3:]

@@ -11,10 +11,13 @@ import numpy as np
 from planarfriction._engine.cells.rollouts import Inputs, ShapesByLoad
 from planarfriction._engine.compiler import threads
 from planarfriction._engine.coupled.steps import PLAIN, in_order, ready
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction.derivatives.parameters import PackedRollout, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
+from planarfriction.models.base import BESIDE, FrictionModel
+from planarfriction.models.cell_loads import in_time, sequence_of
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
@@ -54,10 +57,9 @@ class RolloutInputs(NamedTuple):
         shape = self.model.shapes
         which = np.zeros((1, len(self.dt)), dtype=int)
         if own := self.model.batch:
-            each = np.broadcast_to(
-                np.arange(math.prod(own)).reshape(own), self.batch
-            ).reshape(-1, 1)
-            which = np.repeat(each, len(self.dt), axis=1)
+            each = np.arange(math.prod(own)).reshape(own)
+            which = np.broadcast_to(each, (*self.batch, len(self.dt)))
+            which = np.array(which.reshape(len(self.state), -1))
         if not isinstance(shape, ShapesByLoad):
             loads, which = np.unique(self.normal_force, return_inverse=True)
             which = which.reshape(self.normal_force.shape)
@@ -77,10 +79,41 @@ class RolloutInputs(NamedTuple):
         )
 
 
+def given_loads(
+    model: Any, twist: Any, normal_force: Any, loads: Any, cover: Any
+) -> Pressing | None:
+    """Return the pressure in each step of a rollout by the loads of cells (see `rollouts.rollout`), or None."""
+    if loads is None and cover is None:
+        return None
+    if normal_force is not None:
+        raise InvalidValueError("normal_force", BESIDE, normal_force)
+    if loads is None:
+        raise InvalidValueError("loads", "be given with a cover", "None")
+    validation.instance("model", model, FrictionModel, "a friction model")
+    steps = np.shape(twist)[-2:-1]
+    cells = model._bearing(in_time(loads)[1])
+    sizes = *steps, cells.count
+    pairs = [
+        None if each is None else sequence_of(name, each, sizes)
+        for name, each in (("loads", loads), ("cover", cover))
+    ]
+    return cells.under(*pairs)
+
+
+def step_at(
+    model: Any, state: Any, twist: Any, load: Any, dt: Any, given: Pressing | None, t: int
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Take step t of a rollout at loads `[..., T]` or a given pressure."""
+    if given is None:
+        return model.step(state, twist, load[..., t], dt)
+    return model.step(state, twist, None, dt, loads=given.at(t))
+
+
 def sequences(
-    twist: Any, normal_force: Any, dt: Any
+    twist: Any, normal_force: Any, dt: Any, given: Pressing | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return twists `[..., T, 3]`, loads `[..., T]` and steps `[T]`."""
+    normal_force = normal_force if given is None else given.load
     twist, load, dt = (
         validation.numbers(n, v)
         for n, v in (("twist", twist), ("normal_force", normal_force), ("dt", dt))
@@ -115,9 +148,13 @@ def checked(
     dt: Any,
     parameters: Any,
     more: Sequence[tuple] = (),
+    given: Pressing | None = None,
 ) -> RolloutInputs:
     """Check the inputs of a rollout; `more` are batch axes of other arrays that belong to it."""
     packed = pack(model, parameters)
+    if given is not None:
+        packed = packed.under(given)
+        normal_force = given.load
     if packed.rows.ndim == 1 and not (packed.batch or more):
         quick = _of_one(packed, state, twist, normal_force, dt)
         if quick is not None:
@@ -146,7 +183,7 @@ def checked(
         twist.shape[:-2],
         load.shape[:-1],
         packed.rows.shape[:-1],
-        packed.batch,
+        packed.batch[:-1],
         *more,
     )
     try:

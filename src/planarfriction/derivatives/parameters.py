@@ -20,6 +20,7 @@ from planarfriction._engine.published.published_rollouts import (
     tangent,
 )
 from planarfriction._engine.records.packed import cells_by_load
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
@@ -55,8 +56,6 @@ class RolloutFunctions(NamedTuple):
     sensitivities: Callable[..., None]
     tangent: Callable[..., None]
     """Compiled loops (see `cells.rollouts`), which add to their outputs but write the state."""
-    shares: Callable[..., None] | None = None
-    """Derivatives by the weights of cells (see `cells.cells_rollout`)."""
 
 
 _COLUMNS = np.array([published_step.NAMES.index(name) for name in PARAMETERS])
@@ -91,7 +90,16 @@ class PackedRollout(NamedTuple):
     springs: float = 1.0
     """See `cells.rollouts.Inputs`."""
     batch: tuple[int, ...] = ()
-    """Batch axes of the weights of cells, if contacts differ in them: `shapes` has one row for each."""
+    """Axes `[..., 1 or T]` of the rows of `shapes`, if contacts or steps differ in the weights of cells."""
+    bristles: Any = None
+    """Machine form of the bristles of a model with cells, which can bear given loads."""
+
+    def under(self, given: Pressing) -> PackedRollout:
+        """Return the model under given loads `[..., T]`."""
+        rows = given.spread(given.load.shape)
+        numbers = self.bristles.numbers_under(rows)
+        shapes = cells_by_load(numbers, rows.weights, kept=rows.kept)
+        return self._replace(shapes=shapes, batch=given.load.shape)
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """Turn twists into the axes of the compiled loops, or wrenches back, `[..., 3]`."""
@@ -208,6 +216,7 @@ def bristles_of(model: DistributedModel) -> PackedRollout:
         shapes,
         inner=cells.state_shape,
         springs=cells.springs,
+        bristles=cells,
     )
 
 
@@ -216,7 +225,10 @@ def _on_surface(
 ) -> PackedRollout:
     none = np.zeros((1, 0))
     return PackedRollout(
-        PUBLISHED, row, ShapesByLoad(np.array([kind, 0, size]), none, none, data), axes
+        PUBLISHED,
+        row,
+        ShapesByLoad(np.array([kind, 0, size]), none, none, data, none),
+        axes,
     )
 
 
@@ -266,10 +278,10 @@ def pack_cells(
     return PackedRollout(
         _cells(*kind),
         np.array(_any_law(elasto_plastic)),
-        cells_by_load(levers, rows, None),
+        cells_by_load(levers[None], rows),
         inner=(kind[0], weights.shape[-1]),
         springs=1.0 if stiffness is None or of_law else 0.0,
-        batch=() if same else weights.shape[:-1],
+        batch=() if same else (*weights.shape[:-1], 1),
     )
 
 

@@ -15,15 +15,18 @@ from planarfriction._engine.cells.rollouts import (
     ShapesByLoad,
 )
 from planarfriction._engine.compiler import threads
+from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction._support.equality import by_parts
 from planarfriction.derivatives import faces
 from planarfriction.derivatives.inputs import (
     RolloutInputs,
     checked,
+    given_loads,
     rows_of,
     sequences,
     share,
+    step_at,
     sum_to,
 )
 from planarfriction.derivatives.parameters import (
@@ -35,6 +38,7 @@ from planarfriction.derivatives.parameters import (
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.models import FrictionModel
+from planarfriction.models.cell_loads import in_time
 
 ArrayT = TypeVar("ArrayT")
 
@@ -82,7 +86,7 @@ class RolloutTangent(NamedTuple):
     twist: Any = 0.0
     """Changes of the twists `[..., T, 3]`."""
     normal_force: Any = 0.0
-    """Changes of the loads `[..., T]` [N]."""
+    """Changes of the loads `[..., T]` [N], or of those of cells `[..., T, N]` where `loads` are given."""
     parameters: Any = 0.0
     """Changes of the parameters `[..., P]`."""
 
@@ -110,7 +114,7 @@ class RolloutVJP(NamedTuple):
     twist: np.ndarray
     """Gradient with respect to the twists, `[..., T, 3]` [s/m, s/m, s/rad]."""
     normal_force: np.ndarray
-    """Gradient with respect to the loads, of their shape [1/N]."""
+    """Gradient with respect to the loads, of their shape [1/N]: of `loads` that are given, that of those of steps."""
     parameters: np.ndarray
     """Gradient with respect to the parameters, `[..., P]` [1/unit of each]."""
 
@@ -123,6 +127,8 @@ def rollout(
     dt: Any,
     *,
     parameters: Any = None,
+    loads: Any = None,
+    cover: Any = None,
 ) -> Rollout[np.ndarray]:
     """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
@@ -133,6 +139,10 @@ def rollout(
     common compliance, with their derivatives, and `ReducedModelPublished` where its shape follows the load. Pads with a
     common compliance take no `parameters`.
 
+    `loads` `[..., T, N]` [N] of the cells, as in `FrictionModel.step`, take the place of `normal_force`: each step sees
+    which cells were pressed in the one before. The first sees no change unless `loads` is a tuple of the loads before
+    it, `[..., N]`, and those of the steps; and so for `cover`.
+
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
     them.
     """
@@ -140,13 +150,14 @@ def rollout(
         raise InvalidValueError(
             "model", f"be a friction model ({MODELS.classes()})", type(model).__name__
         )
+    given = given_loads(model, twist, normal_force, loads, cover)
     if faces.hangs(model, parameters) or (
         parameters is None
         and isinstance(model, FrictionModel)
         and not is_compiled(model)
     ):
-        return _stepped(model, state, twist, normal_force, dt)
-    inputs = checked(model, state, twist, normal_force, dt, parameters)
+        return _stepped(model, state, twist, normal_force, dt, given)
+    inputs = checked(model, state, twist, normal_force, dt, parameters, given=given)
     end, wrenches, _ = _roll(inputs, 0)
     return Rollout(inputs.shaped(end), wrenches)
 
@@ -159,15 +170,18 @@ def rollout_states(
     dt: Any,
     *,
     parameters: Any = None,
+    loads: Any = None,
+    cover: Any = None,
 ) -> RolloutStates:
     """Step a model as `rollout` does and keep the state before each step, which saves `rollout_vjp` half of its work.
 
     Raises InvalidValueError as `rollout` does.
     """
+    given = given_loads(model, twist, normal_force, loads, cover)
     if faces.hangs(model, parameters):
-        path = faces.path_of(model, state, twist, normal_force, dt)
+        path = faces.path_of(model, state, twist, normal_force, dt, given)
         return RolloutStates(path.state, path.wrenches, path.states)
-    inputs = checked(model, state, twist, normal_force, dt, parameters)
+    inputs = checked(model, state, twist, normal_force, dt, parameters, given=given)
     end, wrenches, states = _roll(inputs, len(inputs.dt))
     return RolloutStates(
         inputs.shaped(end), wrenches, inputs.shaped(states, len(inputs.dt))
@@ -185,6 +199,8 @@ def rollout_vjp(
     *,
     parameters: Any = None,
     states: Any = None,
+    loads: Any = None,
+    cover: Any = None,
 ) -> RolloutVJP:
     """Compute the gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` by its inputs.
 
@@ -198,13 +214,37 @@ def rollout_vjp(
 
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled rollout.
     """
+    given = given_loads(model, twist, normal_force, loads, cover)
     if faces.hangs(model, parameters):
-        path = faces.path_of(model, state, twist, normal_force, dt)
-        found = faces.vjp(path, wrenches_bar, state_bar, rollout_vjp)
+        path = faces.path_of(model, state, twist, normal_force, dt, given)
+        *found, by_disc = faces.vjp(path, wrenches_bar, state_bar, gradient)
         start = model.rest() if state is None else state
         shapes = *map(np.shape, (start, twist, normal_force)), found[-1].shape[-1:]
-        return RolloutVJP(*map(sum_to, shapes, found))
-    inputs = checked(model, state, twist, normal_force, dt, parameters)
+        found = RolloutVJP(*map(sum_to, shapes, found))
+        return found if given is None else _by_cell(found, model, loads, by_disc)
+    found, by_disc = gradient(
+        model, state, twist, normal_force, dt, wrenches_bar, state_bar,
+        parameters=parameters, states=states, given=given, cells=given is not None,
+    )  # fmt: skip
+    return found if given is None else _by_cell(found, model, loads, by_disc)
+
+
+def _by_cell(found: RolloutVJP, model: Any, loads: Any, by_disc: Any) -> RolloutVJP:
+    """Return gradients with those of loads of cells, from those of discs `[..., T, n]`."""
+    loads = in_time(loads)[1]
+    by_loads = model._bearing(loads).spread(by_disc)
+    return found._replace(normal_force=sum_to(np.shape(loads), by_loads))
+
+
+def gradient(
+    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, wrenches_bar: Any, state_bar: Any = None, *,
+    parameters: Any = None, states: Any = None, given: Pressing | None = None, own: float = 1.0, cells: bool = True,
+) -> tuple[RolloutVJP, np.ndarray]:  # fmt: skip
+    """Return what `rollout_vjp` does at a `given` pressure, and the gradient by the loads of the model's `cells`.
+
+    That is `[..., T, n]`, with a share of `own` of what a pad sees of them (see `Bars`).
+    """
+    inputs = checked(model, state, twist, normal_force, dt, parameters, given=given)
     (count, size) = inputs.state.shape
     steps = len(inputs.dt)
     packed = inputs.model
@@ -219,7 +259,9 @@ def rollout_vjp(
             -1, size
         )
     rows_bar = np.zeros((count, inputs.rows.shape[-1]))
-    bars = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar)
+    along = np.zeros((count, steps, 3)), np.zeros((count, steps))
+    by_disc = np.zeros((count, steps if cells else 0, inner[-1]))
+    bars = Bars(z_bar, *along, rows_bar, by_disc, own)
     compiled = inputs.compiled(True)
     share(
         compiled,
@@ -228,39 +270,13 @@ def rollout_vjp(
     )
     vector = parameters if parameters is not None else packed.rows[..., family.columns]
     start = np.empty(inner) if state is None else state
-    return RolloutVJP(
+    found = RolloutVJP(
         sum_to(np.shape(start), inputs.shaped(z_bar)),
         sum_to(np.shape(twist), inputs.of_all(turned(bars.twist))),
         sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
         sum_to(np.shape(vector), inputs.of_all(rows_bar[:, family.columns])),
     )
-
-
-def weights_vjp(
-    model: PackedRollout, state: Any, twist: Any, normal_force: Any, dt: Any, wrenches_bar: Any, weights: np.ndarray, *,
-    parameters: Any = None, states: Any = None,
-) -> np.ndarray:  # fmt: skip
-    """Compute the gradient of `sum(wrenches_bar wrenches)` of a `rollout` by the `weights` `[..., N]` of its cells.
-
-    Other arguments are as in `rollout_vjp`. Raises InvalidValueError as `rollout_vjp` does.
-    """
-    inputs = checked(
-        model, state, twist, normal_force, dt, parameters, [weights.shape[:-1]]
-    )
-    count = len(inputs.state)
-    shares = inputs.model.family.shares
-    on_the_way = _on_the_way(inputs, states)
-    cotangents = rows_of(
-        "wrenches_bar", wrenches_bar, (len(inputs.dt), 3), inputs.batch
-    )
-    found = np.zeros((count, weights.shape[-1]))
-    compiled = inputs.compiled()
-    share(
-        compiled,
-        count,
-        lambda *span: shares(compiled, on_the_way, cotangents, span, found),
-    )  # pyright: ignore
-    return sum_to(weights.shape, inputs.of_all(found))
+    return found, inputs.of_all(by_disc)
 
 
 def rollout_jacobian(
@@ -272,6 +288,8 @@ def rollout_jacobian(
     names: Sequence[str] | None = None,
     *,
     parameters: Any = None,
+    loads: Any = None,
+    cover: Any = None,
 ) -> RolloutJacobian:
     """Step a model as `rollout` does, with derivatives of the wrenches by the parameters `names`.
 
@@ -281,17 +299,19 @@ def rollout_jacobian(
     Raises InvalidValueError for inputs of wrong shapes, for negative values where they are not possible, and for names
     that are not parameters of the law.
     """
+    given = given_loads(model, twist, normal_force, loads, cover)
     if faces.hangs(model, parameters):
         known = parameter_names(model)
         some = known if names is None else validation.choices("names", names, known)
         units = np.eye(len(known))[[known.index(name) for name in some]]
-        path = faces.path_of(model, state, twist, normal_force, dt)
+        path = faces.path_of(model, state, twist, normal_force, dt, given)
         shape = len(units), *[1] * (path.load.ndim - 1), len(known)
         tangent = RolloutTangent(parameters=units.reshape(shape))
-        found = rollout_jvp(model, state, twist, normal_force, dt, tangent)
+        more = {"loads": loads, "cover": cover}
+        found = rollout_jvp(model, state, twist, normal_force, dt, tangent, **more)
         slopes = np.moveaxis(found.wrenches_dot, 0, -1)
         return RolloutJacobian(path.state, path.wrenches, slopes)
-    inputs = checked(model, state, twist, normal_force, dt, parameters)
+    inputs = checked(model, state, twist, normal_force, dt, parameters, given=given)
     family = inputs.model.family
     turned = inputs.model.turned
     count = len(inputs.state)
@@ -322,6 +342,8 @@ def rollout_jvp(
     tangent: RolloutTangent | None = None,
     *,
     parameters: Any = None,
+    loads: Any = None,
+    cover: Any = None,
 ) -> RolloutJVP:
     """Step a model as `rollout` does, with the change of the result for changes of the inputs (`tangent`).
 
@@ -329,42 +351,59 @@ def rollout_jvp(
 
     Raises `InvalidValueError` as `rollout_vjp` does.
     """
+    tangent = RolloutTangent() if tangent is None else tangent
+    validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
+    given = given_loads(model, twist, normal_force, loads, cover)
+    heavier = None
+    if given is not None:
+        name = "tangent.normal_force"
+        changes = validation.finite_numbers(name, tangent.normal_force)
+        shape = *changes.shape[:-2], *np.shape(in_time(loads)[1])[-2:]
+        changes = validation.filled(name, changes, shape)
+        heavier = model._bearing(changes).loads(changes)
+        tangent = tangent._replace(normal_force=0.0)
     if faces.hangs(model, parameters):
-        tangent = RolloutTangent() if tangent is None else tangent
-        validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
         more = [
             np.shape(each)[: max(np.ndim(each) - count, 0)]
-            for each, count in zip(tangent, (1, 2, 1, 1), strict=True)
+            for each, count in zip((*tangent, heavier), (1, 2, 1, 1, 2), strict=True)
         ]
-        path = faces.path_of(model, state, twist, normal_force, dt, more)
-        changes = faces.jvp(path, tangent, rollout_jvp)
+        path = faces.path_of(model, state, twist, normal_force, dt, given, more)
+        changes = faces.jvp(path, tangent, heavier, push)
         return RolloutJVP(path.state, path.wrenches, *changes)
+    inputs = model, state, twist, normal_force, dt
+    return push(*inputs, tangent, heavier, parameters=parameters, given=given)
+
+
+def push(
+    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, tangent: RolloutTangent, heavier: Any, *,
+    parameters: Any = None, given: Pressing | None = None,
+) -> RolloutJVP:  # fmt: skip
+    """Return what `rollout_jvp` does at a `given` pressure, for changes of the loads of the model's cells, or None."""
     packed = pack(model, parameters)
     family = packed.family
     turned = packed.turned
     steps = validation.numbers("twist", twist).shape[-2:-1]
-    tangent = RolloutTangent() if tangent is None else tangent
-    validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
-    names = [f"tangent.{name}" for name in tangent._fields]
-    inner = packed.inner, (*steps, 3), steps, (len(family.names),)
+    heavier = np.zeros((0, packed.inner[-1])) if heavier is None else heavier
+    names = [f"tangent.{name}" for name in tangent._fields] + ["loads"]
+    inner = packed.inner, (*steps, 3), steps, (len(family.names),), heavier.shape[-2:]
     changes = [
         validation.finite_numbers(name, value)
-        for name, value in zip(names, tangent, strict=True)
+        for name, value in zip(names, (*tangent, heavier), strict=True)
     ]
     more = [
         value.shape[: max(value.ndim - len(shape), 0)]
         for value, shape in zip(changes, inner, strict=True)
     ]
-    inputs = checked(packed, state, twist, normal_force, dt, None, more)
+    inputs = checked(packed, state, twist, normal_force, dt, None, more, given)
     rows = zip(names, changes, inner, strict=True)
-    z, twists, loads, values = (rows_of(*each, inputs.batch) for each in rows)
+    z, twists, loads, values, heavier = (rows_of(*each, inputs.batch) for each in rows)
     numbers = np.zeros((len(values), inputs.rows.shape[-1]))
     numbers[:, family.columns] = values
     end = inputs.state.copy()
     count = len(inputs.state)
     d_state = np.zeros_like(end)
     d_state[:] = z.reshape(len(z), -1)
-    changed = Bars(d_state, turned(twists), loads, numbers)
+    changed = Bars(d_state, turned(twists), loads, numbers, heavier)
     compiled = inputs.compiled(slopes=bool(loads.any()))
     both = [np.zeros((count, *steps, 3)) for _ in range(2)]
     share(
@@ -417,24 +456,19 @@ def _differentiate(
         share(inputs, len(z), lambda *span: run(inputs, span, z, out))
         return
     state = z.reshape(1, model.inner[0], -1)
-    data = whole.data.reshape(blocks, -1)
+    data = whole.data.reshape(len(whole.data), blocks, -1)
 
     def one(k: int) -> Derivatives:
         cells = slice(k * lanes, (k + 1) * lanes)
         part = state[..., cells].reshape(1, -1)
         sums = Derivatives(out.columns, *map(np.zeros_like, out[1:]))
-        weights, by_load = (
+        weights, by_load, kept = (
             np.ascontiguousarray(each[..., cells])
-            for each in (whole.weights, whole.by_load)
+            for each in (whole.weights, whole.by_load, whole.kept)
         )
-        run(
-            inputs._replace(
-                shape=ShapesByLoad(whole.surface, weights, by_load, data[k])
-            ),
-            (0, 1),
-            part,
-            sums,
-        )
+        levers = np.ascontiguousarray(data[:, k])
+        shape = ShapesByLoad(whole.surface, weights, by_load, levers, kept)
+        run(inputs._replace(shape=shape), (0, 1), part, sums)
         state[..., cells] = part.reshape(1, model.inner[0], -1)
         return sums
 
@@ -444,11 +478,16 @@ def _differentiate(
 
 
 def _stepped(
-    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any
+    model: Any,
+    state: Any,
+    twist: Any,
+    normal_force: Any,
+    dt: Any,
+    given: Pressing | None,
 ) -> Rollout[np.ndarray]:
     """Step any model, which checks the numbers itself."""
     state = model.rest() if state is None else validation.numbers("state", state)
-    twist, load, dt = sequences(twist, normal_force, dt)
+    twist, load, dt = sequences(twist, normal_force, dt, given)
     inner = model.state_shape
     axes = state.shape, (*twist.shape[:-2], *inner), (*load.shape[:-1], *inner)
     state = np.broadcast_to(
@@ -456,7 +495,7 @@ def _stepped(
     )
     wrenches = np.empty((*state.shape[: -len(inner)], len(dt), 3))
     for t, step in enumerate(dt):
-        state, wrenches[..., t, :] = model.step(
-            state, twist[..., t, :], load[..., t], step
+        state, wrenches[..., t, :] = step_at(
+            model, state, twist[..., t, :], load, step, given, t
         )
     return Rollout(np.array(state), wrenches)

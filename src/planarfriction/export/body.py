@@ -37,7 +37,7 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
 
     Those of a pad's face are among them, for all patches and for one `alone`.
     """
-    row = layout(patches, 0, 0, 0)
+    row = layout(patches, 0)
     counts = {name: part.stop - part.start for name, part in row.slices.items()}
     given = dict.fromkeys(("dt", "state", "new"), 1)
     record = np.dtype(

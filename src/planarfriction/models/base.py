@@ -25,6 +25,9 @@ from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.moment_pressure import centre_of, moments_of
 
+BESIDE = "be None beside loads of cells"
+"""Rule for what takes the place of these."""
+
 
 @by_parts
 class ModelJacobians(NamedTuple):
@@ -208,24 +211,34 @@ class FrictionModel(ByValue):
     ) -> StepJacobians:
         """Return the analytic derivatives of `step` (see `StepJacobians`); one-sided at kinks.
 
-        With `moments` or `loads` those at the pressure that they cause, which is held.
+        With `moments` those at the pressure that they cause, which is held. With `loads` the slopes of the wrench by
+        the load are those by the loads of the cells, `wrench_load` `[..., 3, N]`, and `state_load` those of each
+        bristle by the load of its cell or disc, or on a pad with a common compliance `[..., states, n]`. The cover is
+        held.
 
         Raises InvalidValueError as `step` does.
         """
         plain = moments is None and loads is None and cover is None
         done = plain and self.compiled.jacobians_one(state, twist, normal_force, dt)
-        return done or self.compiled.step_jacobians(
-            *self._given(state, twist, normal_force, moments, loads, cover, dt)
-        )
+        if done:
+            return done
+        given = self._given(state, twist, normal_force, moments, loads, cover, dt)
+        slopes = self.compiled.step_jacobians(*given)
+        if loads is None:
+            return slopes
+        by_cell = self._bearing(loads).spread(slopes.wrench_load)
+        return slopes._replace(wrench_load=by_cell)
 
     # ------------------------------------------------------------------ pressure given anew
 
     def _pressing(self, loads: Any, cover: Any) -> Pressing:
         """Return the cells under given loads (see `cell_loads`)."""
-        return self._cells.under(loads, cover)
+        if isinstance(loads, Pressing):
+            return loads
+        return self._bearing(loads).under(loads, cover)
 
-    @property
-    def _cells(self) -> Cells:
+    def _bearing(self, loads: Any) -> Cells:
+        """Return the cells that bear `loads`: those of the patch, or of the model."""
         rule = "be None for a model without cells"
         raise InvalidValueError("loads", rule, type(self).__name__)
 
@@ -237,7 +250,7 @@ class FrictionModel(ByValue):
             return self._inputs(state, twist, load, moments, dt=dt)
         for name, value in (("normal_force", load), ("moments", moments)):
             if value is not None:
-                raise InvalidValueError(name, "be None beside loads of cells", value)
+                raise InvalidValueError(name, BESIDE, value)
         if loads is None:
             raise InvalidValueError("loads", "be given with a cover", "None")
         pressing = self._pressing(loads, cover)

@@ -64,6 +64,20 @@ class Cells(NamedTuple):
             held.whole[:] = cells._gathered(every, every, every)[2]
         return cells
 
+    def loads(self, cells: np.ndarray) -> np.ndarray:
+        """Return loads `[..., n]` of discs, or changes of them, from those of cells `[..., N]`."""
+        parts = cells[..., self.discs.cells] * self.discs.parted
+        return np.add.reduceat(parts, self.discs.begins[:-1], axis=-1)
+
+    def spread(self, discs: np.ndarray) -> np.ndarray:
+        """Return slopes `[..., N]` by the loads of cells from those by the loads of discs `[..., n]`."""
+        slopes = np.zeros((self.count, *discs.shape[:-1]))
+        parts = (
+            np.repeat(discs, np.diff(self.discs.begins), axis=-1) * self.discs.parted
+        )
+        np.add.at(slopes, self.discs.cells, np.moveaxis(parts, -1, 0))
+        return np.moveaxis(slopes, 0, -1)
+
     def under(self, loads: Any, cover: Any = None) -> Pressing:
         """Return the discs under `loads` `[..., N]` [N], now or (before, now), with the pressed shares of cells.
 
@@ -110,6 +124,28 @@ class Cells(NamedTuple):
         moved = np.empty((len(now), 3, n if self.discs.numbers.size else 0))
         gather(now, cover, before, self.discs, weights, pads, moved)
         return weights, pads, moved
+
+
+def sequence_of(name: str, value: Any, ends: tuple[int, ...]) -> tuple[Any, Any]:
+    """Return what was before each step of a rollout, and what is then, of a value of shape `[..., *ends]`.
+
+    The value may be a tuple of what was before the first step, `[..., N]`, and of the steps; else nothing changes then.
+    """
+    (first, value) = in_time(value)
+    steps = validation.numbers(name, value)
+    if steps.shape[-2:] != ends:
+        wanted = ", ".join(map(str, ends))
+        rule = f"have shape [..., {wanted}], the steps of the rollout and the cells"
+        raise InvalidValueError(name, rule, f"shape {list(steps.shape)}")
+    before = steps[..., :1, :]
+    if first is not None:
+        before = validation.numbers(name, first)[..., None, :]
+        shapes = before.shape, steps[..., :1, :].shape
+        lead = validation.common_shape(name, shapes)[:-2]
+        before, steps = (
+            np.broadcast_to(each, (*lead, *each.shape[-2:])) for each in (before, steps)
+        )
+    return np.concatenate([before, steps], axis=-2)[..., : ends[0], :], steps
 
 
 def in_time(value: Any) -> tuple[Any, Any]:

@@ -89,6 +89,9 @@ class DistributedModel(FrictionModel):
         """True if the pieces of the pad have a compliance in common."""
         return self.pad is not None and self.pad.compliance(self.patch) is not None
 
+    def _bearing(self, loads: Any) -> Cells:
+        return self._cells
+
     @functools.cached_property
     def _cells(self) -> Cells:
         stiffness = None if self.pad is None else self.pad.pieces(self.patch, self.law)

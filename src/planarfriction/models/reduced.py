@@ -11,7 +11,6 @@ from typing import Any, Self
 import numpy as np
 
 from planarfriction._engine.records.base import CompiledModel
-from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction._support.equality import checked
 from planarfriction.laws import FrictionLaw
@@ -108,14 +107,13 @@ class ReducedModel(FrictionModel):
         squares = 0.5 * cells.lever_radii**2
         return Cells.of(members, stiffness, (shares, places, squares))
 
-    def _pressing(self, loads: Any, cover: Any) -> Pressing:
-        """Return the discs under loads of the cells, or of the discs."""
+    def _bearing(self, loads: Any) -> Cells:
         count = self.reduction.patch.cells
         shape = validation.numbers("loads", in_time(loads)[1]).shape
         if shape[-1:] == (count,) != (self.patch.cells,):
             alike = None if self.pad is None else np.ones(count)
-            return Cells.alone(count, alike).under(loads, cover)
-        return self._cells.under(loads, cover)
+            return Cells.alone(count, alike)
+        return self._cells
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Return the analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.

@@ -15,8 +15,9 @@ import numpy as np
 
 from planarfriction import derivatives
 from planarfriction._support.equality import by_parts
+from planarfriction.derivatives.inputs import sum_to
 from planarfriction.derivatives.parameters import PackedRollout
-from planarfriction.derivatives.rollouts import weights_vjp
+from planarfriction.derivatives.rollouts import gradient
 from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.scene import MAX_STEPS, Scene
@@ -92,16 +93,17 @@ class RolloutOperation(NamedTuple):
         step = float(held[0])
         more = {"parameters": parameters, "states": kept[0] if kept else None}
         model = self.pack(*weights, *held[1:])
-        found = derivatives.rollout_vjp(
-            model, state, twist, load, step, bars[1], bars[0], **more
-        )
+        # Bristles do not see the weights, or their stiffness on a pad follows these.
+        found, by_cell = gradient(
+            model, state, twist, load, step, bars[1], bars[0], **more, own=0.0, cells=self.weighs
+        )  # fmt: skip
+        found = found[:4]
         if not self.cells:
             return found
         if not self.weighs:
             return *found, np.zeros(weights[0].shape)
-        return *found, weights_vjp(
-            model, state, twist, load, step, bars[1], weights[0], **more
-        )
+        by_weight = (np.asarray(load)[..., None] * by_cell).sum(axis=-2)
+        return *found, sum_to(weights[0].shape, by_weight)
 
 
 class SceneOperation(NamedTuple):

@@ -37,7 +37,10 @@ BAR = LANES * 13
 """Field of a block: cotangent or change of the bristles."""
 
 OUT = LANES * 16
-"""Field of a block: wrench and its change, which add up over the cells."""
+"""Field of a block: wrench and its change, which add up over the cells; cotangents of their loads."""
+
+HEAVIER = LANES * 22
+"""Field of a block: changes of the loads of the cells."""
 
 BLOCK = LANES * 23
 """Numbers of a block: an odd number of fields, for if it were a power of two, blocks would drive each other out of the
@@ -62,8 +65,6 @@ class BlockFunctions(NamedTuple):
     retreat: Any
     """`(law, twist, (dt, load, 1 or 0 without load, pull[3]), block, lanes)`: carry the cotangent of the state over a
     step; return the sums of `cell_loops.backward_passes`."""
-    shares: Any
-    """Arguments as of `retreat`: add the derivatives of `load pull . wrench` of a step by the weights to `OUT`."""
     pushed: Any
     """`(law, z, u, dt, dz, du, changes of the law, change of the cell's load)`: step a cell and its change."""
     law: Any

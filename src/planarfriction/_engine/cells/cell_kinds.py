@@ -14,7 +14,6 @@ from planarfriction._engine.cells.cell_loops import (
     CellKind,
     backward_passes,
     forward_passes,
-    share_passes,
 )
 from planarfriction._engine.codegen.derivatives import forward
 from planarfriction._engine.codegen.vectors import Vector, reader_of
@@ -65,20 +64,19 @@ def _pushed(kind: CellKind) -> Any:
 
 @functools.cache
 def rollouts_of_cells(size: int, turned: bool, sort: str) -> tuple:
-    """Return rollout, gradient, sensitivities, tangent and shares of a kind of cells (see `KINDS`)."""
+    """Return rollout, gradient, sensitivities and tangent of a kind of cells (see `KINDS`)."""
     kind = KINDS[size, turned, sort]
-    loops = forward_passes(kind).run, backward_passes(kind).run, share_passes(kind).run
+    loops = forward_passes(kind).run, backward_passes(kind).run
     functions = BlockFunctions(
         kind.lever, size, *loops, _pushed(kind), _law_of(kind), reader_of(size)
     )
     sensitivities = cells_sensitivities.bound(functions, kind)
-    rollout, gradient, tangent, shares = (
+    rollout, gradient, tangent = (
         cells_rollout.entry_of(each, functions, kind.name)
         for each in (
             cells_rollout.rollout,
             cells_rollout.gradient,
             cells_rollout.tangent,
-            cells_rollout.shares,
         )
     )
-    return rollout, gradient, sensitivities, tangent, shares
+    return rollout, gradient, sensitivities, tangent

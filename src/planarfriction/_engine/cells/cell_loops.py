@@ -283,6 +283,7 @@ def backward_passes(kind: CellKind) -> Passes:
     """Write the adjoint of a step of the cells of a block: the cotangent of the state in place, and sums over cells.
 
     These are the cotangents of the twist [3], of the load, and of the law in the order of `cells_rollout.PARAMETERS`.
+    The cotangent of the load of each cell goes into the field `OUT`, and its part by the law of a pad into the next.
     """
     element = kind.element
     lever = kind.lever
@@ -300,10 +301,13 @@ def backward_passes(kind: CellKind) -> Passes:
             tape, (state_bar, tuple(load * s.weight * each for each in pulled))
         )
         along = sum(a * b for a, b in zip(pulled, traction, strict=True))
+        stored = [along]
         if kind.pad:
-            along = along + law_bar.pop()
+            stored.append(law_bar.pop())
+            along = along + stored[1]
         return (
             z_bar,
+            tuple(stored),
             twin(lever.wrench)(s.cell, u_bar),
             (s.weight + load * by_load) * along,
             tuple(law_bar),
@@ -315,32 +319,8 @@ def backward_passes(kind: CellKind) -> Passes:
         f"{element.name}_back",
         traced(adjoint),
         sources,
-        list(bar.values()),
+        [*bar.values(), *_fields("out", OUT, 1 + kind.pad).values()],
         element.backward,
-    )
-
-
-def share_passes(kind: CellKind) -> Passes:
-    """Write the derivative of the load times a step's wrench, along a vector, by the weights of the cells of a block.
-
-    It is added to the field `OUT`.
-    """
-
-    def share(trace: Trace) -> Any:
-        s = _Symbols(trace, kind)
-        _, traction = twin(kind.element.step)(s.law, s.z, s.u, s.dt)
-        pulled = twin(kind.lever.seen)(s.cell, s.several("p", 3))
-        along = sum(a * b for a, b in zip(pulled, traction, strict=True))
-        return (Number(trace, "before") + s.load * along,)
-
-    store = f"block[{OUT} + i]"
-    sources = {**_in_block(kind), **_PULL, "before": store}
-    return passes(
-        f"{kind.element.name}_shares",
-        traced(share),
-        sources,
-        [store],
-        kind.element.forward,
     )
 
 

@@ -15,6 +15,7 @@ from planarfriction._engine.cells.cell_blocks import (
     BAR,
     BLOCK,
     BY_LOAD,
+    HEAVIER,
     LANES,
     OUT,
     WEIGHT,
@@ -23,7 +24,7 @@ from planarfriction._engine.cells.cell_blocks import (
     divided,
     totals,
 )
-from planarfriction._engine.cells.rollouts import Bars, Inputs, row_of
+from planarfriction._engine.cells.rollouts import Bars, Inputs, ShapesByLoad, row_of
 from planarfriction._engine.codegen.definitions import bind
 from planarfriction._engine.codegen.vectors import (
     Vector,
@@ -54,11 +55,36 @@ def by_of(path: str, pad: bool = False) -> tuple[str, ...]:
 
 @kernel
 def _lay(w: Doubles, blocks: int, levers: np.ndarray, numbers: int = BLOCK) -> None:
-    """Write the numbers of the levers, states of zero and no cotangents."""
-    per_block = levers.shape[0] // blocks
+    """Write the numbers of the levers in the first row, states of zero and no cotangents."""
     for k in range(blocks):
         clear(at(w, k * numbers), numbers)
-        copy(at(pointer(levers), k * per_block), at(w, k * numbers), per_block)
+        _place(levers, 0, blocks, k, at(w, k * numbers))
+
+
+@kernel
+def _place(levers: np.ndarray, row: int, blocks: int, k: int, block: Doubles) -> None:
+    per_block = levers.shape[1] // blocks
+    copy(at(pointer(levers), row * levers.shape[1] + k * per_block), block, per_block)
+
+
+@kernel
+def _press(shape: ShapesByLoad, row: int, blocks: int, k: int, lanes: int, block: Doubles) -> None:  # fmt: skip
+    """Write the weights of the cells of block k at a load, and their levers if these change."""
+    for i in range(lanes):
+        block[WEIGHT + i] = shape.weights[row, k * lanes + i]
+    if shape.data.shape[0] > 1:
+        _place(shape.data, row, blocks, k, block)
+
+
+@kernel
+def _keep(
+    shape: ShapesByLoad, row: int, k: int, lanes: int, block: Doubles, field: int, size: int
+) -> None:  # fmt: skip
+    """Leave of a field of vectors of block k what stays of bristles as a step begins."""
+    if shape.kept.shape[0] > 0:
+        for m in range(size):
+            for i in range(lanes):
+                block[field + m * LANES + i] *= shape.kept[row, k * lanes + i]
 
 
 @kernel
@@ -96,15 +122,20 @@ def _forget(w: Doubles, blocks: int, field: int, size: int) -> None:
 
 
 @kernel
-def _weigh(
-    w: Doubles, blocks: int, lanes: int, weights: np.ndarray, by_load: np.ndarray
-) -> None:
+def _weigh(w: Doubles, blocks: int, lanes: int, shape: ShapesByLoad, row: int) -> None:
     for k in range(blocks):
         block = at(w, k * BLOCK)
-        first = k * lanes
+        _press(shape, row, blocks, k, lanes, block)
         for i in range(lanes):
-            block[WEIGHT + i] = weights[first + i]
-            block[BY_LOAD + i] = by_load[first + i]
+            block[BY_LOAD + i] = shape.by_load[row, k * lanes + i]
+
+
+@kernel
+def _stay(
+    w: Doubles, blocks: int, lanes: int, shape: ShapesByLoad, row: int, field: int, size: int
+) -> None:  # fmt: skip
+    for k in range(blocks):
+        _keep(shape, row, k, lanes, at(w, k * BLOCK), field, size)
 
 
 class IntervalWithChanges(NamedTuple):
@@ -137,16 +168,16 @@ def _roll(
     twists = inputs.twist[row_of(inputs.twist, b)]
     loads = inputs.load[row_of(inputs.load, b)]
     which = inputs.which[row_of(inputs.which, b)]
-    weights = inputs.shape.weights
     last = -1
-    (blocks, lanes) = divided(weights.shape[1])
+    (blocks, lanes) = divided(inputs.shape.weights.shape[1])
     kept = states.shape[0] > 0
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
-            _weigh(w, blocks, lanes, weights[last], inputs.shape.by_load[last])
+            _weigh(w, blocks, lanes, inputs.shape, last)
         if kept:
             _read(w, Z, states[t], n, kind.size)
+        _stay(w, blocks, lanes, inputs.shape, last, Z, kind.size)
         load = loads[t]
         twist = three(twists[t])
         dt = inputs.dt[t]
@@ -205,15 +236,15 @@ def _pull(
     twists = inputs.twist[row_of(inputs.twist, b)]
     loads = inputs.load[row_of(inputs.load, b)]
     which = inputs.which[row_of(inputs.which, b)]
-    weights = inputs.shape.weights
     last = -1
-    (blocks, lanes) = divided(weights.shape[1])
+    (blocks, lanes) = divided(inputs.shape.weights.shape[1])
     by_law = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for t in range(inputs.dt.shape[0] - 1, -1, -1):
         if which[t] != last:
             last = which[t]
-            _weigh(w, blocks, lanes, weights[last], inputs.shape.by_load[last])
+            _weigh(w, blocks, lanes, inputs.shape, last)
         _write(w, Z, states[t], n, kind.size)
+        _stay(w, blocks, lanes, inputs.shape, last, Z, kind.size)
         load = loads[t]
         twist = three(twists[t])
         shared = inputs.dt[t], load, 0.0 if load == 0.0 else 1.0, *three(pulls[t])
@@ -222,6 +253,13 @@ def _pull(
             add(twist_bar[t], sums[:3])
             load_bar[t] += sums[3]
             by_law = plus(by_law, 1.0, sums[4:])
+            if bars.cells.shape[1] > 0:
+                block = at(w, k * BLOCK + OUT)
+                for i in range(lanes):
+                    block[i] += bars.own * block[LANES + i]
+        if bars.cells.shape[1] > 0:
+            _read(w, OUT, bars.cells[b, t], n, 1)
+        _stay(w, blocks, lanes, inputs.shape, last, BAR, kind.size)
     return inputs.springs * by_law[0], *by_law[1:]
 
 
@@ -249,42 +287,6 @@ def gradient(
             row_bar[COLUMNS[m]] += by_law[m]
 
 
-@kernel
-def shares(
-    kind: BlockFunctions, inputs: Inputs, states: np.ndarray, wrench_bar: np.ndarray, span: tuple[int, ...],
-    out: np.ndarray, scratch: np.ndarray,
-) -> None:  # fmt: skip
-    """Write the cotangents of the weights of cells, from those of the wrenches [B or 1, T, 3], to `out` [B, n].
-
-    Bristles do not see the weights, or their stiffness on a pad follows these: they are the `states` before each step
-    [B or 1, T, size n], and stay.
-    """
-    w = pointer(scratch)
-    n = states.shape[2] // kind.size
-    rows = inputs.rows
-    blocks, lanes = divided(inputs.shape.weights.shape[1])
-    for b in range(span[0], span[1]):
-        twists = inputs.twist[row_of(inputs.twist, b)]
-        loads = inputs.load[row_of(inputs.load, b)]
-        law = law_of(rows[row_of(rows, b)])
-        pulls = wrench_bar[row_of(wrench_bar, b)]
-        before = states[row_of(states, b)]
-        _lay(w, blocks, inputs.shape.data)
-        at_load = inputs.which[row_of(inputs.which, b), 0]
-        weights = inputs.shape.weights[at_load]
-        _weigh(w, blocks, lanes, weights, inputs.shape.by_load[at_load])
-        for t in range(inputs.dt.shape[0]):
-            load = loads[t]
-            twist = three(twists[t])
-            shared = (inputs.dt[t], loads[t], 1.0, *three(pulls[t]))
-            if load == 0.0:
-                continue
-            _write(w, Z, before[t], n, kind.size)
-            for k in range(blocks):
-                kind.shares(law, twist, shared, at(w, k * BLOCK), lanes)
-        _read(w, OUT, out[b], n, 1)
-
-
 # ---------------------------------------------------------------------- forwards
 
 
@@ -302,7 +304,9 @@ def _push_one(
     u = lever.seen(one, interval.twist)
     d_u = lever.seen(one, interval.d_twist)
     law = kind.law(interval.law, block, i, load)
-    heavier = (weight + load * block[BY_LOAD + i]) * interval.d_load
+    heavier = (weight + load * block[BY_LOAD + i]) * interval.d_load + block[
+        HEAVIER + i
+    ]
     (new, traction), (d_new, d_traction) = kind.pushed(
         law, z, u, interval.dt, change, d_u, interval.d_law, heavier
     )
@@ -337,14 +341,13 @@ def tangent(
     w = pointer(scratch)
     n = z.shape[1] // kind.size
     rows = inputs.rows
-    weights = inputs.shape.weights
-    all_by_load = inputs.shape.by_load
-    blocks, lanes = divided(weights.shape[1])
+    blocks, lanes = divided(inputs.shape.weights.shape[1])
     for b in range(span[0], span[1]):
         twists = inputs.twist[row_of(inputs.twist, b)]
         loads = inputs.load[row_of(inputs.load, b)]
         turns = changes.twist[row_of(changes.twist, b)]
         pushes = changes.load[row_of(changes.load, b)]
+        heavier = changes.cells[row_of(changes.cells, b)]
         law = law_of(rows[row_of(rows, b)])
         d_law = law_of(changes.rows[row_of(changes.rows, b)])
         which = inputs.which
@@ -356,7 +359,11 @@ def tangent(
         for t in range(inputs.dt.shape[0]):
             if which[t] != last:
                 last = which[t]
-                _weigh(w, blocks, lanes, weights[last], all_by_load[last])
+                _weigh(w, blocks, lanes, inputs.shape, last)
+            _stay(w, blocks, lanes, inputs.shape, last, Z, kind.size)
+            _stay(w, blocks, lanes, inputs.shape, last, BAR, kind.size)
+            if heavier.shape[0] > 0:
+                _write(w, HEAVIER, heavier[t], n, 1)
             load = loads[t]
             stiffer = inputs.springs * d_law.sigma_0
             by_law = (stiffer, *d_law[1:7], d_law.breakaway_ratio)

@@ -20,7 +20,14 @@ from planarfriction._engine.cells.cell_blocks import (
     divided,
 )
 from planarfriction._engine.cells.cell_loops import CellKind
-from planarfriction._engine.cells.cells_rollout import _lay, _read, _write, entry_of
+from planarfriction._engine.cells.cells_rollout import (
+    _keep,
+    _lay,
+    _press,
+    _read,
+    _write,
+    entry_of,
+)
 from planarfriction._engine.cells.rollouts import Derivatives, row_of
 from planarfriction._engine.codegen.derivatives import forwards
 from planarfriction._engine.codegen.vectors import (
@@ -165,14 +172,17 @@ def _follow(
     twists = inputs.twist[row_of(inputs.twist, b)]
     loads = inputs.load[row_of(inputs.load, b)]
     which = inputs.which[row_of(inputs.which, b)]
+    shape = inputs.shape
+    blocks, _ = divided(shape.weights.shape[1])
     last = -1
     wrench = out.wrenches[b]
     slopes = out.slopes[b]
     for t in range(inputs.dt.shape[0]):
         if which[t] != last:
             last = which[t]
-            for i in range(lanes):
-                block[WEIGHT + i] = inputs.shape.weights[last, k * lanes + i]
+            _press(shape, last, blocks, k, lanes, block)
+        _keep(shape, last, k, lanes, block, Z, kind.size)
+        _keep(shape, last, k, lanes, block, _CHANGE, kind.size * len(_MOVING))
         load = loads[t]
         if load == 0.0:
             _forget(block)

@@ -81,8 +81,9 @@ def covered_part(
         bx = outline[2 * k] - x
         by = outline[2 * k + 1] - y
         length = math.hypot(bx - ax, by - ay)
-        ux = (bx - ax) / length
-        uy = (by - ay) / length
+        per = 1.0 / length if length > 0.0 else 0.0
+        ux = (bx - ax) * per
+        uy = (by - ay) * per
         start = ax * ux + ay * uy
         end = bx * ux + by * uy
         # Places along the side count from its foot, and its distance from the nearer corner: corners may be far away.

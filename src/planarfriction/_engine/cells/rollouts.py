@@ -23,7 +23,9 @@ class ShapesByLoad(NamedTuple):
     by_load: np.ndarray
     """Slopes of the weights by the load, `[L, M]` [1/N]."""
     data: np.ndarray
-    """Numbers of the limit surface, or of the levers of the cells, flat."""
+    """Numbers of the limit surface, flat, or of the levers of the cells, `[1 or L, K]`."""
+    kept: np.ndarray
+    """Share of the bristles of the cells that stays as a step begins, `[L, M]`; `[0, M]` if all does."""
 
 
 class Inputs(NamedTuple):
@@ -66,6 +68,10 @@ class Bars(NamedTuple):
     """[B, T]"""
     rows: np.ndarray
     """[B, N], comes in as zeros; changes are [B or 1, N]."""
+    cells: np.ndarray
+    """Of the loads of cells, [B, T, n]; [B, 0, n] if none are wanted. Changes are [B or 1, T or 0, n]."""
+    own: float = 1.0
+    """Share of the cotangents of these that comes by the law of a pad: 0 at a held ratio of stiffness to load."""
 
 
 @kernel

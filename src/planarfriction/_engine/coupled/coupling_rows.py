@@ -39,7 +39,7 @@ class ContactSolve(NamedTuple):
     """Moments of the normal forces at W_0, about the patches' origins, [2k] (see `following`)."""
     support: Doubles
     """Rectangle that bears each patch whose pressure follows: centre, cosine and sine of its first axis, half widths,
-    and width of the margin over which cells leave it, [7k]; half widths of 0 for all of it."""
+    [6k]; half widths of 0 for all of it."""
     follows: Doubles
     """1 of patches whose pressure follows these, -1 of those that keep that of the last solution, else 0, [k]."""
     state: Doubles
@@ -108,6 +108,8 @@ class ContactSolve(NamedTuple):
     """Weights of the points of all patches that can follow."""
     copies: Integers
     """Records of the patches among these whose points are cells."""
+    moved: Doubles
+    """Numbers of the discs of these."""
 
 
 Offsets = offsets_of(ContactSolve)
@@ -117,8 +119,11 @@ INVALID = -1.0
 """Stands in place of a number of iterations."""
 
 
-def layout(patches: int, states: int, points: int, copies: int) -> Layout:
-    """Return the layout of rows for k patches, of so many `points` to share loads, and words of records to copy."""
+def layout(
+    patches: int, states: int, points: int = 0, copies: int = 0, moved: int = 0
+) -> Layout:
+    """Return the layout of rows for k patches, of so many `points` to share loads, words of records to copy, and
+    numbers of discs that move."""
     k = patches
     n = 3 * patches
     shapes = dict.fromkeys(ContactSolve._fields, n)
@@ -132,7 +137,8 @@ def layout(patches: int, states: int, points: int, copies: int) -> Layout:
     shapes |= dict.fromkeys(("moments", "shift"), 2 * k) | {
         "weights": points,
         "copies": copies,
-        "support": 7 * patches,
+        "moved": moved,
+        "support": 6 * patches,
     }
     shapes |= dict.fromkeys(("state", "new"), states) | {"host": 12 * k}
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(
@@ -150,11 +156,15 @@ class Followers(NamedTuple):
     x: Doubles
     """Coordinates of the points of all patches [m]."""
     y: Doubles
+    width: Doubles
+    """Widths of the cells, over which an edge uncovers them [m]."""
     firsts: Integers
     """First point of each patch, and behind the last the count of all, [k + 1]."""
     words: Integers
     """Words of the record of a patch whose points are cells, of which the last is the address of the weights; 0 of one
     that moves as a whole, [k]."""
+    moves: Integers
+    """Numbers of each disc of a patch, as `CompiledModel.moves`, [k]."""
 
 
 class Patches(NamedTuple):

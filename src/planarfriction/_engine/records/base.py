@@ -95,6 +95,8 @@ class CompiledModel:
 
     rollouts: Any = None
     """The model as the loops of rollouts see it, once `derivatives` has packed it."""
+    moves = 0
+    """Numbers of each disc, the first of which are its place and kappa times its radius; 0 of what cannot move."""
     behind = 0
     """Numbers behind a wrench that steps need as scratch."""
 
@@ -155,13 +157,16 @@ class CompiledModel:
     ) -> Iterator[tuple[Any, PackedModel, np.ndarray | None]]:
         """Yield rows of the flat batch, the model at the load of each row or at the one load of all, and offsets.
 
-        A pressure is a `Pressing` of cells, or its centres `[..., 2]` [m]: patches whose pressure keeps its shape move
-        by offsets `[rows, 2]` [m], None else. Rows without load may be left out; their results are zero.
+        A pressure is a `Pressing` of cells, cells that are packed, or its centres `[..., 2]` [m]: patches whose
+        pressure keeps its shape move by offsets `[rows, 2]` [m], None else. Rows without load may be left out; their
+        results are zero.
         """
         raise NotImplementedError
 
     def points(self) -> tuple[np.ndarray, int]:
-        """Return the cells that share the load, `[n, 2]` [m], and the words of their record, or one point that has all.
+        """Return the cells that share the load, and the words of their record, or one point that has all.
+
+        Cells `[n, 3]` have places x and y and a width [m].
 
         The last word is the address of the weights of cells; a point, which has none, moves as a whole. There is no
         point where it would change with the load: such a patch cannot follow moments in `coupling`.

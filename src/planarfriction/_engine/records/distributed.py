@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -26,6 +27,10 @@ from planarfriction._engine.records.packed import (
     linearised,
 )
 from planarfriction._engine.records.pressing import Pressing
+from planarfriction.formulas import LIGHTEST
+
+SHORTEST = 1e-9
+"""Least width of a cell over which an edge uncovers it [m]."""
 
 LOAD_STEP = 1e-5
 """Step of the central differences of weights by the load, as a share of the load [-]; their relative error is 1e-10."""
@@ -49,6 +54,8 @@ class CompiledDistributed(CompiledModel):
         if pad is not None:
             self.stiff = pad.pieces(patch, law) / law.numbers.sigma_0
             self.of_pad = True
+        if self.size == 3 and not patch.anisotropic:
+            self.moves = 3 + (pad is not None)
         self._contact, functions = self._functions()
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
@@ -96,6 +103,9 @@ class CompiledDistributed(CompiledModel):
         if pressure is None and self.fixed is not None:
             yield slice(None), self.fixed, None
             return
+        if isinstance(pressure, PackedModel):
+            yield slice(None), pressure, None
+            return
         if not isinstance(pressure, Pressing):
             weights = self.patch.weights(load.reshape(-1))
             if pressure is not None:
@@ -107,10 +117,28 @@ class CompiledDistributed(CompiledModel):
     def under(self, given: Pressing) -> PackedModel:
         """Pack the cells under given loads, with numbers of their own if they move or their stiffness changes."""
         packed = self._packed(given.weights)
-        (weights, numbers) = packed.keepalive
         if given.places is None and given.stiffer is None:
             return packed
-        numbers = np.tile(numbers, (len(weights), 1, 1))
+        return self._anew(packed, self.numbers_under(given), packed.keepalive[0])
+
+    def _anew(
+        self, packed: PackedModel, numbers: np.ndarray, weights: np.ndarray
+    ) -> PackedModel:
+        """Return cells with `numbers` `[R, numbers, n]` and `weights` `[R, n]` of their own in each row."""
+        (record, _) = self.record(numbers[0], weights)
+        columns = {"weights": places_of(weights), "cells": places_of(numbers)}
+        if self.sort == PAD:
+            last = numbers.strides[1] * (numbers.shape[1] - 1)
+            columns["stiff"] = places_of(numbers) + last
+        rows = rows_of(record, len(weights), **columns)
+        return packed._replace(records=rows, keepalive=(weights, numbers))
+
+    def numbers_under(self, given: Pressing) -> np.ndarray:
+        """Return the `numbers` of the cells under given loads `[R, numbers, n]`, or one row if they stay."""
+        numbers = self.numbers()[None]
+        if given.places is None and given.stiffer is None:
+            return numbers
+        numbers = np.tile(numbers, (len(given.weights), 1, 1))
         if given.places is not None:
             x, y = np.moveaxis(given.places, -2, 0)
             first = 3 if self.patch.anisotropic else 0
@@ -119,13 +147,7 @@ class CompiledDistributed(CompiledModel):
             numbers[:, first + 2] = KAPPA * given.radii
         if given.stiffer is not None:
             numbers[:, -1] *= given.stiffer
-        (record, _) = self.record(numbers[0], weights)
-        columns = {"weights": places_of(weights), "cells": places_of(numbers)}
-        if self.sort == PAD:
-            last = numbers.strides[1] * (numbers.shape[1] - 1)
-            columns["stiff"] = places_of(numbers) + last
-        rows = rows_of(record, len(weights), **columns)
-        return packed._replace(records=rows, keepalive=(weights, numbers))
+        return numbers
 
     def step_jacobians(
         self,
@@ -135,21 +157,54 @@ class CompiledDistributed(CompiledModel):
         dt: np.ndarray,
         pressure: Any = None,
     ) -> StepJacobians:
-        """See `CompiledModel`; by the state before it was left."""
-        if not isinstance(pressure, Pressing) or pressure.kept is None:
+        """See `CompiledModel`; of given loads by the state before it was left, and by the load of each cell."""
+        if not isinstance(pressure, Pressing):
             return super().step_jacobians(state, twist, load, dt, pressure)
-        state = pressure.left(state, self.size)
-        slopes = super().step_jacobians(state, twist, load, dt, pressure)
-        kept = pressure.kept.reshape(*load.shape, 1, 1, -1)
-        return slopes._replace(
-            state_state=slopes.state_state * kept,
-            wrench_state=slopes.wrench_state * kept,
+        rows, n = pressure.weights.shape
+        numbers = self.numbers_under(pressure).swapaxes(1, 2)
+        numbers = np.broadcast_to(numbers, (rows, *numbers.shape[1:]))
+        numbers = np.ascontiguousarray(numbers).reshape(rows * n, -1, 1)
+        weights = np.ones((rows * n, 1))
+        contact = self._anew(self._packed(pressure.weights), numbers, weights)
+        contact = contact._replace(states=self.size)
+        shares = np.maximum(pressure.weights, LIGHTEST)
+        left = pressure.left(state, self.size).reshape(rows, self.size, n)
+        slopes = self._one.step_jacobians(
+            np.ascontiguousarray(left.swapaxes(1, 2)).reshape(-1, self.size, 1),
+            np.repeat(twist.reshape(rows, 3), n, axis=0),
+            (load.reshape(rows, 1) * shares).ravel(),
+            np.repeat(dt.ravel(), n),
+            contact,
         )
+        kept = 1.0 if pressure.kept is None else pressure.kept[:, None, None]
+        by_state, by_twist, by_load, pull_state, pull_twist, pull_load = (
+            np.moveaxis(each.reshape(rows, n, *each.shape[1:]), 1, -1)
+            for each in slopes
+        )
+        found = (
+            by_state[:, :, :, 0] * kept,
+            by_twist[:, :, 0].swapaxes(-1, -2),
+            by_load[:, :, 0],
+            pull_state[:, :, :, 0] * kept,
+            pull_twist.sum(axis=-1),
+            pull_load,
+        )
+        return StepJacobians(
+            *(each.reshape(*load.shape, *each.shape[1:]) for each in found)
+        )
+
+    @functools.cached_property
+    def _one(self) -> CompiledDistributed:
+        """Machine form of one cell, whose numbers are given with it."""
+        one = copy.copy(self)
+        one._prepare((self.size, 1), (self.size, self.size, 1))
+        return one
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
         size = size_of(type(self.record(np.zeros((2, 1)), np.zeros(1))[0]))
-        return self.patch.positions, size
+        widths = np.maximum(np.sqrt(self.patch.areas), SHORTEST)
+        return np.column_stack([self.patch.positions, widths]), size
 
     def linearisation(
         self, state: np.ndarray, twist: np.ndarray, load: np.ndarray
@@ -227,7 +282,7 @@ class CompiledDistributed(CompiledModel):
                 self.patch.weights(loads + change) for change in (step, -step)
             )
             by_load = (above - below) / (2.0 * step)[:, None]
-        return cells_by_load(self.numbers(), self.patch.weights(loads), by_load)
+        return cells_by_load(self.numbers()[None], self.patch.weights(loads), by_load)
 
     def _packed(
         self, weights: np.ndarray, chosen: np.ndarray | None = None

@@ -92,17 +92,27 @@ def linearised(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> np.
 
 
 def cells_by_load(
-    levers: np.ndarray, weights: np.ndarray, by_load: np.ndarray | None
+    levers: np.ndarray,
+    weights: np.ndarray,
+    by_load: np.ndarray | None = None,
+    kept: np.ndarray | None = None,
 ) -> ShapesByLoad:
-    """Pack cells by the numbers of their levers `[K, N]` and weights `[L, N]` at L loads, with slopes or zeros."""
-    numbers, cells = levers.shape
+    """Pack cells by the numbers of their levers `[1 or L, K, N]` and weights `[L, N]` at L loads.
+
+    Slopes of the weights are zeros unless given; without `kept` bristles stay as they are.
+    """
+    rows, numbers, cells = levers.shape
     blocks, lanes = divided.py_func(cells)
-    padded = np.zeros((numbers, blocks * lanes))
-    padded[:, :cells] = levers
-    data = np.zeros((blocks, numbers, LANES))
-    data[:, :, :lanes] = padded.reshape(numbers, blocks, lanes).swapaxes(0, 1)
+    padded = np.zeros((rows, numbers, blocks * lanes))
+    padded[..., :cells] = levers
+    data = np.zeros((rows, blocks, numbers, LANES))
+    data[..., :lanes] = padded.reshape(rows, numbers, blocks, lanes).swapaxes(1, 2)
     shapes, slopes = np.zeros((2, len(weights), blocks * lanes))
     shapes[:, :cells] = weights
     if by_load is not None:
         slopes[:, :cells] = by_load
-    return ShapesByLoad(np.zeros(3, dtype=int), shapes, slopes, data.ravel())
+    stays = np.zeros((0 if kept is None else len(kept), blocks * lanes))
+    if kept is not None:
+        stays[:, :cells] = kept
+    data = data.reshape(rows, -1)
+    return ShapesByLoad(np.zeros(3, dtype=int), shapes, slopes, data, stays)

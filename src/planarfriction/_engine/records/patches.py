@@ -48,14 +48,17 @@ def packed_patches(
         [0 if each is None else each.records.shape[1] for each in fixed], np.int64
     )
     places, words = zip(*(each.points() for each in inner), strict=True)
-    x, y = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
+    columns = (np.ascontiguousarray(each) for each in np.concatenate(places).T)
     followers = Followers(
-        x, y, np.cumsum([0, *map(len, places)]), np.array(words, np.int64)
+        *columns,
+        np.cumsum([0, *map(len, places)]),
+        np.array(words, np.int64),
+        np.array([each.moves for each in inner], np.int64),
     )
+    moved = sum(each.moves * len(at) for each, at in zip(inner, places, strict=True))
     bounds = np.cumsum([0, *(math.prod(each.state_shape) for each in models)])
-    rows = layout(
-        len(models), int(bounds[-1]), len(followers.x), int(followers.words.sum())
-    )
+    shared = len(followers.x), int(followers.words.sum()), moved
+    rows = layout(len(models), int(bounds[-1]), *shared)
     none = np.zeros((3, 3))
     soft = [none if each.compliance is None else each.compliance for each in models]
     patches = Patches(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,13 @@ class Pressing(NamedTuple):
                 )
                 for each in self
             )
+        )
+
+    def at(self, step: Any) -> Pressing:
+        """Return the rows of a step of a rollout, the last axis of the loads, or of a list of steps."""
+        axis = self.load.ndim - 1
+        return Pressing(
+            *(None if each is None else each.take(step, axis) for each in self)
         )
 
     def left(self, state: np.ndarray, components: int) -> np.ndarray:

@@ -67,9 +67,9 @@ class CompiledPublished(CompiledModel):
 
     def points(self) -> tuple[np.ndarray, int]:
         """See `CompiledModel`."""
-        return np.empty((0, 2)) if self.depends_on_load else self.shapes.shape_at(
-            None
-        ).place[None], 0
+        if self.depends_on_load:
+            return np.empty((0, 3)), 0
+        return np.array([[*self.shapes.shape_at(None).place, 0.0]]), 0
 
     def linearisation(
         self, shape: Any, state: np.ndarray, twist: np.ndarray

@@ -114,31 +114,36 @@ class CompiledSoft(CompiledDistributed):
         answer = np.linalg.inv(np.eye(3) - by_face @ soft / h)
         wrench_state = answer @ alone
         wrench_twist = answer @ by_face
-        wrench_load = (answer @ pieces.wrench_load[..., None])[..., 0]
+        by_load = pieces.wrench_load
+        of_load = pieces.state_load
+        if isinstance(pressure, Pressing):
+            alone = np.eye(of_load.shape[-1])
+            of_load = np.einsum("...an,nm->...anm", of_load, alone)
+        else:
+            by_load = by_load[..., None]
+        wrench_load = answer @ by_load
         moved = np.zeros((*batch, 3, n + 3))
         moved[..., n:] = np.eye(3) / h
         face_state = moved + soft @ wrench_state / h
         face_twist = np.eye(3) + soft @ wrench_twist / h
-        face_load = (soft @ wrench_load[..., None] / h)[..., 0]
+        face_load = soft @ wrench_load / h
         of_twist = pieces.state_twist.reshape(*batch, n, 3)
         new_state = of_twist @ face_state
         new_state[..., :n] += _spread(pieces.state_state)
         loaded = (load > 0.0)[..., None, None] * dt[..., None, None]
         back = np.zeros((*batch, 3, n + 3))
         back[..., n:] = (load > 0.0)[..., None, None] * np.eye(3)
-        of_load = pieces.state_load.reshape(*batch, n)
+        of_load = of_load.reshape(*batch, n, -1) + of_twist @ face_load
+        new_load = np.concatenate([of_load, -loaded * face_load], axis=-2)
+        if not isinstance(pressure, Pressing):
+            new_load = new_load[..., 0]
+            wrench_load = wrench_load[..., 0]
         return StepJacobians(
             np.concatenate([new_state, back - loaded * face_state], axis=-2),
             np.concatenate(
                 [of_twist @ face_twist, loaded * (np.eye(3) - face_twist)], axis=-2
             ),
-            np.concatenate(
-                [
-                    of_load + (of_twist @ face_load[..., None])[..., 0],
-                    -loaded[..., 0] * face_load,
-                ],
-                axis=-1,
-            ),
+            new_load,
             wrench_state,
             wrench_twist,
             wrench_load,

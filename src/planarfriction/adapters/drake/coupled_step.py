@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.coupled.coupling import solve_batch
+from planarfriction._engine.cells.moment_pressure import tilted
+from planarfriction._engine.records.packed import PackedModel
 from planarfriction.adapters.drake.plant_copy import Shadow
 from planarfriction.coupling import CoupledPatches, HostStep
 from planarfriction.models.base import lever_of
@@ -51,6 +52,8 @@ class Asked(NamedTuple):
     """x axes of the patches in their frames; 0 before the first contact."""
     twists: np.ndarray
     loads: np.ndarray
+    covers: np.ndarray
+    """Pressed shares of the cells of patches under contact surfaces; 0 without contact."""
     touching: list[bool]
     answers: np.ndarray
     """Reaction of twists and loads to wrenches at the end, from which the next step starts."""
@@ -89,14 +92,17 @@ class Asking:
         owed: np.ndarray,
         axes: np.ndarray,
         answers: np.ndarray,
+        covers: np.ndarray,
     ) -> Asked:
         """Take a step from the state of the shadow, under generalized forces `applied` and friction.
 
         From `bristles`, the `wrench` of each patch in the last step, the generalized `force` that these were, the
-        twists that bristles are `owed` (those that they saw in the last step were off by them), its x `axes`, and its
-        `answers`.
+        twists that bristles are `owed` (those that they saw in the last step were off by them), its x `axes`, its
+        `answers`, and the `covers` of its cells.
         """
         row = self._row
+        row.held = {}
+        pressed = np.zeros(len(covers))
         passes = 0
         iterations = 0
         solved = False
@@ -111,7 +117,9 @@ class Asking:
             velocity = self._shadow.step(applied + force)
             pushes = self._shadow.pushes(first=passes == 0)
             passes += 1
-            if self._touch(pushes, bristles, wrench, owed, axes):
+            new = self._touch(pushes, bristles, wrench, owed, axes)
+            if new:
+                self._press(new, pushes, bristles, covers, pressed)
                 np.copyto(row.follows, abs(row.follows))
                 if passes == 1:
                     self._answer_as_before(answers)
@@ -167,6 +175,7 @@ class Asking:
             axes,
             twist - owed,
             load,
+            pressed,
             self._touching,
             answers,
             velocity,
@@ -193,13 +202,13 @@ class Asking:
         wrench: np.ndarray,
         owed: np.ndarray,
         axes: np.ndarray,
-    ) -> bool:
-        """Place patches that touch for the first time in this step; return True if there are any.
+    ) -> list[int]:
+        """Place patches that touch for the first time in this step, and return them.
 
         Their bristles, wrenches and what they are owed are carried into their axes of this step, in place.
         """
         if all(self._touching):
-            return False
+            return []
         new = [
             p
             for p, touching in enumerate(self._touching)
@@ -221,7 +230,31 @@ class Asking:
                 self._row.response.diagonal() / self._shadow.dt
             )
             self._open = max(MISFIT, RESOLUTION * momentum * speeds.max())
-        return bool(new)
+        return new
+
+    def _press(
+        self, new: list[int], pushes: np.ndarray, bristles: np.ndarray, before: np.ndarray, pressed: np.ndarray
+    ) -> None:  # fmt: skip
+        """Give patches under contact surfaces the pressure of these, and write which cells are `pressed`.
+
+        Drake takes the force of each polygon at its centroid. A plane over the pressures brings their centre there.
+        """
+        for p in new:
+            one = self._shadow.covers[p]
+            if one.stop == one.start:
+                continue
+            loads, cover = self._shadow.pressed(p)
+            if loads.any():
+                model = self._coupled.models[p]
+                mx, my = self._moments[p] @ pushes[p]
+                load = self._normals[p] @ pushes[p, :3]
+                centre = np.array([[-my, mx]]) / load
+                loads = tilted(model.patch.positions, loads[None], centre)[0]
+                pressing = model._pressing(loads, (before[one], cover))
+                self._row.held |= self._coupled._press(
+                    bristles[None], np.zeros((1, len(self._touching))), (), {p: pressing}
+                )  # fmt: skip
+                pressed[one] = cover
 
     def _answer_freely(self) -> None:
         """Take the response of the bodies without contact: none is larger, so that each pass gets closer."""
@@ -290,18 +323,15 @@ class CouplingRow(SimpleNamespace):
         self.response = self.response.reshape(3 * k, 3 * k)
         self.load_response = self.load_response.reshape(k, 3 * k)
         self.dt[:] = shadow.dt
+        self.held: dict[int, PackedModel] = {}
+        """Patches under pressures that are given."""
         self._coupled = coupled
         self._words = words
 
     def solve(self) -> int:
         """Fill in `new, wrench, twist, load, residual, converged`; the iterations taken."""
         self.wrench[:] = self.guess
-        packed = self._coupled._packed
-        if packed.following:
-            count = int(self._coupled._solve(self._words)[0])
-        else:
-            solve_batch(packed.patches.words, self._words, 0, 1)
-            count = int(self.iterations[0])
+        count = int(self._coupled._solve(self._words, self.held)[0])
         if count < 0:
             self._refuse()
         return count

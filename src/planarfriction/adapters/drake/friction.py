@@ -90,7 +90,8 @@ class Friction(LeafSystem):
         states = self.coupled.state_shape[0]
         sizes = {
             "bristles": states, "wrenches": 3 * k, "force": self._size, "owed": 3 * k, "axes": 3 * k, "twists": 3 * k,
-            "loads": k, "answers": k * (1 + 12 * k), "velocities": self._size, "report": len(Report._fields),
+            "loads": k, "covers": self._shadow.covers[-1].stop, "answers": k * (1 + 12 * k),
+            "velocities": self._size, "report": len(Report._fields),
         }  # fmt: skip
         bounds = np.cumsum([0, *sizes.values()])
         self._parts = {
@@ -241,7 +242,15 @@ class Friction(LeafSystem):
         own = context.get_discrete_state_vector().value()
         before = (
             own[parts[name]]
-            for name in ("bristles", "wrenches", "force", "owed", "axes", "answers")
+            for name in (
+                "bristles",
+                "wrenches",
+                "force",
+                "owed",
+                "axes",
+                "answers",
+                "covers",
+            )
         )
         asked = self._asking.step(applied, *before)
         *report, converged = asked.report

@@ -31,7 +31,7 @@ from planarfriction.models import FrictionModel
 CENTRES = ("auto", "frame", "contact")
 """Ways to place the centre of a patch."""
 
-PRESSURES = ("auto", "follows", "fixed")
+PRESSURES = ("auto", "follows", "fixed", "surface")
 """Ways to place the pressure of a patch."""
 
 _ROUND = Sphere, Capsule, Ellipsoid
@@ -64,7 +64,9 @@ class PatchContact(Checked):
     curved side of a single cylinder."""
     pressure: str = "auto"
     """Pressure that "follows" the moments of the contact forces (see `ContactPatch.weights`), or is "fixed" to the
-    patch; "auto" is fixed if one side is a single sphere, capsule or ellipsoid."""
+    patch; "auto" is fixed if one side is a single sphere, capsule or ellipsoid. With "surface" the cells bear the
+    pressure of Drake's hydroelastic contact surface where they lie (see `FrictionModel.step`, `loads`), and that of the
+    patch where Drake has points of contact."""
 
     def __post_init__(self) -> None:
         validation.instance("model", self.model, FrictionModel, "a friction model")
@@ -121,6 +123,12 @@ class Placed:
             patch.pressure == "auto" and faces and follows(patch.model)
         )
         """True if the pressure follows the contact forces."""
+        self.surface = None
+        """Cells `[3, N]` of a patch with the pressure of a contact surface: x, y, and radii of their discs [m]."""
+        if patch.pressure == "surface":
+            cells = patch.model.patch
+            patch.model._bearing(cells.areas)  # knows loads of cells
+            self.surface = np.array([*cells.positions.T, np.sqrt(cells.areas / np.pi)])
         self.centre = CENTRES.index(patch.centre)
         """Origin of the patch, one of those of `placing`."""
         self.round = not faces

@@ -14,6 +14,8 @@ import numpy as np
 from pydrake.multibody.tree import JacobianWrtVariable
 from pydrake.systems.framework import DiagramBuilder
 
+from planarfriction._engine.cells.moment_pressure import NARROW
+from planarfriction._engine.cells.surface_cells import press
 from planarfriction._engine.coupled import placing
 from planarfriction.adapters.drake.patches import Placed
 from planarfriction.errors import InvalidValueError
@@ -52,6 +54,12 @@ class Shadow:
         self._carriers = [self.plant.get_frame(each.carrier.index()) for each in placed]
         self._placed = placed
         self.follows = [each.follows for each in placed]
+        sizes = [
+            0 if each.surface is None else each.surface.shape[1] for each in placed
+        ]
+        ends = np.cumsum([0, *sizes])
+        self.covers = [slice(*ends[p : p + 2].tolist()) for p in range(len(placed))]
+        """Places of the cells of each patch under contact surfaces among all of these."""
         self._reaches = [placing.reach_of(each.patch.model.patch) for each in placed]
         self._cylinders = [
             [
@@ -71,6 +79,8 @@ class Shadow:
         self._world = self.plant.world_frame()
         self._seen: list[Any] = [None] * len(placed)
         """Maps `[3, 6]` of motions to twists, and places of the patches on both bodies, as `rows` finds them."""
+        self._axes: list[Any] = [None] * len(placed)
+        """Origins and axes x and y of the patches in the world `[3, 3]`, as `rows` finds them."""
         self._points: list[tuple[int, int, float]] = []
         self._surfaces: list[tuple[int, int, float]] = []
         self._pressed: list[list[tuple[float, list[float]]]] = []
@@ -156,6 +166,7 @@ class Shadow:
         )
         *x, c, s = placing.x_axis(*across, normal)
         y = _cross(normal, x)
+        self._axes[p] = np.array([place, x, y])
         away = list(map(operator.sub, middle, place))
         beyond = (
             max(placing.excess(_dot(x, away), _dot(y, away), 1.0, self._reaches[p]))
@@ -193,6 +204,25 @@ class Shadow:
             x @ turned,
             ((c, -s), (s, c)),
         )
+
+    def pressed(self, p: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return loads and pressed shares of the cells of a patch `[2, N]` under its contact surfaces in this step."""
+        place, *axes = self._axes[p]
+        cells = self._placed[p].surface
+        found = np.zeros((2, cells.shape[1]))
+        results = self._contacts()
+        for i, owner, _ in self._surfaces:
+            if owner == p:
+                surface = results.hydroelastic_contact_info(i).contact_surface()
+                corners, pressures, counts = _polygons(surface)
+                # Counter-clockwise in the axes x and y, or in x and -y.
+                side = 1.0 if surface.face_normal(0) @ np.cross(*axes) > 0.0 else -1.0
+                flat = (corners - place) @ np.transpose(axes) * [1.0, side]
+                begins = np.append(0, np.cumsum(counts))
+                planes = _planes(flat, pressures, begins)
+                x, y, radii = cells
+                press(flat, begins, planes, x, side * y, radii, *found)
+        return found
 
     def bends(self, patches: Iterable[int]) -> list[np.ndarray]:
         """Return what patches have moved in the step taken last, per dt, beyond their twists at its velocities `[3]`.
@@ -290,6 +320,45 @@ class Shadow:
             sum(force * place[i] for force, place in self._pressed[p]) / total
             for i in range(3)
         ]
+
+
+def _planes(corners: np.ndarray, values: np.ndarray, begins: np.ndarray) -> np.ndarray:
+    """Return the planes `a + b x + c y` `[F, 3]` through values at the corners `[V, 2]` of polygons."""
+    numbers = np.column_stack([corners, values])
+    counts = np.diff(begins)[:, None]
+    means = np.add.reduceat(numbers, begins[:-1]) / counts
+    x, y, p = (numbers - np.repeat(means, counts[:, 0], axis=0)).T
+    squares = np.column_stack([x * x, x * y, y * y, x * p, y * p])
+    xx, xy, yy, xp, yp = np.add.reduceat(squares, begins[:-1]).T
+    area = xx * yy - xy * xy
+    flat = area > NARROW * (xx + yy) ** 2
+    per = np.where(flat, 1.0 / np.where(flat, area, 1.0), 0.0)
+    along_x = per * (yy * xp - xy * yp)
+    along_y = per * (xx * yp - xy * xp)
+    level = means[:, 2] - along_x * means[:, 0] - along_y * means[:, 1]
+    return np.column_stack([level, along_x, along_y])
+
+
+def _polygons(surface: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the corners `[V, 3]` of all faces of a contact surface, the pressures there, and how many each has."""
+    if surface.is_triangle():
+        mesh = surface.tri_mesh_W()
+        field = surface.tri_e_MN()
+        counts = np.full(mesh.num_triangles(), 3)
+        corners = [each.vertex(i) for each in mesh.triangles() for i in range(3)]
+    else:
+        mesh = surface.poly_mesh_W()
+        field = surface.poly_e_MN()
+        counts = np.array(
+            [mesh.element(f).num_vertices() for f in range(mesh.num_elements())]
+        )
+        faces = np.array(mesh.face_data())
+        heads = np.cumsum([0, *(counts[:-1] + 1)])
+        corners = np.delete(faces, heads)
+    each = range(mesh.num_vertices())
+    places = np.array([mesh.vertex(v) for v in each])
+    pressures = np.array([field.EvaluateAtVertex(v) for v in each])
+    return places[corners], pressures[corners], counts
 
 
 # NumPy's own functions of three numbers take as long as a contact.

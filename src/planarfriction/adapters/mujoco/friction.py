@@ -19,6 +19,7 @@ import numpy as np
 from planarfriction._engine.compiler.calls import address_of
 from planarfriction._engine.compiler.memory import place_of, row_of
 from planarfriction._engine.coupled import coupling as kernels
+from planarfriction._engine.coupled import placing
 from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout, same
 from planarfriction.adapters.mujoco.loops import step as loops
@@ -327,7 +328,9 @@ class Friction:
         )
         joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
         free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
-        extents = np.array([each.extent() for each in self.placed])
+        extents = np.array(
+            [placing.reach_of(each.patch.model.patch) for each in self.placed]
+        )
         laws = np.array([_sort_of_law(patch.model) for patch in self.patches], np.int64)
         self._kept = problem, columns, free, packed, extents, laws
         places = {

@@ -33,10 +33,6 @@ CENTRES = ("auto", "site", "contact")
 
 PRESSURES = ("auto", "follows", "fixed")
 
-EDGE = 0.01
-"""Displacement across the edge of a box in which a cell loses its load, in largest distances of cells from the origin:
-less than the distance of the outermost centres from the rim of a patch, so that a face is borne to its rim."""
-
 _ROUND = {
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}"))
     for name in ("SPHERE", "CAPSULE", "ELLIPSOID")
@@ -388,11 +384,6 @@ class Placed:
         return d.site_xpos[self.site] + turned @ centre, np.array(
             [x, np.cross(normal, x), normal]
         )
-
-    def extent(self) -> tuple[float, ...]:
-        """Return the reach of the patch (see `placing`) and the width of its edge, [5] [m]."""
-        patch = self.patch.model.patch
-        return *placing.reach_of(patch), EDGE * placing.size_of(patch)
 
 
 def misplaced_line(placed: Sequence[Placed], found: int) -> str | None:

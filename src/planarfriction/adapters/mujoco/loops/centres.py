@@ -89,7 +89,7 @@ def _fault(own, m, d, s, p, x, y):
     """Return the fault of patch p, with the centre of its contact forces at x, y in its frame."""
     scale = scale_of(own, m, p)
     (dx, dy) = displacement_of(own, m, p)
-    reach = at(doubles(own.extents), 5 * p)
+    reach = at(doubles(own.extents), 4 * p)
     site = integers(own.site)[p]
     if (
         not is_at_contact(own, d, s, p)
@@ -123,11 +123,7 @@ def _support(own, m, d, s, p, support):
             j = (k + 2) % 3
             first = column(turned, i)
             support[0], support[1] = shrunk * dot(x, away), shrunk * dot(y, away)
-            support[2], support[3], support[6] = (
-                dot(x, first),
-                dot(y, first),
-                doubles(own.extents)[5 * p + 4],
-            )
+            support[2], support[3] = dot(x, first), dot(y, first)
             support[4] = shrunk * half[i]
             support[5] = shrunk * half[j]
 
@@ -184,4 +180,4 @@ def follow_centres(own, m, d, s, nefc, radius, problem, kept):
         for i in range(3):
             centre[i] = dot(column(turned, i), away)
         _resize(own, m, s, nefc, p, guess)
-        _support(own, m, d, s, p, at(problem.support, 7 * p))
+        _support(own, m, d, s, p, at(problem.support, 6 * p))

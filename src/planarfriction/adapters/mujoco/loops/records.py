@@ -243,7 +243,7 @@ class Host(NamedTuple):
     on_box: int
     """Address of flags: 1 where the other geom is a box, whose faces bear patches as far as they go."""
     extents: int
-    """Address of the reach of each patch, and the width of the edge beyond which cells carry nothing, [k, 5] [m]."""
+    """Address of the reach of each patch, [k, 4] [m]."""
     parameters: int
     """Place of the parameters of the patches in the numerics of a model, behind the digest of the patches."""
     laws: int
