@@ -35,6 +35,7 @@ LIBRARY = [
     "doctor",
     "explore",
     "export",
+    "hold",
     "identify",
     "limit-surface",
     "run",

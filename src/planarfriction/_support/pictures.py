@@ -18,6 +18,7 @@ PICTURES = {
     "identification": "identification:plot_identification",
     "joint": "identification:plot_joint",
     "grip": "planning:plot_grip",
+    "hold": "holding:plot_hold",
     "push": "planning:plot_push",
 }
 """Functions that draw a record, by the name of the picture: `module:function` within `planarfriction.plots`."""

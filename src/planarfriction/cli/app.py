@@ -14,6 +14,7 @@ from click.shell_completion import CompletionItem
 from planarfriction import __version__
 from planarfriction.cli.doctor import doctor
 from planarfriction.cli.export import export
+from planarfriction.cli.hold import hold
 from planarfriction.cli.identify import identify
 from planarfriction.cli.options import (
     FILE,
@@ -231,5 +232,6 @@ def warm() -> None:
 
 app.add_command(doctor)
 app.add_command(export)
+app.add_command(hold)
 app.add_command(identify)
 app.add_command(sweep)

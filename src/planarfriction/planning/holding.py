@@ -75,48 +75,66 @@ def holding_load(
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     mu = validation.positive("mu", mu)
     margin = validation.non_negative("margin", margin)
-    if not load.any():
-        return 0.0
+    return (1.0 + margin) * smallest_force(load[None], patch, mu)
+
+
+def smallest_force(
+    loads: np.ndarray, patch: ContactPatch, mu: float, lost: np.ndarray | float = 0.0
+) -> float:
+    """Return the smallest normal force [N] that holds each of the loads `[n, 3]`.
+
+    While a load acts, the normal force is smaller by `lost` `[n]` [N].
+    """
+    if not loads.any():
+        return float(np.max(lost))
     if not patch.depends_on_load:
-        return (1.0 + margin) * _needed(load, patch, mu, None)
+        return float((forces_needed(loads, surface_at(patch), mu) + lost).max())
+    needed = lambda each: float(
+        (forces_needed(loads, surface_at(patch, each), mu) + lost).max()
+    )
     reach = np.hypot(*patch.positions.T).max()
     metric = 1.0
     if patch.root is not None:
         metric = np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max()
     # Bounds friction over mu.
     strongest = metric * (1.0 + np.hypot(*patch.asymmetries().T).max())
-    force = max(np.hypot(*load[:2]), abs(load[2]) / reach)
+    fx, fy, tau = loads.T
+    force = max(np.hypot(fx, fy).max(), np.abs(tau).max() / reach)
     low = force / (mu * strongest)
     tried = low * (1.0 - 1e-9)
     for _ in range(_STEPS):
-        if _needed(load, patch, mu, tried) <= tried:
+        if needed(tried) <= tried:
             break
         tried, low = _STEP * tried, tried
     else:
         raise InvalidValueError(
             "wrench",
             "be a load that this patch holds at some normal force",
-            load.tolist(),
+            loads[0].tolist(),
         )
     if tried > low:
         from scipy.optimize import brentq
 
-        off = lambda each: each - _needed(load, patch, mu, each)
-        tried: Any = brentq(off, low, tried, xtol=1e-12 * low)
-    return (1.0 + margin) * tried
+        tried: Any = brentq(
+            lambda each: each - needed(each), low, tried, xtol=1e-12 * low
+        )
+    return tried
 
 
-def _needed(
-    load: np.ndarray, patch: ContactPatch, mu: float, normal_force: float | None
-) -> float:
-    """Return the normal force that holds the load on the shape at `normal_force`."""
-    surface = _surface(patch, normal_force)
-    twist = surface.twist(-load)
-    return float(load @ twist / (mu * surface.dissipation(twist)))
+def forces_needed(loads: np.ndarray, surface: LimitSurface, mu: float) -> np.ndarray:
+    """Return the normal forces `[n]` [N] that hold the loads `[n, 3]` on a limit surface; 0 without a load."""
+    forces = np.zeros(len(loads))
+    some = loads.any(axis=1)
+    if not some.any():
+        return forces
+    twists = surface.twist(-loads[some])
+    power = np.einsum("...i,...i", loads[some], twists)
+    forces[some] = power / (mu * surface.dissipation(twists))
+    return forces
 
 
 @functools.lru_cache(maxsize=8)
-def _surface(patch: ContactPatch, normal_force: float | None) -> LimitSurface:
+def surface_at(patch: ContactPatch, normal_force: float | None = None) -> LimitSurface:
     """Return the limit surface of a patch, whose table for twists is dear: a plan asks several times."""
     # These pull as they do in models.
     few = patch.has_discs and not patch.cell_extents().any()
