@@ -99,6 +99,7 @@ def test_commands(draw: random.Random) -> None:
         "explore",
         "referee",
         "reproduce",
+        "simulator-benchmark",
         "simulators",
         "warm",
     ) and not {

@@ -40,8 +40,10 @@ class Commands(click.Group):
     """Group that looks for commands of other packages only where its own do not suffice: a search takes 10 ms."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands, without aliases."""
         self.add_installed()
-        return super().list_commands(ctx)
+        names = super().list_commands(ctx)
+        return [name for name in names if self.commands[name].name == name]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.commands:
@@ -57,13 +59,18 @@ class Commands(click.Group):
             formatter.write_text(ELSEWHERE)
 
     def add_installed(self) -> None:
-        """Add the commands of other packages, without those whose package cannot be imported."""
+        """Add the commands of other packages, without those whose package cannot be imported.
+
+        A command has its own name, and that of its entry point as an alias.
+        """
         for entry in entry_points(group=GROUP):
             if entry.name not in self.commands:
                 try:
-                    self.add_command(entry.load(), entry.name)
+                    found = entry.load()
                 except ImportError:
                     continue
+                self.add_command(found, entry.name)
+                self.commands.setdefault(found.name or entry.name, found)
 
 
 class MemberOf(click.Choice):

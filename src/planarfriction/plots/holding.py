@@ -100,7 +100,7 @@ def _draw_section(
     loop = np.append(np.flatnonzero(flat), 0)
     axes.plot(force[loop], torque[loop], color=style.PALETTE[0], lw=1.6)
     axes.plot(force[plan.worst], torque[plan.worst], "o", ms=6, color="k", mec="white")
-    axes.annotate("worst", (force[plan.worst], torque[plan.worst]), (6, 3), weight="bold",
+    axes.annotate("worst", (force[plan.worst], torque[plan.worst]), (7, -5), weight="bold",
                   **_LABEL)  # fmt: skip
     axes.text(0.98, 0.97, "slips", transform=axes.transAxes, ha="right", va="top",
               color="0.25")  # fmt: skip
