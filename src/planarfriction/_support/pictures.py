@@ -20,6 +20,7 @@ PICTURES = {
     "grip": "planning:plot_grip",
     "hold": "holding:plot_hold",
     "push": "planning:plot_push",
+    "push plan": "push_plan:plot_push_plan",
 }
 """Functions that draw a record, by the name of the picture: `module:function` within `planarfriction.plots`."""
 

@@ -72,7 +72,7 @@ LENGTH = Length()
 """Type of options that are a length."""
 
 
-def _sides(text: str) -> tuple[float, float] | None:
+def parse_sides(text: str) -> tuple[float, float] | None:
     """Return width and height [m] of a rectangle such as 12x20mm; None for another text."""
     match = _SIDES.fullmatch(text.strip())
     if match is None:
@@ -100,7 +100,7 @@ def find_patch(
         name.lower(): functools.partial(make, width=width)
         for name, make in PUBLISHED_PATCHES.items()
     }
-    sides = _sides(text)
+    sides = parse_sides(text)
     if sides is not None:
         makers[text.lower()] = functools.partial(
             pf.ContactPatch.rectangle, *sides, name=text.strip()
