@@ -417,9 +417,9 @@ class Log(ByValue):
         Other columns and lines that begin with # are ignored, but for a theta of numbers beside the twist, which shows
         if that is `held`. `time` and `fn` are accepted for t and normal_force, capital letters for small ones, and
         semicolons and tabs for commas; Fz, Mz, Tz and the names of ROS (wrench.force.x) too. Units in brackets behind
-        names or below them, such as `Time (ms)`, `vx [mm/s]` or `tau [N mm]`, are converted. `normal_force` [N] replaces
-        a missing column of that name; `window` is that of `from_motion`. If columns are named `contact.vx`, as in the
-        files of `planarfriction run`, those of `contact` are read, or those of the only contact.
+        names or below them, such as `Time (ms)`, `vx [mm/s]` or `tau [N mm]`, are converted. `normal_force` [N]
+        replaces a missing column of that name; `window` is that of `from_motion`. If columns are named `contact.vx`,
+        as in the files of `planarfriction run`, those of `contact` are read, or those of the only contact.
 
         Raises FileError, in one line that names the line and the column of what is wrong, and InvalidValueError for a
         wrong argument, used or not.
