@@ -48,7 +48,7 @@ SKIPPED = {
 
 RECORDS = """
     Rollout RolloutVJP RolloutJacobian RolloutStates RolloutTangent RolloutJVP SceneGradient SceneSensitivities
-    Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
+    Identification Verdict MotionPlan GripPlan GripReport HoldPlan Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     GridError LimitSurface FrictionLaw RateLaw FrictionModel Pressure HostStep Measurement Estimate
     JointFit

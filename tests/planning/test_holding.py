@@ -161,6 +161,8 @@ def test_the_force_in_motion_of_a_soft_finger_holds_every_load_on_its_shape():
 
 
 def test_a_part_without_a_load_needs_no_force_and_is_drawn():
+    soft = pf.ContactPatch.disc(0.01, 5, pressure=pf.SoftFinger(c=6e-3, n=0.3, k=2.0))
+    assert holding_load(np.zeros(3), soft, 0.8) == 0.0
     plan = plan_hold(DISC, 0.8, mass=0.1, gravity=(0.0, 0.0), grip=1.0)
     assert plan.needed == 0.0 and plan.safety_factor == np.inf
     assert len(plan.plot().axes) == 2
