@@ -51,6 +51,7 @@ def figures() -> dict[str, plots.style.PlotFigure]:
         "limit-surface": plots.plot_limit_surface(pf.LimitSurfaceExact(pads)),
         "pre-sliding-cycles": pre_sliding_cycles(),
         "grip-plan": grip_plan(),
+        "hold": hold(),
         "discs": discs(),
         "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
         "concept-motions": motions(),
@@ -278,6 +279,13 @@ def grip_plan() -> plots.style.PlotFigure:
         model, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=1.0
     )
     return pf.planning.plan_grip(plate, {"angle": np.radians(-30.0)}).plot()
+
+
+def hold() -> plots.style.PlotFigure:
+    """The grip in motion of docs/grip-planning.md."""
+    pad = pf.ContactPatch.rectangle(0.012, 0.020)
+    part = {"mass": 0.3, "centre_of_mass": (0.06, 0.0), "acceleration": 3.0}
+    return pf.planning.plan_hold(pad, 0.8, **part, grip=30.0, margin=0.2).plot()
 
 
 def main(folder: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import panel as pn
 
 from planarfriction._support.described import field_docs
+from planarfriction.cli.options import parse_sides
 from planarfriction.families import Family
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
@@ -35,6 +36,7 @@ TOOLTIPS = {
     "undo": "Goes back by one change, or by one drag as a whole.",
     "link": "Puts all that is on the screen into the address of the page.",
     "patch": "Published contact patch, of which the map shows the pressure.",
+    "sides": "Width and height of an evenly pressed rectangle: 12x20mm, 1.2x2cm, or 0.012x0.02 in metres.",
     "file": "Table or picture of relative pressures, of at most 64 x 64 cells; only their ratios matter.",
     "clear": "Takes all pressure away, for a map of your own.",
     "tool": "Effect of a drag over the map.",
@@ -58,6 +60,7 @@ class Controls:
         self.patch = widgets.Select(
             label="Patch", options=[*PUBLISHED_PATCHES, OWN], value=state.drawing.name
         )
+        self.sides = widgets.TextInput(label="Rectangle", placeholder="12x20mm")
         self.file = widgets.FileInput(
             label="Pressure map from a file (.csv, .npy, grey image)", accept=""
         )
@@ -177,6 +180,7 @@ class Controls:
             self.load: state.normal_force,
             self.cell_size: _thousandfold(drawing.cell_size),
             self.patch: drawing.name if drawing.origin == "published" else OWN,
+            self.sides: drawing.name if parse_sides(drawing.name) else "",
             **{
                 each: law_parameters(state.law)[each.tags[0]]
                 for each in self.parameters
@@ -204,6 +208,7 @@ class Controls:
         return pn.Column(
             _heading("Contact"),
             self.patch,
+            self.sides,
             self.file,
             pn.Row(
                 self.cell_size,

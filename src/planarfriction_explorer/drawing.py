@@ -16,6 +16,7 @@ import numpy as np
 from planarfriction import geometry
 from planarfriction._support import validation
 from planarfriction._support.equality import Checked, checked
+from planarfriction.cli.options import parse_sides
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.limit_surface import (
     LimitSurfaceEllipsoid,
@@ -91,6 +92,27 @@ class Drawing(Checked):
             patch.weights() / patch.weights().max()
         )
         return cls(pressures, patch.grid.cell_width, name, "published")
+
+    @classmethod
+    def rectangle(cls, text: str) -> Drawing:
+        """Return an evenly pressed rectangle such as `12x20mm`, whose sides are met within 1 % by square cells.
+
+        Raises `InvalidValueError` for a text that has no two sides, and for a rectangle that is too narrow.
+        """
+        sides = parse_sides(text)
+        if sides is None:
+            raise InvalidValueError("the rectangle", "be such as 12x20mm", repr(text))
+        width, height = (validation.length("the rectangle", each) for each in sides)
+        longer = max(width, height)
+        # The fewest cells along the longer side of which nearly a whole number fits into the shorter one.
+        for cells in range(16, MOST_SIDE + 1):
+            size = longer / cells
+            columns, rows = (max(1, round(each / size)) for each in (width, height))
+            if np.allclose([columns * size, rows * size], [width, height], rtol=0.01):
+                return cls(np.ones((rows, columns)), size, text.strip())
+        raise InvalidValueError(
+            "the rectangle", f"have sides of a ratio up to {MOST_SIDE}", text
+        )
 
     @classmethod
     def read(cls, name: str, content: bytes, cell_size: float) -> Drawing:

@@ -105,6 +105,10 @@ class Page:
             lambda name: self._draw(Drawing.published(name)) if name != OWN else None,
         )
         on(
+            controls.sides,
+            lambda text: self._draw(Drawing.rectangle(text)) if text else None,
+        )
+        on(
             controls.cell_size,
             lambda size: self._draw(self.state.drawing.scaled(1e-3 * size)),
         )

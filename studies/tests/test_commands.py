@@ -20,7 +20,7 @@ REFUSED = {
     "online trials --parts 1": "--parts must be an integer >= 4, got 1",
     "online demo --out a.txt": "cannot write a.txt: animations are .gif, .mp4 or .html files",
     "online demo --seed -1": "--seed must be an integer >= 0, got -1",
-    "referee --case none": "time_step, torsion, tower, got 'none'",
+    "simulator-benchmark --case none": "time_step, torsion, tower, got 'none'",
     "referee --case stop --step 0": "--step must be > 0, got 0.0",
 }
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import threading
 import time
 
@@ -10,6 +11,7 @@ import pytest
 from planarfriction._support.validation import number_in
 from planarfriction.cli import console, main
 from planarfriction.cli.output import write_csv
+from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import columns_of
 from tests.support.identification_logs import clean_log, excitation, noisy
 
@@ -47,9 +49,40 @@ def test_estimates_json_and_picture(path, tmp_path, capsys):
         and "slow run: 500 samples, disc" in captured.out
     )
     assert captured.err.count("wrote") == 2
+    assert re.search(
+        r"time: reading [\d.]+ s, reduced-published [\d.]+ s", captured.err
+    )
     data = json.loads((out / "slow-run-identification.json").read_text())
     assert data["parameters"]["mu_c"]["estimate"] == pytest.approx(0.5, abs=0.01)
     assert (out / "slow-run-residuals.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        (["vx", "vy"], "are vx and vy in mm/s"),
+        (["tau"], "or tau in N mm"),
+        (["t"], "is it in ms?"),
+    ],
+)
+def test_wrong_units_are_doubted_before_the_fit(
+    columns, words, tmp_path, capsys, monkeypatch
+):
+    """Names without a unit that hold mm/s, N mm or ms are doubted in lines, however long the fit takes."""
+
+    def stop(*_, **__):
+        raise InvalidValueError("fit", "not begin", "a fit")
+
+    monkeypatch.setattr("planarfriction.identify.identify_lugre", stop)
+    log = dict(columns_of(clean_log(*excitation(duration=0.5))))
+    for name in columns:
+        log[name] = 1e3 * log[name]
+    write_csv(tmp_path / "log.csv", log)
+    assert main(["identify", str(tmp_path / "log.csv"), "--patch", "disc"]) == 2
+    *warnings, error = capsys.readouterr().err.splitlines()
+    assert all(each.startswith("warning: ") for each in warnings)
+    assert words in "\n".join(warnings), warnings
+    assert "a fit" in error
 
 
 def test_ctrl_c_prints_what_was_found_so_far(path, capsys, monkeypatch):

@@ -40,6 +40,20 @@ def shown(page):
     return np.array(cells, dtype=float).reshape(3, 3)
 
 
+def test_a_rectangle_of_two_sides_with_units(page):
+    page.controls.sides.value = "12x20mm"
+    drawing = page.state.drawing
+    assert (drawing.width, drawing.height) == pytest.approx((0.012, 0.02))
+    assert page.controls.patch.value == OWN
+    page.controls.sides.value = "12x20in"
+    assert "must be a length such as 60mm" in page.message.object
+    assert page.state.drawing is drawing
+    page.controls.patch.value = "Square"
+    assert page.controls.sides.value == ""
+    with refused("the rectangle must have sides of a ratio up to 64"):
+        Drawing.rectangle("1x200mm")
+
+
 def test_what_stands_on_the_page_is_the_answer_to_what_is_set(page):
     page.controls.patch.value = "NonConvex2"
     page.controls.load.value = 2.5

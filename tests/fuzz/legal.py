@@ -58,7 +58,7 @@ SKIPPED = {
 
 RECORDS = """
     Rollout RolloutVJP RolloutJacobian RolloutStates RolloutTangent RolloutJVP SceneGradient SceneSensitivities
-    Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
+    Identification Verdict MotionPlan GripPlan GripReport HoldPlan Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     GridError LimitSurface FrictionLaw RateLaw FrictionModel Pressure HostStep Measurement Estimate
     JointFit Markers
@@ -156,9 +156,9 @@ def objects() -> dict[str, Any]:
         "refined": 2,
         "x_min": 0.0, "y_min": 0.0, "cell_width": 0.001, "cell_height": 0.001, "columns": 5, "rows": 5,
         "load": 1, "speed": 0.01, "spin": 1.0, "segments": 5, "samples": 20, "save_every": 0.01, "stop_speed": 1e-4,
-        "controller": None, "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,
+        "controller": None, "grip": 30.0, "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,
         "rtol": 1e-4, "atol": 1e-3, "t": 0.05, "elasto_plastic": 0.9, "creep_speed": 1e-5, "relaxation_time": 0.01,
-        "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None,
+        "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None, "acceleration": 3.0,
         "arm": 0.06, "share": 0.5, "forefoot": model,
         "times_repeated": 2, "gravity": (0.0, -9.81), "size": (0.15, 0.08), "fingers": 2, "phase": 0.0,
         # arrays

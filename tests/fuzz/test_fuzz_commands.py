@@ -44,6 +44,7 @@ LEGAL = {
     ],
     "limit-surface": ["--patch", "Line"],
     "export": ["scene.toml", "--out", "library"],
+    "hold": ["--mass", "0.3", "--pad", "12x20mm", "--offset", "60mm", "--mu", "0.8"],
     "identify": ["log.csv", "--patch", "Line", "--parameters", "mu_c", "--starts", "1"],
     PLAN: ["--patch", "Line", "--parameters", "mu_c", "--duration", "0.2"],
     "reproduce": ["--list"],
@@ -55,6 +56,7 @@ TEXTS = """
     nan inf -inf 0 -1 1 2 0.5 1e-300 5e-324 1e300 1e9 1,2,3 mu_c=1e400 mu_c=nan mu_c=0.5 mu_c,mu_c a= = x - -- --help
     . .. / /dev/null nowhere/x.png picture.png picture.txt table.csv map.csv map.png map.npy log.csv scene.toml
     scene.json empty.csv empty.toml folder.csv folder.toml Circle disc ring --out runs.zarr t_end=0.01
+    12mm 12x20mm 1e9x1e-9mm 5mm,-3cm
     body.mass=1:2:3 patch.law.mu_c=0.5,0.8 patch.model=reduced,distributed patch.position=[0,0] t_end=a:b
 """
 
@@ -99,6 +101,7 @@ def test_commands(draw: random.Random) -> None:
         "explore",
         "referee",
         "reproduce",
+        "simulator-benchmark",
         "simulators",
         "warm",
     ) and not {

@@ -440,8 +440,8 @@ def test_separators_and_other_names(log, tmp_path, separator, point):
         ),
         ("stamp,vx,vy,fx,fy,tau,fn", "has no column t, omega; found"),
         (
-            "t,vx [mm/s],vy,omega,fx,fy,tau,fn",
-            "column vx [mm/s] must be in SI units, got mm/s",
+            "t,vx [ft/s],vy,omega,fx,fy,tau,fn",
+            "column vx [ft/s] must be in m/s or a multiple of it, got ft/s",
         ),
         ("t,vx,Vx,vy,omega,fx,fy,tau,fn", "columns vx and Vx are the same"),
         (
@@ -544,6 +544,19 @@ def test_names_of_sensors_and_ros_and_units_below_them(log, tmp_path, names, uni
 def test_units_below_the_names_are_checked(log, tmp_path):
     path = written(tmp_path / "log.csv", columns_of(log))
     head, _, rest = path.read_text().partition("\n")
-    path.write_text(f"{head}\ns,mm/s,m/s,rad/s,N,N,Nm,N\n{rest}")
-    with refused(r"column .vx \[mm/s\]. must be in SI units, got mm/s", FileError):
+    path.write_text(f"{head}\ns,m/s,m/s,rad/s,N,N,lbf ft,N\n{rest}")
+    with refused("column .tau .lbf ft.. must be in N m or a multiple of it", FileError):
         Log.from_csv(path)
+
+
+def test_units_in_the_heading_are_converted(log, tmp_path):
+    """Times in ms, speeds in mm/s, angles in degrees, torques in N mm, forces in N and mN."""
+    headings = (
+        "Time (ms),vx [mm/s],vy [cm/s],wz [deg/s],Fx [N],Fy [mN],tau [N mm],Fn [kN]"
+    )
+    per_unit = [1e3, 1e3, 1e2, 180.0 / np.pi, 1.0, 1e3, 1e3, 1e-3]
+    columns = zip(headings.split(","), per_unit, columns_of(log).values(), strict=True)
+    table = {heading: factor * column for heading, factor, column in columns}
+    read = Log.from_csv(written(tmp_path / "log.csv", table))
+    for name in ("time", "twist", "wrench", "normal_force"):
+        assert getattr(read, name) == pytest.approx(getattr(log, name), rel=1e-12)

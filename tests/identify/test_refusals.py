@@ -115,27 +115,27 @@ REFUSED = [
     ),
     (
         lambda: turned(np.where(TIME < 2.0, ANGLE, ANGLE + 2.0)),
-        "theta [rad] must only jump by whole turns, got a step of 2.03 at t = 2 s",
+        "theta [rad] must only jump by full rotations, got a step of 2.03 at t = 2 s",
     ),
     (
         lambda: turned(np.where(TIME < 2.0, ANGLE, ANGLE + np.pi)),
-        "theta [rad] must only jump by whole turns, got a step of 3.17 at t = 2 s",
+        "theta [rad] must only jump by full rotations, got a step of 3.17 at t = 2 s",
     ),
     (
         lambda: turned(np.degrees(wrapped(ANGLE))),
-        "theta [rad] must only jump by whole turns, got a step of -358 at t = 1.05 s",
+        "theta [rad] must only jump by full rotations, got a step of -358 at t = 1.05 s",
     ),
     (
         lambda: turned(np.where(TIME < 2.0, ANGLE, ANGLE + 4.0 * np.pi)),
-        "theta [rad] must only jump by whole turns, got a step of 12.6 at t = 2 s",
+        "theta [rad] must only jump by full rotations, got a step of 12.6 at t = 2 s",
     ),
     (
         lambda: turned(wrapped(60.0 * ANGLE)),
-        "theta [rad] must turn by less than a quarter turn between samples, or be unwrapped, got",
+        "theta [rad] must rotate by less than 90 degrees between samples, or be unwrapped, got",
     ),
     (
         lambda: turned(wrapped(130.0 * ANGLE)),
-        "theta [rad] must turn by less than a quarter turn between samples, or be unwrapped, got",
+        "theta [rad] must rotate by less than 90 degrees between samples, or be unwrapped, got",
     ),
     (
         lambda: Slide(TIME[::-1], FREE.pose),
@@ -147,7 +147,7 @@ REFUSED = [
     ),
     (
         lambda: Slide(TIME, np.stack([TIME, TIME, np.degrees(wrapped(ANGLE))], -1)),
-        "theta of slide [rad] must only jump by whole turns, got a step of -358 at t = 1.05 s",
+        "theta of slide [rad] must only jump by full rotations, got a step of -358 at t = 1.05 s",
     ),
     (lambda: MassProperties(0.0, 1.0), "mass must be > 0, got 0.0"),
     (

@@ -131,7 +131,7 @@ def test_wrapped_angles_are_unwrapped_and_said():
         lambda t, q, torque: (t, (6.0 * q + np.pi) % (2.0 * np.pi) - np.pi, torque)
     )
     fit = identify_joint(wrapped, Plant())
-    assert "jumps by a whole turn were removed" in said(fit)
+    assert "jumps by a full rotation were removed" in said(fit)
     assert fit.values["mu_c"] == pytest.approx(0.6, rel=0.03)
     assert fit.values["inertia"] == pytest.approx(0.05 / 6.0, rel=0.03)
 

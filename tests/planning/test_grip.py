@@ -124,7 +124,7 @@ def test_the_report_says_what_friction_does():
     assert report.spread == pytest.approx(np.abs(report.angles + HALF).max())
     shown = repr(turning())
     assert (
-        "turn by -30 degrees" in shown
+        "rotate by -30 degrees" in shown
         and "+5 %" in shown
         and "An error of one percent" in shown
     )
@@ -260,7 +260,7 @@ def test_a_report_is_in_degrees_and_millimetres():
     assert turned.spread == pytest.approx(0.1)
     said = " ".join(str(turned).split())
     assert (
-        "turn by 11.46 degrees" in said
+        "rotate by 11.46 degrees" in said
         and "-1 % 17.189 4.000 3.000 nominal 11.459 2.000 1.000 +1 % 8.021" in said
     )
     assert (

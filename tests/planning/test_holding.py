@@ -12,6 +12,7 @@ from planarfriction.planning import (
     holding,
     holding_load,
     plan_grip,
+    plan_hold,
 )
 from tests.support.refusals import refused
 
@@ -125,3 +126,45 @@ def test_a_load_alone_weighs_what_it_pulls_at_its_contact_radius(monkeypatch):
         pytest.approx((mass, mass * radius**2), rel=1e-12),
         pytest.approx((3.0, 3.0 * radius**2), rel=1e-12),
     ]
+
+
+def test_the_force_in_motion_is_that_of_gravity_and_acceleration_in_the_worst_direction():
+    """Without an offset the closed form is m g/2 mu + m a/2 sqrt(1 + 1/mu^2), with a pull out of the pads' plane."""
+    mass, mu, most = 0.3, 0.8, 3.0
+    plan = plan_hold(DISC, mu, mass=mass, acceleration=most)
+    along = 0.5 * mass * most * np.hypot(1.0, 1.0 / mu)
+    assert plan.needed == pytest.approx(0.5 * mass * 9.81 / mu + along, rel=1e-3)
+    assert plan.at_rest == pytest.approx(0.5 * mass * 9.81 / mu, rel=1e-9)
+    assert plan.worst_direction == "along +y, 40° towards a finger"  # atan(mu) is 38.7
+
+
+def test_the_force_in_motion_with_an_offset_is_the_holding_load_upwards():
+    """No direction needs less than `holding_load` of the same wrench, and the one upwards needs just that."""
+    pad = pf.ContactPatch.rectangle(0.012, 0.02)
+    plan = plan_hold(
+        pad, 0.8, mass=0.3, centre_of_mass=(0.06, 0.0), acceleration=3.0, grip=30.0
+    )
+    up = 0.15 * 12.81 * np.array([0.0, -1.0, -0.06])
+    k = np.flatnonzero((plan.angles == np.pi / 2) & (plan.elevations == 0.0))[0]
+    assert plan.forces[k] == pytest.approx(holding_load(up, pad, 0.8), rel=1e-9)
+    assert plan.forces[k] <= plan.needed < 1.002 * plan.forces[k]
+    assert plan.safety_factor == pytest.approx(30.0 / plan.needed)
+    assert plan.worst_direction == "along +y, 5° towards a finger"
+
+
+def test_the_force_in_motion_of_a_soft_finger_holds_every_load_on_its_shape():
+    soft = pf.ContactPatch.disc(0.01, 5, pressure=pf.SoftFinger(c=6e-3, n=0.3, k=2.0))
+    plan = plan_hold(soft, 0.8, mass=0.1, centre_of_mass=(0.02, 0.01), acceleration=0.0)
+    load = 0.05 * 9.81 * np.array([0.0, -1.0, -0.02])
+    assert plan.needed == pytest.approx(holding_load(load, soft, 0.8), rel=1e-9)
+    assert plan.worst_direction == "at rest"
+
+
+def test_a_part_without_a_load_needs_no_force_and_is_drawn():
+    soft = pf.ContactPatch.disc(0.01, 5, pressure=pf.SoftFinger(c=6e-3, n=0.3, k=2.0))
+    assert holding_load(np.zeros(3), soft, 0.8) == 0.0
+    plan = plan_hold(DISC, 0.8, mass=0.1, gravity=(0.0, 0.0), grip=1.0)
+    assert plan.needed == 0.0 and plan.safety_factor == np.inf
+    assert len(plan.plot().axes) == 2
+    with refused("grip must be > 0, got 0"):
+        plan_hold(DISC, 0.8, mass=0.1, grip=0)

@@ -250,6 +250,11 @@ def test_a_plan_leads_to_its_pose(kind):
     assert plan.report.sticks and plan.report.used <= 0.8 + 1e-9
     assert plan.report.length < 1.3 * np.hypot(*goal[:2])
     assert "reached" in str(plan.report)
+    axes = plan.plot().axes[0]
+    line = next(each for each in axes.lines if each.get_label() == "goal")
+    corner = 1e3 * (goal[:2] + pf.geometry.rotate(SQUARE[0], goal[2]))
+    np.testing.assert_allclose(line.get_xydata()[0], corner)
+    assert f"{1e3 * plan.report.length:.3g} mm" in axes.get_title()
     # a pusher that is rougher than thought sticks too, and nothing changes
     rough = push(slider(kind), Pusher(0.5), plan.path)
     np.testing.assert_allclose(rough.end, plan.push.end, rtol=0.0, atol=1e-5)

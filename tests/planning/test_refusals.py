@@ -160,7 +160,7 @@ REFUSED = [
     ),
     (
         lambda: Slider(SURFACE, [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]),
-        "outline must be convex, without three corners on a line, got another polygon",
+        "outline must be convex, without three corners on a line: use its convex hull, shapely",
     ),
     (
         lambda: Slider(PATCH, SQUARE),

@@ -404,7 +404,7 @@ def test_a_motion_that_cannot_be_seen_says_how_far_it_goes():
     time = run.data["time"].values
     run = with_values(run, x=2e-6 * time, y=-1e-6 * time, theta=np.radians(1e-3) * time)
     title = plots.plot_motion(run).axes[0].get_title(loc="left")
-    assert title == "moves by up to 4.5 µm, turns by up to 35 µrad"
+    assert title == "moves by up to 4.5 µm, rotates by up to 35 µrad"
 
 
 @pytest.mark.parametrize("mounted_on", ["world", "body"])

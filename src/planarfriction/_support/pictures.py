@@ -18,7 +18,9 @@ PICTURES = {
     "identification": "identification:plot_identification",
     "joint": "identification:plot_joint",
     "grip": "planning:plot_grip",
+    "hold": "holding:plot_hold",
     "push": "planning:plot_push",
+    "push plan": "push_plan:plot_push_plan",
 }
 """Functions that draw a record, by the name of the picture: `module:function` within `planarfriction.plots`."""
 

@@ -14,6 +14,7 @@ from click.shell_completion import CompletionItem
 from planarfriction import __version__
 from planarfriction.cli.doctor import doctor
 from planarfriction.cli.export import export
+from planarfriction.cli.hold import hold
 from planarfriction.cli.identify import identify
 from planarfriction.cli.options import (
     FILE,
@@ -39,8 +40,10 @@ class Commands(click.Group):
     """Group that looks for commands of other packages only where its own do not suffice: a search takes 10 ms."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands, without aliases."""
         self.add_installed()
-        return super().list_commands(ctx)
+        names = super().list_commands(ctx)
+        return [name for name in names if self.commands[name].name == name]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in self.commands:
@@ -56,13 +59,18 @@ class Commands(click.Group):
             formatter.write_text(ELSEWHERE)
 
     def add_installed(self) -> None:
-        """Add the commands of other packages, without those whose package cannot be imported."""
+        """Add the commands of other packages, without those whose package cannot be imported.
+
+        A command has its own name, and that of its entry point as an alias.
+        """
         for entry in entry_points(group=GROUP):
             if entry.name not in self.commands:
                 try:
-                    self.add_command(entry.load(), entry.name)
+                    found = entry.load()
                 except ImportError:
                     continue
+                self.add_command(found, entry.name)
+                self.commands.setdefault(found.name or entry.name, found)
 
 
 class MemberOf(click.Choice):
@@ -231,5 +239,6 @@ def warm() -> None:
 
 app.add_command(doctor)
 app.add_command(export)
+app.add_command(hold)
 app.add_command(identify)
 app.add_command(sweep)

@@ -94,30 +94,52 @@ def print_table(
     headings: Sequence[str],
     rows: Sequence[Sequence[str]],
     *,
-    width: int = 200,
+    width: int = 100,
 ) -> None:
     """Print a table on stdout: columns with numbers are aligned on the right, words on the left.
 
-    It is as wide as the terminal; elsewhere `width` letters are enough for every table that programs may read.
+    It is as wide as the terminal. Elsewhere it has at most `width` letters: columns that do not fit follow in another
+    table, which begins with the first column.
     """
-    table = Table(
-        title=title, title_justify="left", title_style="bold", header_style="bold"
-    )
-    for number, heading in enumerate(headings):
-        numbers = number > 0 and any(
-            character.isdigit() for row in rows for character in row[number][:2]
-        )
-        # Stays in one piece.
-        name = number == 0 and not any(" " in row[0] for row in rows)
-        table.add_column(
-            heading,
-            justify="right" if numbers else "left",
-            overflow="fold",
-            no_wrap=name,
-        )
-    for row in rows:
-        table.add_row(*row)
     console = Console(markup=False, highlight=False)  # units in brackets are no markup
+    groups = [range(len(headings))]
     if not console.is_terminal:
         console = Console(markup=False, highlight=False, width=width)
-    console.print(table)
+        groups = _groups(headings, rows, width)
+    for columns in groups:
+        table = Table(
+            title=title, title_justify="left", title_style="bold", header_style="bold"
+        )
+        for number in columns:
+            numbers = number > 0 and any(
+                character.isdigit() for row in rows for character in row[number][:2]
+            )
+            # Stays in one piece.
+            name = number == 0 and not any(" " in row[0] for row in rows)
+            table.add_column(
+                headings[number],
+                justify="right" if numbers else "left",
+                overflow="fold",
+                no_wrap=name,
+            )
+        for row in rows:
+            table.add_row(*(row[number] for number in columns))
+        console.print(table)
+
+
+def _groups(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], width: int
+) -> list[Sequence[int]]:
+    """Return the numbers of the columns of each table, so that no word of it is broken at `width` letters."""
+    words = [
+        [word for text in column for word in text.split()]
+        for column in zip(headings, *rows, strict=True)
+    ]
+    least = [3 + max(map(len, column), default=0) for column in words]
+    groups: list[list[int]] = [[0]]
+    for number in range(1, len(headings)):
+        taken = sum(least[each] for each in groups[-1]) + least[number] + 1
+        if taken > width and len(groups[-1]) > 1:
+            groups.append([0])
+        groups[-1].append(number)
+    return list(groups)

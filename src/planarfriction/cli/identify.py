@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -151,10 +152,10 @@ def identify(
     """Estimate friction parameters of a contact from logs of its motion and its friction wrench.
 
     Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
-    in s, m/s, rad/s, N and N m. Twist and wrench are about the origin of the contact frame, in its axes; the wrench
-    acts on the moving body. The files that `planarfriction run` writes are such logs. Prints the estimates, their
-    errors, and what the data do not determine. The command `identify plan` suggests which motion to measure next (for a
-    log called plan, write ./plan).
+    in s, m/s, rad/s, N and N m, or with units in the heading: Time (ms), vx [mm/s], tau [N mm]. Twist and wrench are
+    about the origin of the contact frame, in its axes; the wrench acts on the moving body. The files that
+    `planarfriction run` writes are such logs. Prints the estimates, their errors, and what the data do not determine.
+    The command `identify plan` suggests which motion to measure next (for a log called plan, write ./plan).
 
     \b
     Examples:
@@ -168,6 +169,7 @@ def identify(
     from planarfriction.cli.console import note, work_progress
     from planarfriction.cli.output import slug, write_picture
     from planarfriction.identify import FitOptions, identify_lugre
+    from planarfriction.identify.checks import check_logs
 
     given = find_patch(patch, size)
     names = parse_names(parameters)
@@ -184,11 +186,14 @@ def identify(
     if out is not None:
         make_folder(out)
     read = []
-    with work_progress("identifying") as progress:
+    with work_progress("identifying") as shown:
+        progress = Stages(shown)
         for path in logs:
             progress(f"reading {path.name}")
             log = pf.Log.from_csv(path, normal_force=normal_force, contact=contact)
             read.append(log)
+        for doubt in check_logs(read, given):  # a fit of wrong units takes minutes
+            note(f"warning: {doubt}")
         try:
             found = identify_lugre(
                 read,
@@ -210,6 +215,7 @@ def identify(
         sep="\n",
     )
     note(f"{found.starts[0]} of {found.starts[1]} starting points led to this minimum")
+    note(progress.times())
     if out is not None:
         stem = slug(read[0].name)
         table = out / f"{stem}-identification.json"
@@ -218,6 +224,38 @@ def identify(
         note(f"wrote {table}")
         note(f"wrote {write_picture(found.plot(), picture)}")
     return 0
+
+
+class Stages:
+    """Receiver of the progress of a fit that measures the time of its stages."""
+
+    def __init__(self, shown: Callable[..., None]):
+        self._shown = shown
+        self._seconds: dict[str, float] = {}
+        self._stage = "reading"
+        self._since = time.perf_counter()
+
+    def __call__(self, text: str) -> None:
+        """Show the progress; its text says to which stage it belongs."""
+        self._end()
+        model, colon, work = text.partition(": ")
+        if colon:
+            self._stage = "intervals" if work.startswith("interval") else model
+        self._shown(text)
+
+    def _end(self) -> None:
+        """Add the time since the last call to the stage that it began or went on with."""
+        now = time.perf_counter()
+        self._seconds[self._stage] = self._seconds.get(self._stage, 0.0) + (
+            now - self._since
+        )
+        self._since = now
+
+    def times(self) -> str:
+        """Return the time of each stage until now in one line."""
+        self._end()
+        parts = [f"{name} {each:.1f} s" for name, each in self._seconds.items()]
+        return f"time: {', '.join(parts)}"
 
 
 def parse_start(entries: Sequence[str]) -> dict[str, float]:

@@ -6,6 +6,7 @@ import functools
 import importlib.util
 import inspect
 import os
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -28,10 +29,64 @@ _PER_WIDTH = {"width": 1.0, "length": 1.0, "radius": 0.5}
 """First parameters of shapes that a width decides, and how large they are for a width of 1."""
 
 
+_METRES = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+"""Units of lengths on the command line, and how many metres they are."""
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+
+_LENGTH = re.compile(rf"({_NUMBER})\s*([a-zµ]*)", re.IGNORECASE)
+
+_SIDES = re.compile(
+    rf"({_NUMBER})\s*([a-zµ]*?)\s*[x×]\s*({_NUMBER})\s*([a-zµ]*)", re.IGNORECASE
+)
+
+
+def parse_length(name: str, text: str) -> float:
+    """Return the length [m] that a text spells: `60mm`, `6 cm`, or a number in metres.
+
+    Raises InvalidValueError for a text that is no length.
+    """
+    match = _LENGTH.fullmatch(text.strip())
+    if match is None or match[2] not in _METRES:
+        raise InvalidValueError(
+            name, "be a length such as 60mm, 6cm or 0.06 (metres)", repr(text)
+        )
+    return float(match[1]) * _METRES[match[2]]
+
+
+class Length(click.ParamType):
+    """A length, with a unit or in metres."""
+
+    name = "length"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Return the length [m]."""
+        if isinstance(value, float):
+            return value
+        return parse_length("--" + (param.name or "").replace("_", "-"), str(value))
+
+
+LENGTH = Length()
+"""Type of options that are a length."""
+
+
+def parse_sides(text: str) -> tuple[float, float] | None:
+    """Return width and height [m] of a rectangle such as 12x20mm; None for another text."""
+    match = _SIDES.fullmatch(text.strip())
+    if match is None:
+        return None
+    width, height = match[1] + (match[2] or match[4]), match[3] + match[4]
+    return parse_length("patch", width), parse_length("patch", height)
+
+
 def find_patch(
     text: str | None, size: Mapping[str, Any], width: float = WIDTH
 ) -> pf.ContactPatch:
     """Return the patch called `text` (case does not matter), `width` [m] wide, or the pressure map in the file `text`.
+
+    A text such as `12x20mm` is a rectangle, 12 mm along x and 20 mm along y.
 
     Circle for None, not for an empty text. `size` holds the options of `map_options` that were given.
 
@@ -45,15 +100,24 @@ def find_patch(
         name.lower(): functools.partial(make, width=width)
         for name, make in PUBLISHED_PATCHES.items()
     }
+    sides = parse_sides(text)
+    if sides is not None:
+        makers[text.lower()] = functools.partial(
+            pf.ContactPatch.rectangle, *sides, name=text.strip()
+        )
     if make := makers.get(text.lower()):
         for name in size:
-            if name != "width":
+            if name != "width" or sides is not None:
                 raise InvalidValueError(
                     f"--{name.replace('_', '-')}",
                     "be given only for a pressure map",
                     f"{size[name]} for the patch {text}",
                 )
         return make()
+    if _LENGTH.fullmatch(text.strip()) and not os.path.exists(text):
+        raise InvalidValueError(
+            "patch", "have two sides such as 12x20mm, or be a name with --width", text
+        )
     if not (Path(text).suffix or (text and os.path.exists(text))):
         from planarfriction._support import validation  # loads NumPy
 
@@ -91,7 +155,8 @@ def pressure_map(path: str | Path, size: Mapping[str, Any]) -> pf.ContactPatch:
 
 
 PATCH_HELP = (
-    f"{', '.join(PUBLISHED_PATCHES)}, disc, rectangle, or a pressure map (.csv, .npy, .npz, .mat, .asf, grey image; "
+    f"{', '.join(PUBLISHED_PATCHES)}, disc, rectangle, two sides (12x20mm), or "
+    "a pressure map (.csv, .npy, .npz, .mat, .asf, grey image; "
     "row 0 is the top) with --cell-size or --width."
 )
 """Text on the values that the option `--patch` takes."""
@@ -168,12 +233,14 @@ _map_option = functools.partial(option, expose_value=False, callback=_into_size)
 
 _MAP_OPTIONS = (
     _map_option(
-        "--cell-size", type=float, help="Side of a cell of a pressure map in m."
+        "--cell-size",
+        type=LENGTH,
+        help="Side of a cell of a pressure map (1mm, or in m).",
     ),
     _map_option(
         "--width",
-        type=float,
-        help=f"Width in m of a patch. Default: {WIDTH}, or the scene's or map's.",
+        type=LENGTH,
+        help=f"Width of a patch (20mm, or in m). Default: {WIDTH}, or the scene's or map's.",
     ),
     _map_option(
         "--header/--no-header",

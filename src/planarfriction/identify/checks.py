@@ -340,7 +340,7 @@ def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
         expected = sliding.friction(twist, scale)[:, :2] @ [1.0, 1.0j]
         angle = np.angle((wrench[:, :2] @ [1.0, 1.0j]).conj() @ expected)
         if abs(angle) > LEAST_MOUNTED:
-            words = f"with fx and fy turned by {np.degrees(angle):.0f} deg"
+            words = f"with fx and fy rotated by {np.degrees(angle):.0f} deg"
             yield words, twist, rotate(wrench, angle)
 
 

@@ -60,20 +60,35 @@ MESSAGES = {
 }
 """Names of columns by the names of fields of ROS messages, without their prefix, such as wrench in wrench.force.x."""
 
-UNITS = {
-    "t": ("s",),
-    "vx": ("m/s",),
-    "vy": ("m/s",),
-    "omega": ("rad/s", "1/s"),
-    "x": ("m",),
-    "y": ("m",),
-    "theta": ("rad",),
-    "fx": ("n",),
-    "fy": ("n",),
-    "normal_force": ("n",),
-    "tau": ("nm", "n*m", "n.m", "n·m"),
+_DEGREE = np.pi / 180.0
+
+_LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+
+_SPEEDS = {f"{unit}/s": factor for unit, factor in _LENGTHS.items()}
+
+_FORCES = {"n": 1.0, "mn": 1e-3, "kn": 1e3}
+
+_TORQUES = {
+    f"{force}{between}{length}": per_newton * per_metre
+    for force, per_newton in _FORCES.items()
+    for between in ("", "*", ".", "·")
+    for length, per_metre in _LENGTHS.items()
 }
-"""Units that may stand in brackets behind a name, or below it, in small letters and without spaces."""
+
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9},
+    "vx": _SPEEDS,
+    "vy": _SPEEDS,
+    "omega": {"rad/s": 1.0, "1/s": 1.0, "deg/s": _DEGREE, "°/s": _DEGREE},
+    "x": _LENGTHS,
+    "y": _LENGTHS,
+    "theta": {"rad": 1.0, "deg": _DEGREE, "degrees": _DEGREE, "°": _DEGREE},
+    "fx": _FORCES,
+    "fy": _FORCES,
+    "normal_force": _FORCES,
+    "tau": _TORQUES,
+}
+"""Units in brackets behind a name, or below it, in small letters and without spaces, and their values in SI units."""
 
 _MESSAGE = re.compile(r"(?:.*[./_])?(force|torque|linear|angular|position)[./_]([xyz])")
 """Pattern of the name of a field of a ROS message."""
@@ -91,7 +106,7 @@ def find_columns(
     regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named "contact.vx", those of
     `contact` are taken, or of the only contact that has them all.
 
-    Raises FileError for a column that is missing, that is there twice, or that has another unit.
+    Raises FileError for a column that is missing, that is there twice, or that has an unknown unit.
     """
     named = _named(path, headings)
     contacts = sorted({name.rpartition(".")[0] for name in named} - {""})
@@ -122,13 +137,15 @@ def find_columns(
     wanted = [name for name in ("t", *_measured(own), *LOAD) if name in own]
     found = {name: own[name] for name in wanted}
     for name, heading in found.items():
-        unit = _parts(heading)[1]
-        if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
+        if _si_value(name, heading) is None:
+            usual = {"n": "N", "nm": "N m"}
+            first = next(iter(UNITS[name]))
             raise FileError(
-                f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}"
+                f"{path}: column {shown(repr(heading))} must be in {usual.get(first, first)} or a multiple of it, "
+                f"got {shown(_parts(heading)[1])}"
             )
     angle = own.get("theta") or named.get("theta")
-    if angle is not None and (_parts(angle)[1] or "rad").strip().lower() == "rad":
+    if angle is not None and _si_value("theta", angle) is not None:
         found.setdefault("theta", angle)
     return found
 
@@ -164,6 +181,14 @@ def _parts(heading: str) -> tuple[str, str | None]:
     """Split a heading such as "vx [m/s]" into name and unit."""
     match = _HEADING.fullmatch(heading)
     return (heading, None) if match is None else (match["name"].strip(), match["unit"])
+
+
+def _si_value(name: str, heading: str) -> float | None:
+    """Return the SI value of the unit in the heading of a column; 1 without a unit, None for one that is not known."""
+    unit = _parts(heading)[1]
+    if unit is None:
+        return 1.0
+    return UNITS[name].get(unit.lower().replace(" ", ""))
 
 
 def _of_contact(named: dict[str, str], contact: str) -> dict[str, str]:
@@ -391,10 +416,10 @@ class Log(ByValue):
 
         Other columns and lines that begin with # are ignored, but for a theta of numbers beside the twist, which shows
         if that is `held`. `time` and `fn` are accepted for t and normal_force, capital letters for small ones, and
-        semicolons and tabs for commas; Fz, Mz, Tz and the names of ROS (wrench.force.x) too; units may stand below the
-        names. `normal_force` [N] replaces a missing column of that name; `window` is that of
-        `from_motion`. If columns are named `contact.vx`, as in the files of `planarfriction run`, those of `contact`
-        are read, or those of the only contact.
+        semicolons and tabs for commas; Fz, Mz, Tz and the names of ROS (wrench.force.x) too. Units in brackets behind
+        names or below them, such as `Time (ms)`, `vx [mm/s]` or `tau [N mm]`, are converted. `normal_force` [N]
+        replaces a missing column of that name; `window` is that of `from_motion`. If columns are named `contact.vx`,
+        as in the files of `planarfriction run`, those of `contact` are read, or those of the only contact.
 
         Raises FileError, in one line that names the line and the column of what is wrong, and InvalidValueError for a
         wrong argument, used or not.
@@ -411,7 +436,11 @@ class Log(ByValue):
         motion = MOTION if found.keys().isdisjoint(TWIST) else TWIST
         spare = [found["theta"]] if motion is TWIST and "theta" in found else []
         values = table.numbers(list(found.values()), spare)
-        columns = dict(zip(found, values.T, strict=True))
+        factors = [_si_value(*each) for each in found.items()]
+        columns = {
+            name: value if factor == 1.0 else factor * value
+            for name, factor, value in zip(found, factors, values.T, strict=True)
+        }
         zeros = np.zeros(len(values))
         moved, wrench = (
             np.stack([columns.get(name, zeros) for name in names], -1)
@@ -590,9 +619,9 @@ def unwrapped(
     around = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1)
     jump = np.abs(steps - np.median(around, axis=1)) > QUARTER
     fast = wrapped & (np.abs(steps) > QUARTER)
-    slower = "turn by less than a quarter turn between samples, or be unwrapped"
+    slower = "rotate by less than 90 degrees between samples, or be unwrapped"
     for where, shown_steps, rule in (
-        (jump, measured, "only jump by whole turns"),
+        (jump, measured, "only jump by full rotations"),
         (fast, steps, slower),
     ):
         if where.any():

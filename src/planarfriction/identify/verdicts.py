@@ -109,7 +109,7 @@ def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
     turned = {each.name: each.turns for each in measured if each.turns}
     if not turned:
         return []
-    count = f"{sum(turned.values())} jumps of theta by a whole turn were taken out"
+    count = f"{sum(turned.values())} jumps of theta by a full rotation were removed"
     return [caution(f"{count}, in {few_of([*turned], 3)}")]
 
 
@@ -265,8 +265,8 @@ def judge(
     if len(candidates) > 1:
         scores = [each.score for each in candidates if each is not best]
         scores.sort(key=lambda each: each.held_out)
-        rest = ", ".join(f"{each.held_out:.3g} times for {each}" for each in scores)
-        text = f"on held-out parts of the logs, its errors are {chosen.held_out:.3g} times what noise explains ({rest})"
+        rest = ", ".join(f"{each}: {each.held_out:.3g}" for each in scores)
+        text = f"the prediction error on held-out samples is {chosen.held_out:.3g} times the noise ({rest})"
         verdicts.append(caution(text))
     verdicts += map(caution, _on_data(evidence, u))
     verdicts += (Verdict("fit", each.agrees, str(each)) for each in held)
@@ -313,7 +313,7 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
         )
     if u.score > HELD_OUT:
         text.append(
-            f"its errors on held-out parts of the logs are {u.score:.1f} times what noise explains"
+            f"its prediction error on held-out samples is {u.score:.1f} times the noise"
         )
     if u.strain > STRAIN:
         text.append(

@@ -206,11 +206,9 @@ class JointLog(ByValue):
                 self._set(**{each: validation.array(each, value, (len(time),))})
         q, turns = unwrapped(time, self.q, f"q of {self.name}")
         if turns and self.goal is not None:
-            rule = (
-                "be unwrapped beside a goal: add whole turns so that it does not jump"
-            )
+            rule = "be unwrapped beside a goal: add full rotations so that it does not jump"
             raise InvalidValueError(
-                f"q of {self.name}", rule, f"{turns} jumps by a whole turn"
+                f"q of {self.name}", rule, f"{turns} jumps by a full rotation"
             )
         self._set(q=q, turns=self.turns + turns)
         if self.drive is not None:

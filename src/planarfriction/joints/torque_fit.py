@@ -590,7 +590,9 @@ def judge(
     for log in found.logs:
         if log.turns:
             yield Verdict(
-                "q", True, f"{log.name}: {log.turns} jumps by a whole turn were removed"
+                "q",
+                True,
+                f"{log.name}: {log.turns} jumps by a full rotation were removed",
             )
     yield from lags(found.logs)
 

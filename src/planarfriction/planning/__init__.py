@@ -2,12 +2,14 @@
 
 from planarfriction.planning.grip import GripPlan, GripReport, plan_grip
 from planarfriction.planning.holding import dynamic_holding_load, holding_load
+from planarfriction.planning.in_motion import HoldPlan, plan_hold
 from planarfriction.planning.push_plans import PushPlan, PushReport, plan_push
 from planarfriction.planning.pushing import Push, Pusher, Slider, motion_cone, push
 
 __all__ = [
     "GripPlan",
     "GripReport",
+    "HoldPlan",
     "Push",
     "PushPlan",
     "PushReport",
@@ -17,6 +19,7 @@ __all__ = [
     "holding_load",
     "motion_cone",
     "plan_grip",
+    "plan_hold",
     "plan_push",
     "push",
 ]

@@ -237,7 +237,7 @@ class GripReport(ByValue):
 
     def __str__(self) -> str:
         if "angle" in self.goal:
-            wanted = f"turn by {np.rad2deg(self.goal['angle']):.4g} degrees"
+            wanted = f"rotate by {np.rad2deg(self.goal['angle']):.4g} degrees"
             per = f"{np.rad2deg(self.per_percent):.2g} degrees"
         else:
             x, y = 1e3 * np.array(self.goal["slide"])
@@ -246,7 +246,7 @@ class GripReport(ByValue):
         lines = [
             f"Grip plan: {wanted}.",
             "",
-            f"{'friction':>9}{'turn [deg]':>13}{'slide x [mm]':>15}{'slide y [mm]':>15}",
+            f"{'friction':>9}{'angle [deg]':>13}{'slide x [mm]':>15}{'slide y [mm]':>15}",
         ]
         both = zip(self.frictions, self.angles, self.slides, strict=True)
         for factor, angle, (x, y) in both:

@@ -75,8 +75,6 @@ def holding_load(
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     mu = validation.positive("mu", mu)
     margin = validation.non_negative("margin", margin)
-    if not load.any():
-        return 0.0
     return (1.0 + margin) * smallest_force(load[None], patch, mu)
 
 
@@ -87,6 +85,8 @@ def smallest_force(
 
     While a load acts, the normal force is smaller by `lost` `[n]` [N].
     """
+    if not loads.any():
+        return float(np.max(lost))
     if not patch.depends_on_load:
         return float((forces_needed(loads, surface_at(patch), mu) + lost).max())
     needed = lambda each: float(
@@ -125,6 +125,8 @@ def forces_needed(loads: np.ndarray, surface: LimitSurface, mu: float) -> np.nda
     """Return the normal forces `[n]` [N] that hold the loads `[n, 3]` on a limit surface; 0 without a load."""
     forces = np.zeros(len(loads))
     some = loads.any(axis=1)
+    if not some.any():
+        return forces
     twists = surface.twist(-loads[some])
     power = np.einsum("...i,...i", loads[some], twists)
     forces[some] = power / (mu * surface.dissipation(twists))
@@ -203,8 +205,8 @@ def dynamic_holding_load(
         scene = Scene(
             body, contact, end, force=load, save_every=end, start="equilibrium"
         )
-        histories = simulate(scene).histories
-        moved = np.array([histories[name].values[-1] for name in ("x", "y", "theta")])
+        data = simulate(scene).data
+        moved = np.array([data[name][-1] for name in ("x", "y", "theta")])
         dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(low))
         way = np.hypot(dx, dy) + model.patch.contact_radius(low) * abs(theta)
         stiffer = softening(model, low).min()

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from planarfriction._support import validation
 from planarfriction._support.described import described
 from planarfriction._support.equality import ByValue
+from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.geometry import rotate
 from planarfriction.limit_surface import LimitSurfaceEllipsoid
@@ -83,7 +84,7 @@ class PushReport:
             "reached": self.end,
             "with an ellipsoid": self.ellipsoid_end,
         }
-        lines = [f"{'':18}{'x [mm]':>10}{'y [mm]':>10}{'turn [deg]':>12}"]
+        lines = [f"{'':18}{'x [mm]':>10}{'y [mm]':>10}{'angle [deg]':>12}"]
         for name, (x, y, a) in rows.items():
             lines.append(
                 f"{name:18}{1e3 * x:>10.2f}{1e3 * y:>10.2f}{math.degrees(a):>12.2f}"
@@ -109,8 +110,8 @@ class PushPlan(ByValue):
         return str(self.report)
 
     def plot(self) -> Any:
-        """Draw the push; returns a matplotlib Figure."""
-        return self.push.plot()
+        """Draw the push, its goal and the length of the path; returns a matplotlib Figure."""
+        return picture("push plan", self)
 
 
 def plan_push(

@@ -239,7 +239,8 @@ class Slider(ByValue):
         if not convex or abs(winding) > 7.0:
             raise InvalidValueError(
                 "outline",
-                "be convex, without three corners on a line",
+                "be convex, without three corners on a line: use its convex hull, "
+                "shapely.MultiPoint(outline).convex_hull.exterior.coords[:-1]",
                 "another polygon",
             )
         if turns[0] < 0.0:

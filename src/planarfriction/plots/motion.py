@@ -167,7 +167,7 @@ def _remark(strobe: _Strobe) -> str:
     far = unit_for("length", length)
     turn = unit_for("angle", angle)
     moves = f"moves by up to {far.factor * length:.2g} {far.label}"
-    return f"{moves}, turns by up to {turn.factor * angle:.2g} {turn.label}"
+    return f"{moves}, rotates by up to {turn.factor * angle:.2g} {turn.label}"
 
 
 def _reach(solution: pf.Solution) -> float:

@@ -1,4 +1,4 @@
-"""The commands `referee` and `simulators`, a view of it; each loads what it needs when it runs."""
+"""The commands `simulator-benchmark` (alias `referee`) and `simulators`, a view of it; each loads its parts late."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ JSON = click.option(
 
 
 @click.group(
+    name="simulator-benchmark",
     invoke_without_command=True,
-    short_help="Judge the friction of simulators by exact cases.",
+    short_help="Benchmark the friction of simulators against exact solutions.",
 )
 @ENGINE
 @CASE
@@ -58,19 +59,19 @@ def referee(
     file: Path | None,
     folder: Path | None,
 ) -> int:
-    """Judge the contact friction of simulators by cases with exact answers: closed forms, or exact motions.
+    """Benchmark the contact friction of simulators on cases with exact solutions: closed forms, or exact motions.
 
     Every engine that is installed runs every case with default and with tuned settings, this library's adapters among
-    them. Marks: ok within the allowed error, off up to ten times that, fails beyond it; - where an engine cannot
+    them. Marks: ok within the allowed error, off up to ten times that, fails beyond it; - if an engine cannot
     describe the case. With --json, results are written as they come, and the same command continues from the file.
 
     \b
     Examples:
-      planarfriction referee
-      planarfriction referee --quick
-      planarfriction referee --engine MuJoCo --case stop --step 0.005
-      planarfriction referee --json referee.json --out referee/
-      planarfriction referee export cases/
+      planarfriction simulator-benchmark
+      planarfriction simulator-benchmark --quick
+      planarfriction simulator-benchmark --engine MuJoCo --case stop --step 0.005
+      planarfriction simulator-benchmark --json results.json --out report/
+      planarfriction simulator-benchmark export cases/
     """
     if context.invoked_subcommand is not None:
         return 0
@@ -102,7 +103,7 @@ def referee(
         make_folder(folder)
     verdicts, code = _judged(chosen, found, file, steps)
     print_table(
-        "Friction against the truth: error over what is allowed",
+        "Error over allowed error",
         *report.table(verdicts),
     )
     for text in left_out:
@@ -134,7 +135,7 @@ def _judged(
     kept = Kept(file)
     code = 0
     try:
-        with Apart() as apart, work_progress("referee") as report:
+        with Apart() as apart, work_progress("benchmark") as report:
             progress = lambda done, of, words: report(words, done, of)
             run(
                 cases, engines, kept, steps=steps, judged=apart.judge, progress=progress
@@ -159,13 +160,13 @@ def simulators(
 ) -> int:
     """Compare patch friction in simulators with their own friction, with default and with the best settings.
 
-    This is a view of `planarfriction referee`, in units instead of marks. Results in the --json
+    This is a view of `planarfriction simulator-benchmark`, in units instead of marks. Results in the --json
     file are not computed again.
 
     \b
     Examples:
       planarfriction simulators
-      planarfriction simulators --engine MuJoCo --json referee.json
+      planarfriction simulators --engine MuJoCo --json results.json
     """
     from planarfriction.cli.console import note, print_table
     from planarfriction_studies.referee import report
@@ -187,7 +188,7 @@ def export(folder: Path) -> int:
 
     \b
     Examples:
-      planarfriction referee export cases/
+      planarfriction simulator-benchmark export cases/
     """
     from planarfriction._support.writing import make_folder
     from planarfriction.cli.console import note
