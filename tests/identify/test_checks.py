@@ -106,7 +106,7 @@ def test_directions_tell_signs_and_units(log, change, words):
 def test_axes_of_a_sensor_that_is_turned(log, angle):
     found = check_log(Log(log.time, log.twist, rotated(log.wrench, angle), LOAD), PATCH)
     assert [
-        f"turned by {-np.degrees(angle):.0f} deg" in str(finding) for finding in found
+        f"rotated by {-np.degrees(angle):.0f} deg" in str(finding) for finding in found
     ] == [True]
 
 

@@ -142,10 +142,10 @@ def test_a_wrapped_angle_gives_the_same_estimates_and_says_so(spun):
             smooth.estimates[name], rel=1e-6
         )
     assert jumping.estimates["mu_c"] == pytest.approx(LAW.mu_c, rel=0.02)
-    assert [str(each) for each in jumping.verdicts if "turn" in str(each)] == [
+    assert [str(each) for each in jumping.verdicts if "rotation" in str(each)] == [
         "fit: 4 jumps of theta by a full rotation were removed, in log"
     ]
-    assert not any("turn" in str(each) for each in smooth.verdicts)
+    assert not any("rotation" in str(each) for each in smooth.verdicts)
 
 
 def without_torque(log):

@@ -92,7 +92,7 @@ def hold(
         ]
     if plan.margin:
         rows.append([f"with {100 * plan.margin:g} % margin [N]", f"{plan.needed:.1f}"])
-    if plan.grip is not None:
+    if plan.grip is not None and plan.safety_factor is not None:
         factor = plan.safety_factor
         verdict = "slips" if factor < 1.0 else "holds, below the margin"
         if plan.grip >= plan.needed:
