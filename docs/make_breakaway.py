@@ -43,9 +43,9 @@ def discs(n: int) -> Callable[[pf.ContactPatch], pf.ReducedModel]:
 
 MODELS: dict[str, tuple[Callable[[pf.ContactPatch], Any], str]] = {
     "all cells": (lambda patch: pf.DistributedModel(patch, LAW), style.DISTRIBUTED),
-    "64 discs": (discs(64), style.PALETTE[2]),
+    "64 discs": (discs(64), style.SHADES[3]),
     "default": (discs(DEFAULT), style.OF_MODEL["reduced"]),
-    "8 discs": (discs(8), style.PALETTE[3]),
+    "8 discs": (discs(8), style.SHADES[0]),
     "published": (lambda patch: pf.ReducedModelPublished(patch, LAW), style.PUBLISHED),
 }
 """Models by the words of the tables: how they are made, and their colour."""

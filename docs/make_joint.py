@@ -88,9 +88,7 @@ def holds() -> style.PlotFigure:
     each = round(1.0 / (FREQUENCY * DT))
     figure = style.new_figure(6.4, 3.9)
     axes = figure.subplots()
-    colours = dict(
-        zip(runs, (style.PUBLISHED, style.OTHER, style.DISTRIBUTED), strict=True)
-    )
+    colours = dict(zip(runs, (style.BUILT_IN, "#F0A27A", style.REDUCED), strict=True))
     for (name, run), line in zip(runs.items(), style.LINE_STYLES, strict=False):
         swings = run[each - 1 :: each]
         rate = (swings[-1] - swings[len(swings) // 2]) / (T_END / 2.0)

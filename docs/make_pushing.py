@@ -75,7 +75,7 @@ def picture(measured: list[replayed_pushes.ReplayedPush]) -> None:
     draw_push(right, one.by(pf.LimitSurfaceExact, samples=101))
     closed = np.concatenate([one.outline, one.outline[:1]])
     for pose, colour, words in (
-        (one.end, style.EXACT, "measured end"),
+        (one.end, style.REFERENCE, "measured end"),
         (one.by(pf.LimitSurfaceEllipsoid).end, style.ELLIPSOID, "end by the ellipsoid"),
     ):
         corners = pose[:2] + pf.geometry.rotate(closed, pose[2])

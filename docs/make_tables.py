@@ -198,8 +198,9 @@ def main(places: Sequence[Path]) -> None:
         if picture.exists():
             with Image.open(drawn) as image:
                 size = tuple(round(SHRUNK * side) for side in image.size)
+                # The median cut would repaint small marks of one role as those of another.
                 image.convert("RGB").resize(size, Image.Resampling.LANCZOS).quantize(
-                    128
+                    128, method=Image.Quantize.FASTOCTREE
                 ).save(picture, optimize=True)
             print(f"images/{picture.name}: {picture.stat().st_size / 1000:.0f} kB")
 

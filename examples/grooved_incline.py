@@ -24,9 +24,8 @@ from scipy.optimize import brentq
 import planarfriction as pf
 from planarfriction.plots.style import (
     DISTRIBUTED,
-    EXACT,
-    FEW,
-    PALETTE,
+    REDUCED,
+    REFERENCE,
     new_figure,
     tidy,
 )
@@ -98,7 +97,7 @@ def draw(
         axes[0].plot(
             x[at] + outline[:, 0],
             y[at] + outline[:, 1],
-            color=PALETTE[6],
+            color="0.2",
             linewidth=1.0,
         )
         for offset in np.arange(-30.0, 31.0, 7.5):
@@ -107,21 +106,19 @@ def draw(
                 axes[0].plot(
                     x[at] + ends[:, 0],
                     y[at] + ends[:, 1],
-                    color=PALETTE[6],
+                    color="0.2",
                     linewidth=0.5,
                     alpha=0.5,
                 )
-    axes[0].plot(x, y, color=PALETTE[0], label="centre of the block")
+    axes[0].plot(x, y, color=DISTRIBUTED, label="centre of the block")
     far = 1.15 * np.hypot(x[-1], y[-1])
-    axes[0].plot(
-        [0.0, 0.0], [0.0, -far], color=PALETTE[6], linestyle=":", label="fall line"
-    )
+    axes[0].plot([0.0, 0.0], [0.0, -far], color="0.2", linestyle=":", label="fall line")
     angle = drift(slope)
     axes[0].plot(
         [0.0, far * np.sin(angle)],
         [0.0, -far * np.cos(angle)],
         "--",
-        color=EXACT,
+        color=REFERENCE,
         label="closed form",
         zorder=3,
     )
@@ -134,11 +131,11 @@ def draw(
     axes[1].plot(
         np.degrees(fine),
         np.degrees([drift(s) for s in fine]),
-        color=EXACT,
+        color=REFERENCE,
         label="closed form",
     )
     for (kind, values), mark, colour in zip(
-        found.items(), "ox", (DISTRIBUTED, FEW), strict=True
+        found.items(), "ox", (DISTRIBUTED, REDUCED), strict=True
     ):
         axes[1].plot(
             np.degrees(slopes),

@@ -29,7 +29,14 @@ import numpy as np
 import torch
 
 import planarfriction as pf
-from planarfriction.plots.style import PALETTE, PRESSURE_MAP, new_figure, tidy
+from planarfriction.plots.style import (
+    PRESSURE_MAP,
+    REDUCED,
+    REFERENCE,
+    SHADES,
+    new_figure,
+    tidy,
+)
 from planarfriction.torch import DistributedModel, rollout, tracking_loss
 
 CELLS, CELL = 8, 3e-3  # cells of a side, side of a cell [m]
@@ -158,13 +165,13 @@ def draw(truth: pf.ContactPatch, rich: Learnt, poor: Learnt):
         image, ax=axes[:3].tolist(), label="load on a cell [%]", shrink=0.85
     )
     for learnt, label, colour in (
-        (rich, "many points", PALETTE[0]),
-        (poor, "one spin", PALETTE[1]),
+        (rich, "many points", REDUCED),
+        (poor, "one spin", SHADES[0]),
     ):
         axes[3].semilogy(np.sqrt(learnt.losses), color=colour, label=label)
     axes[3].axhline(
         np.sqrt(3) * NOISE * LAW.mu_c,
-        color=PALETTE[6],
+        color=REFERENCE,
         linewidth=0.8,
         linestyle="--",
         label="noise",

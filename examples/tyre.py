@@ -30,7 +30,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
-from planarfriction.plots.style import PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import DISTRIBUTED, SHADES, PlotFigure, new_figure, tidy
 
 LOAD, MU = 4000.0, 0.9  # [N], [-]
 HALF_LENGTH, WIDTH = 0.06, 0.14  # a and the width of the patch [m]
@@ -172,7 +172,7 @@ def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
             degrees,
             found,
             "o",
-            color=PALETTE[1],
+            color=DISTRIBUTED,
             markersize=4,
             label="cells, convected",
         )
@@ -187,7 +187,7 @@ def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
         * (1.0 - (x / 1e3 / HALF_LENGTH) ** 2)
     )
     bent.plot(x, 1e3 * limit, color="0.6", linestyle="--", label="largest deflection")
-    for colour, angle in zip(PALETTE, (1.0, 3.0, 6.0), strict=False):
+    for colour, angle in zip(SHADES[1:], (1.0, 3.0, 6.0), strict=True):
         k = int(np.abs(degrees - angle).argmin())
         bent.plot(
             x,

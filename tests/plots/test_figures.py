@@ -758,8 +758,8 @@ def test_a_model_has_its_colour_in_every_figure():
     drawn = [
         line.get_color() for line in plots.plot_histories(runs).axes[0].get_lines()
     ]
-    assert drawn == [style.DISTRIBUTED, style.PUBLISHED, style.FEW]
-    assert tuple(drawn) == (looks.DISTRIBUTED, looks.REDUCED, looks.FEW)
+    assert drawn == [style.DISTRIBUTED, style.PUBLISHED, style.REDUCED]
+    assert tuple(drawn) == (looks.DISTRIBUTED, looks.PUBLISHED, looks.REDUCED)
 
 
 def test_a_body_that_is_tiny_beside_its_path_is_drawn_larger_and_says_so():

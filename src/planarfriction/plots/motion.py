@@ -137,7 +137,7 @@ def _draw(axes: Any, strobe: _Strobe) -> None:
             at = contact_poses(contact, np.array([time]), pose)[0]
             move([_draw_shape(axes, _pad_shape(contact), colour)], axes, at)
     for contact in (each for each in pads if each.support_velocity is None):
-        _draw_shape(axes, _on_mount(contact), style.PAD_COLOUR)
+        _draw_shape(axes, _on_mount(contact), style.PAD)
     style.show_lengths(axes, 1e-3 * float(np.abs(strobe.limits).max()))
     axes.locator_params(nbins=style.ticks(axes, 7))
     axes.update_datalim(strobe.limits.T)
@@ -185,14 +185,21 @@ def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> Artist:
     shape = 1e3 * shape
     # All boxes are one path, so that no seams show between neighbours.
     if shape.ndim == 3:
-        closed = np.concatenate([shape, shape[:, :1]], axis=1)
-        codes = [Outline.MOVETO, *3 * [Outline.LINETO], Outline.CLOSEPOLY]
-        path = Outline(closed.reshape(-1, 2), np.tile(codes, len(shape)))
-        drawn = PathPatch(path, fc=colour, ec="none", alpha=PAD_OPACITY, zorder=2)
+        drawn = PathPatch(
+            outline_of(shape), fc=colour, ec="none", alpha=PAD_OPACITY, zorder=2
+        )
     else:
         look = {"marker": "o", "ms": 4.5, "mew": 0.0, "ls": "none", "alpha": 0.8}
         drawn = Line2D(*shape.T, **look, color=colour, zorder=2)
     return axes.add_artist(drawn)
+
+
+def outline_of(boxes: np.ndarray) -> Outline:
+    """Return the path around polygons `[N, M, 2]`."""
+    closed = np.concatenate([boxes, boxes[:, :1]], axis=1)
+    lines = [Outline.LINETO] * (boxes.shape[1] - 1)
+    codes = [Outline.MOVETO, *lines, Outline.CLOSEPOLY]
+    return Outline(closed.reshape(-1, 2), np.tile(codes, len(boxes)))
 
 
 def move(

@@ -21,10 +21,10 @@ from planarfriction.plots.limit_surface import draw_surface, scaled_samples
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import ContactTrack
 
-STICK = "#0072B2"
+STICK = style.STICKS
 """Colour of what sticks, which pales towards it as its bristles bend."""
 
-SLIP = "#E66100"
+SLIP = style.SLIPS
 """Colour of what slips."""
 
 PLAIN = "#9AA5B1"
@@ -54,7 +54,7 @@ STILL = 1e-3
 ARM = 1e-2
 """Lever of the spin of a body in its speed [m]."""
 
-_PALE = LinearSegmentedColormap.from_list("stick", ["#EAF1F7", STICK])(
+_PALE = LinearSegmentedColormap.from_list("stick", ["#F4F8FB", STICK])(
     np.linspace(0.0, 1.0, 230)
 )
 CELLS = ListedColormap([*_PALE, *[SLIP] * 26])
@@ -185,7 +185,7 @@ class SurfacePanel:
                 axis.label.set_fontsize("x-small")
         axes.set_title("limit surface, $\\mu_c f_N = 1$", fontsize="small", y=0.98)
         self.floor = -limit
-        colour = style.PALETTE[1]
+        colour = style.REDUCED
         self.shadow, self.tail, self.arm, self.head = (
             axes.plot([], [], [], **look)[0]
             for look in (

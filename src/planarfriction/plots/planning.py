@@ -18,7 +18,16 @@ from planarfriction.scenes import simulate
 INSTANTS = 8
 """Outlines that are drawn."""
 
-MODES = ("stick", "slide left", "slide right", "free")
+COLOURS = (style.REDUCED, *style.SHADES[1::2])
+"""Colours of the friction of the scene, and of the least and the most."""
+
+MODES = {
+    "stick": ("0.0", "o"),
+    "slide left": (style.SLIPS, "<"),
+    "slide right": (style.SLIPS, ">"),
+    "free": ("0.75", "."),
+}
+"""Colour and marker of the pusher by what it does."""
 
 
 def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
@@ -29,9 +38,13 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     times = np.append(plan.signal.times, end)
     force = unit_for("force", plan.signal.values)
     values = force.factor * plan.signal(times)
-    grip.plot(times, values, "o-", color=style.PALETTE[0], markersize=3)
+    grip.plot(times, values, "o-", color="0.0", markersize=3)
     holding = force.factor * plan.report.holding
-    dotted = {"color": "0.4", "linewidth": 0.9, "linestyle": style.LINE_STYLES[2]}
+    dotted = {
+        "color": style.REFERENCE,
+        "linewidth": 0.9,
+        "linestyle": style.LINE_STYLES[2],
+    }
     grip.axhline(holding, **dotted)
     grip.annotate("holds the body at the end", (end, holding), color="0.3",
                   fontsize="small", ha="right", va="bottom")  # fmt: skip
@@ -55,7 +68,7 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     # First as it is, then the others.
     for i, (solution, label) in enumerate(zip(solutions, labels, strict=True)):
         time = solution.histories["time"].values
-        line = {"color": style.PALETTE[i], "ls": style.LINE_STYLES[i], "label": label}
+        line = {"color": COLOURS[i], "ls": style.LINE_STYLES[i], "label": label}
         turn.plot(time, angle.factor * angles[i], **line)
         slide.plot(time, length.factor * slides[i], **line)
     wanted = plan.report.goal
@@ -91,13 +104,14 @@ def draw_push(axes: Any, push: pf.planning.Push) -> None:
             face = placed(push.pusher.ends, push.pusher_pose[k])
             axes.plot(*(1e3 * face.T), color="0.3", linewidth=2.0, zorder=4)
     axes.plot(*(1e3 * push.pose[:, :2].T), color="0.5", linewidth=0.8, zorder=2)
-    for i, mode in enumerate(MODES):
+    for mode, (colour, marker) in MODES.items():
         here = push.mode == mode
         if here.any():
             places = 1e3 * push.pusher_pose[here, :2].T
-            colour = "0.75" if mode == "free" else style.PALETTE[i]
             label = f"pusher: {mode}"
-            axes.scatter(*places, s=9, zorder=5, color=colour, label=label)
+            axes.scatter(
+                *places, s=9, zorder=5, color=colour, marker=marker, label=label
+            )
     style.show_times(axes, push.time)
     style.show_lengths(axes, float(np.abs(push.pose[:, :2]).max()))
     axes.set_aspect("equal", adjustable="datalim")

@@ -7,17 +7,25 @@ from typing import Any
 import numpy as np
 
 from planarfriction.plots import style
-from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, FEW, PlotFigure
+from planarfriction.plots.style import (
+    DISTRIBUTED,
+    ELLIPSOID,
+    PUBLISHED,
+    REDUCED,
+    REFERENCE,
+    PlotFigure,
+)
 from planarfriction_studies.experiments import facts
 
-__all__ = ["DISTRIBUTED", "ELLIPSOID", "EXACT", "FEW", "QUARTIC", "REDUCED"]
+__all__ = ["DISTRIBUTED", "ELLIPSOID", "PUBLISHED", "QUARTIC", "REDUCED", "REFERENCE"]
 
-REDUCED, QUARTIC = style.PUBLISHED, style.OTHER
+QUARTIC = style.OTHER
+"""Colour of the quartic surface."""
 
-OTHERS = ("#332288", "#882255", "#999933", "0.45")
-"""Colours of what is no model: shapes, solvers, components, loads, causes."""
+OTHERS = (REDUCED, "0.0", "0.45", "0.7")
+"""Colours of what is no model: shapes, solvers, components, loads, causes; blue for the one that is meant."""
 
-OF_MODEL = {"d": DISTRIBUTED, "r": REDUCED, "e": ELLIPSOID}
+OF_MODEL = {"d": DISTRIBUTED, "r": PUBLISHED, "e": ELLIPSOID}
 """Letter of a model in the names of curves -> its colour."""
 
 

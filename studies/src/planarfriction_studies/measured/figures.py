@@ -18,7 +18,9 @@ DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
 
 COLOURS: dict[str, str] = dict(
     zip(
-        DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PUBLISHED), strict=True
+        DRAWN,
+        (style.OTHER, style.ELLIPSOID, style.REFERENCE, style.PUBLISHED),
+        strict=True,
     )
 )
 """Model -> its colour; the others take what is left, one after the other."""
@@ -93,12 +95,12 @@ def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
     results = benchmark.results[task]
     own = [name for name in results if name not in LIBRARY]
     wanted = [name for name in (*DRAWN, *own) if name in results] or list(results)
-    return {name: results[name] for name in wanted[: len(style.PALETTE)]}
+    return {name: results[name] for name in wanted[: len(style.SERIES)]}
 
 
 def _colours(chosen: Mapping[str, Any]) -> dict[str, str]:
     """Return the colour of each of the chosen models."""
-    left = iter(colour for colour in style.PALETTE if colour not in COLOURS.values())
+    left = iter(colour for colour in style.SERIES if colour not in COLOURS.values())
     return {name: COLOURS.get(name) or next(left, style.OTHER) for name in chosen}
 
 

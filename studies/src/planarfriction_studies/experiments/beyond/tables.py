@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.plots.style import PlotFigure
+from planarfriction.plots.style import SHADES, PlotFigure
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import contacts
 from planarfriction_studies.experiments.beyond.ladder import (
@@ -229,8 +229,8 @@ COLOURS = dict(
     zip(
         KINDS,
         (
+            looks.PUBLISHED,
             looks.REDUCED,
-            looks.OTHERS[0],
             looks.DISTRIBUTED,
             looks.QUARTIC,
             looks.ELLIPSOID,
@@ -242,7 +242,7 @@ COLOURS = dict(
 MODEL_COLOURS = dict(
     zip(
         MOVED,
-        (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0], looks.DISTRIBUTED),
+        (looks.PUBLISHED, SHADES[0], looks.REDUCED, SHADES[3], looks.DISTRIBUTED),
         strict=True,
     )
 )
@@ -299,7 +299,7 @@ def staircase(stairs: Arrays) -> PlotFigure:
                 lw=1.1,
                 label="sum over the 21 x 21 grid's cells",
             )
-            axes.plot(place, exact, color=looks.EXACT, lw=1.3, label="exact")
+            axes.plot(place, exact, color=looks.REFERENCE, lw=1.3, label="exact")
             axes.set(ylabel=label, xlim=(0.0, place[-1]))
             axes.set_title(IN_WORDS[shape], fontsize="medium", loc="left")
     for axes in panels[1]:
@@ -337,8 +337,8 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     slopes = np.array(numbers["slope"])
     fine = np.linspace(slopes[0], slopes[-1], 100)
     closed = np.degrees([contacts.closed_drift(slope) for slope in fine])
-    axes.plot(np.degrees(fine), closed, color=looks.EXACT, label="closed form")
-    colours = (looks.DISTRIBUTED, looks.FEW, looks.REDUCED)
+    axes.plot(np.degrees(fine), closed, color=looks.REFERENCE, label="closed form")
+    colours = (looks.DISTRIBUTED, looks.REDUCED, looks.PUBLISHED)
     for kind, marker, colour in zip(
         contacts.GROOVED_MODELS, "ox+", colours, strict=True
     ):
@@ -365,9 +365,9 @@ PLACES = (4, 5), (4, -12)
 """Offset [points] of words from a marker: above and below in turn, since neighbours may be close."""
 
 FAMILIES = (
-    Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
+    Family("published reduced model", {"published": ""}, looks.PUBLISHED, "^"),
     Family("ReducedModel, 1 disc to one a cell",
-           {name: str(n) for n, name in NAMES.items()} | {ALL: "all"}, looks.FEW, "o"),
+           {name: str(n) for n, name in NAMES.items()} | {ALL: "all"}, looks.REDUCED, "o"),
     Family("distributed, 21 x 21 points", {"full": ""}, looks.DISTRIBUTED, "D"),
 )  # fmt: skip
 

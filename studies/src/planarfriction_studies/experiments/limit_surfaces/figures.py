@@ -175,7 +175,7 @@ def _force_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -
     continuous = 1.0 - 2.0 * np.clip((y + half) / (2.0 * half), 0.0, 1.0) ** 2
     for each, colour in zip(sides, (SUM, BESIDE), strict=True):
         axes.plot(spin_about(each, y)[:, 0], 1e3 * y, color=colour, lw=1.4)
-    axes.plot(continuous, 1e3 * y, color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1])
+    axes.plot(continuous, 1e3 * y, color=looks.REFERENCE, lw=1.0, ls=LINE_STYLES[1])
     for _, at, colour, marker in centres:
         axes.axhline(1e3 * at, color=colour, lw=0.8)
         for each in sides:
@@ -204,7 +204,7 @@ def _spin_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) ->
     axes.plot(
         [],
         [],
-        color=looks.EXACT,
+        color=looks.REFERENCE,
         lw=1.0,
         ls=LINE_STYLES[1],
         label="continuous pressure",
@@ -228,7 +228,7 @@ def _spin_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) ->
         marker="*",
         ms=10,
         ls="",
-        color=looks.EXACT,
+        color=looks.REFERENCE,
         label="torque without force",
         zorder=1,
     )

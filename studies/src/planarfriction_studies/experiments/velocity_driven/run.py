@@ -418,7 +418,7 @@ def _page(
 
 def _box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
     """Draw errors of force [N] and torque [N mm] of all shapes, ours filled, the published boxes open beside them."""
-    colours = {"corrected": looks.REDUCED, "ellipsoid": looks.ELLIPSOID}
+    colours = {"corrected": looks.PUBLISHED, "ellipsoid": looks.ELLIPSOID}
     table = facts.published_table("box")
     figure, panels = looks.box_panels([runs.IN_WORDS[shape] for shape in every], 7.4)
     rows = (
