@@ -11,7 +11,7 @@ from tests.support.refusals import refused
 
 TWO = pf.ContactPatch.points([(-0.01, 0.0), (0.01, 0.0)], name="two points")
 CHORD = 1e-3
-"""Largest distance of a chord of the mesh, 3 degrees wide, from the unit circle: 1 - cos(1.5 degrees), with a margin."""
+"""Largest distance of a chord of 3 degrees from the unit circle, 1 - cos(1.5 degrees), with a margin."""
 
 
 def test_sections_have_their_closed_forms_all_around():

@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.style import context
 
 from planarfriction._support import validation
 from planarfriction._support.shown import unit_for
@@ -114,9 +115,6 @@ COLUMN = 3.5
 PAGE = 7.0
 """Width of a page [inch]; pictures for the web have 160 dots per inch of it."""
 
-SHEET = "planarfriction.plots.print"
-"""Style sheet of figures of these widths."""
-
 NARROW = 4.5
 """Width [inch] below which a figure, or axes and their share of it, have small titles and few ticks."""
 
@@ -125,6 +123,11 @@ WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 
 LARGEST_SIDE = 100.0
 """Largest side of a figure [inch]: 12,000 dots, of which a square takes 0.6 GB."""
+
+
+def paper() -> Any:
+    """Return a context in which figures have the style sheet of a column or page of a paper."""
+    return context("planarfriction.plots.print")
 
 
 class PlotFigure(Figure):

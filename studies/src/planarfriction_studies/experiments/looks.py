@@ -88,6 +88,16 @@ def box(
         axes.plot(at, *most, marker="x", ms=5, mew=1.4, color=colour)
 
 
+def span(axes: Any, at: float, numbers: Any, colour: str) -> None:
+    """Draw the numbers of a box as a dot at the median, a broad line of quartiles, a thin range and a cross."""
+    low, first, median, third, high, *most = numbers
+    axes.vlines(at, low, high, color=colour, lw=1.0)
+    axes.vlines(at, first, third, color=colour, lw=4.0)
+    axes.plot(at, median, "o", ms=5, color=colour, mec="white", mew=0.6, zorder=4)
+    if most:
+        axes.plot(at, *most, marker="x", ms=4, mew=1.1, color=colour)
+
+
 def box_legend(
     figure: PlotFigure,
     colours: dict[str, str],

@@ -141,7 +141,7 @@ def run(work: Work) -> Result:
             "surface_staircase": tables.staircase(stairs),
             "driven_models": tables.driven_boxes(numbers["driven"]),
             "in_hand_ends": _ends_figure(numbers["in hand"]),
-            "ladder": tables.draw_ladder(rows),
+            "ladder": tables.draw_ladder(rows, shifts),
             "few_discs": cells.figure(numbers["few discs"]),
             "grooves": tables.grooves(numbers["grooves"]),
         },
