@@ -262,7 +262,7 @@ def test_histories_show_the_data_in_the_units_of_their_labels():
     expected = {
         "x [mm]": 1e3 * run.data["x"],
         "y [mm]": 1e3 * run.data["y"],
-        "θ [deg]": np.degrees(run.data["theta"]),
+        "θ [°]": np.degrees(run.data["theta"]),
         "speed [mm/s]": 1e3 * np.hypot(run.data["vx"], run.data["vy"]),
         "fx [N]": run.data["fx"][:, 0],
         "fy [N]": run.data["fy"][:, 0],

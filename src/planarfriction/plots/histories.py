@@ -244,7 +244,7 @@ def _draw_panel(
     least = LEAST_SPAN * unit.factor * max(np.abs(values).max() for values in alike)
     span = max(1.1 * (high - low), least) or 1.0
     axes.set_ylim(0.5 * (low + high - span), 0.5 * (low + high + span))
-    axes.set_ylabel(f"{title} [{unit.label}]")
+    axes.set_ylabel(style.with_unit(title, unit))
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.margins(x=0.01)
     style.tidy(axes)

@@ -202,10 +202,9 @@ def _label(axes: Any, strobe: _Strobe, scale: Normalize) -> None:
     last = np.inf
     for k in np.argsort(-ends[:, 1], kind="stable"):
         last = min(ends[k, 1], last - APART * side)
-        mark = angle.label.replace("deg", "°")
         words = (
             f"{clock.factor * strobe.times[k]:.3g} {clock.label}: "
-            f"{angle.factor * turns[k] + 0.0:.3g}{'' if mark == '°' else ' '}{mark}"
+            f"{angle.factor * turns[k] + 0.0:.3g}{'°' if angle.label == 'deg' else ' ' + angle.label}"
         )
         axes.text(
             ends[k, 0] + 0.02 * side,

@@ -32,7 +32,7 @@ MODES = {
 
 def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     """Draw the grip, the turn and the slide over time: broken lines have other frictions."""
-    figure = style.new_figure(7.2, 6.4)
+    figure = style.new_figure(7.0, 5.4)
     grip, turn, slide = figure.subplots(3, 1, sharex=True)
     end = plan.scene.t_end
     times = np.append(plan.signal.times, end)
@@ -64,7 +64,10 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     labels = ["friction of the scene"]
     if len(solutions) > 1:
         least, *_, most = plan.report.frictions
-        labels += [f"friction {100.0 * (f - 1.0):+.3g} %" for f in (least, most)]
+        labels += [
+            f"friction {100.0 * (f - 1.0):+.3g} %".replace("-", "\N{MINUS SIGN}")
+            for f in (least, most)
+        ]
     # First as it is, then the others.
     for i, (solution, label) in enumerate(zip(solutions, labels, strict=True)):
         time = solution.histories["time"].values
@@ -76,7 +79,7 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
         turn.axhline(angle.factor * wanted["angle"], **dotted)
     else:
         slide.axhline(length.factor * np.hypot(*wanted["slide"]), **dotted)
-    turn.set_ylabel(f"turn [{angle.label}]")
+    turn.set_ylabel(style.with_unit("turn", angle))
     slide.set_ylabel(f"slide [{length.label}]")
     slide.set_xlabel("time [s]")
     turn.legend(frameon=False, fontsize="small")

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.style import context
 
 from planarfriction._support import validation
-from planarfriction._support.shown import unit_for
+from planarfriction._support.shown import Unit, unit_for
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 
@@ -221,6 +221,11 @@ def ticks(axes: Any, most: int) -> int:
 def model_colour(model: Any) -> str | None:
     """Return the colour of a friction model; None if it is not one of the library's."""
     return OF_MODEL.get(MODELS.name_of(model) or "")
+
+
+def with_unit(name: str, unit: Unit) -> str:
+    """Return the label of an axis: the name of a quantity with its unit in brackets."""
+    return f"{name} [{unit.label.replace('deg', '°')}]"
 
 
 def show_lengths(axes: Any, largest: float) -> None:

@@ -360,7 +360,8 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     return figure
 
 
-RUNGS = {name: str(count) for count, name in NAMES.items()} | {ALL: "a disc\na cell"}
+RUNGS = {name: str(count) for count, name in NAMES.items()}
+RUNGS |= {"1 discs": "1 disc", ALL: "a disc\na cell"}
 """Model of the ladder -> words beside its marker."""
 
 BESIDE = {
@@ -419,6 +420,7 @@ def draw_ladder(rows: list[Row], shifts: dict[str, float]) -> PlotFigure:
             axes.set_xlabel("time of a run, all cells = 1")
             axes.set_title(title, loc="left")
             axes.margins(x=0.12, y=0.1)
+            axes.set_xlim(left=0.45 * axes.dataLim.x0)
             axes.xaxis.set_major_locator(FixedLocator(TICKS))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_locator(NullLocator())
@@ -451,7 +453,14 @@ def _draw_rungs(axes: Any, errors: Callable[[str], tuple[list, list]]) -> None:
         at = (float(np.median(times)), float(np.median(values)))
         _bar(axes, at[0], values, looks.PUBLISHED)
         axes.plot(*at, "^", color=looks.PUBLISHED, ms=7, mec="white", zorder=5)
-        _name(axes, "published", at, (6, 3), LETTERS[looks.PUBLISHED])
+        rising = max(values) > 2.0 * at[1]  # where its bar is
+        _name(
+            axes,
+            "published",
+            at,
+            (-6, 0) if rising else (0, 6),
+            LETTERS[looks.PUBLISHED],
+        )
 
 
 def _draw_whole(axes: Any, errors: tuple[list, list], *, reference: bool) -> None:

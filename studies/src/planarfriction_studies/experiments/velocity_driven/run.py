@@ -338,10 +338,13 @@ MARKERS = {"d": "o", "r": "s", "e": "^"}
 """Letter of a model -> marker of its published curves."""
 
 SHOWN = (
-    ("ft", "force [% of the load]", 100.0),
-    ("tau", "torque [N mm]", 1e3),
+    ("ft", "force error [% of the load]", 100.0),
+    ("tau", "torque error [N mm]", 1e3),
 )
 """Quantity of the errors, label of its axis, and shown units per SI unit."""
+
+SHOWN_FLOOR = 1e-3
+"""Least error that is shown [%, N mm]: many are zero but for rounding."""
 
 SPEEDS = (
     ("vx", "$v_x$ [mm/s]", 1e3),
@@ -451,6 +454,7 @@ def _box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
                         ]
                         looks.span(axes, at + 0.12, theirs, MEASURED)
             axes.set(yscale="log", ylabel=label)
+            axes.set_ylim(bottom=SHOWN_FLOOR)
             axes.yaxis.set_major_formatter("{x:g}")
             tidy(axes)
             axes.grid(False, axis="x")
