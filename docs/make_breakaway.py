@@ -412,13 +412,6 @@ def draw(kept: dict[str, Any]) -> style.PlotFigure:
         price = kept["prices"][name]["step"]
         worst = max(each.max() for each in errors)
         handles += right.plot(price, worst, ls="", ms=7, **look, label=TITLES.get(name, name))  # fmt: skip
-        words = TITLES.get(name, name)
-        place = {"xytext": (-7, 0), "textcoords": "offset points", "ha": "right"}
-        if name == "published":
-            place |= {"xytext": (7, 0), "ha": "left"}
-        letters = style.LETTERS.get(colour, colour)
-        letters = "0.3" if colour == style.SHADES[0] else letters
-        right.annotate(words, (price, worst), va="center", color=letters, **place)
     for edge in np.arange(0.5, len(SHAPES) - 1):
         left.axvline(edge, color="0.9", lw=0.6)
     names = [shape.replace(" ", "\n") for shape in SHAPES]
@@ -428,7 +421,7 @@ def draw(kept: dict[str, Any]) -> style.PlotFigure:
     right.set(xscale="log", xlabel="time of a step / 3-state model")
     right.xaxis.set_major_formatter("{x:g}")
     right.set_title("largest of all", loc="left")
-    right.margins(x=0.35)
+    right.margins(x=0.15)
     for axes in (left, right):
         style.tidy(axes)
     left.grid(False, axis="x")

@@ -259,7 +259,7 @@ def plot_joint(fit: Any) -> style.PlotFigure:
              for each in fit.series]  # fmt: skip
     series = fit.series[int(np.argmax(gains))]
     what = "angle" if fit.unit == "rad" else "torque"
-    figure = style.new_figure(9.6, 5.4)
+    figure = style.new_figure(7.4, 4.4)
     grid = figure.add_gridspec(2, 2, height_ratios=[1.4, 1.0], width_ratios=[1.6, 1.0])
     upper = figure.add_subplot(grid[0, 0])
     lower = figure.add_subplot(grid[1, 0], sharex=upper)

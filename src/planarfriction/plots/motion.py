@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,7 +120,7 @@ def _strobe(solution: pf.Solution) -> _Strobe:
     validation.instance("solution", solution, pf.Solution, "a Solution")
     time = solution.histories["time"].values
     poses = body_poses(solution)
-    chosen = _instants(poses, _reach(solution))
+    chosen = instants(poses, _reach(solution))
     limits = _limits(solution, time[chosen], poses[chosen], 1.0)
     side = 1e-3 * float(np.diff(limits, axis=-1).max())
     size = 2.0 * _reach(solution)
@@ -130,7 +131,7 @@ def _strobe(solution: pf.Solution) -> _Strobe:
     return _Strobe(solution, time[chosen], poses[chosen], poses, larger, limits)
 
 
-def _instants(poses: np.ndarray, reach: float) -> np.ndarray:
+def instants(poses: np.ndarray, reach: float) -> np.ndarray:
     """Return the indices of the first pose, of that at which half of the motion is done, and of the last."""
     x, y, turn = np.diff(poses, axis=0).T
     done = np.cumsum(np.hypot(np.hypot(x, y), reach * turn))
@@ -169,48 +170,55 @@ def _draw(axes: Any, strobe: _Strobe) -> None:
     axes.margins(0.0)
     axes.set_aspect("equal", adjustable="datalim")  # narrow motions fill the panel too
     style.tidy(axes)
-    _draw_path(axes, strobe, scale)
-    _label(axes, strobe, scale)
+    draw_path(axes, strobe.solution.histories["time"].values, strobe.path, scale)
+    side = float(np.diff(strobe.limits, axis=-1).max())
+    for pose in strobe.poses:
+        symbols.centre_of_mass(axes, 1e3 * pose[:2], MASS * side)
+    lines = [strobe.larger * each for each in body_lines(solution)]
+    body = np.concatenate(lines or [np.zeros((1, 2))])
+    corners = [1e3 * placed(body, pose) for pose in strobe.poses]
+    turns = strobe.poses[:, 2] - strobe.path[0, 2]
+    label_poses(axes, times, turns, corners, side, scale)
     axes.set_title(_remark(strobe), fontsize="small", loc="left")
 
 
-def _draw_path(axes: Any, strobe: _Strobe, scale: Normalize) -> None:
-    """Draw the path of the centre of mass, coloured by time, and its place at each instant."""
-    time = strobe.solution.histories["time"].values
+def draw_path(axes: Any, time: np.ndarray, poses: np.ndarray, scale: Any) -> None:
+    """Draw the path of a body [mm], coloured by time on a `scale`."""
     some = style.evenly(len(time), PIECES)
-    places = 1e3 * strobe.path[some, :2]
+    places = 1e3 * poses[some, :2]
     pieces = np.stack([places[:-1], places[1:]], axis=1)
     colours = style.TIME_COLOURS(scale(0.5 * (time[some][1:] + time[some][:-1])))
     look = {"linewidth": 2.2, "capstyle": "round", "zorder": 4}
     axes.add_collection(LineCollection(list(pieces), colors=colours, **look))
-    side = float(np.diff(strobe.limits, axis=-1).max())
-    for pose in strobe.poses:
-        symbols.centre_of_mass(axes, 1e3 * pose[:2], MASS * side)
 
 
-def _label(axes: Any, strobe: _Strobe, scale: Normalize) -> None:
-    """Write time and turn of each instant to the right of the body, clear of each other."""
-    clock = unit_for("time", strobe.times)
-    turns = strobe.poses[:, 2] - strobe.path[0, 2]
+def label_poses(
+    axes: Any,
+    times: np.ndarray,
+    turns: np.ndarray,
+    corners: Sequence[np.ndarray],
+    side: float,
+    scale: Any,
+) -> None:
+    """Write time and turn of each instant to the right of the body's corners [mm], clear of each other.
+
+    `side` is the larger side of the view [mm].
+    """
+    clock = unit_for("time", times)
     angle = unit_for("angle", turns)
-    side = float(np.diff(strobe.limits, axis=-1).max())
-    lines = [strobe.larger * each for each in body_lines(strobe.solution)]
-    lines = lines or [np.zeros((1, 2))]
-    corners = [1e3 * placed(np.concatenate(lines), pose) for pose in strobe.poses]
+    sign = "°" if angle.label == "deg" else f" {angle.label}"
     # The upper one of corners that are about as far to the right.
     ends = np.array([each[np.argmax(each @ [1.0, 0.1])] for each in corners])
     last = np.inf
     for k in np.argsort(-ends[:, 1], kind="stable"):
         last = min(ends[k, 1], last - APART * side)
-        words = (
-            f"{clock.factor * strobe.times[k]:.3g} {clock.label}: "
-            f"{angle.factor * turns[k] + 0.0:.3g}{'°' if angle.label == 'deg' else ' ' + angle.label}"
-        )
+        turn = f"{angle.factor * turns[k] + 0.0:.3g}{sign}"
+        words = f"{clock.factor * times[k]:.3g} {clock.label}: {turn}"
         axes.text(
             ends[k, 0] + 0.02 * side,
             last,
             words.replace("-", "\N{MINUS SIGN}"),
-            color=style.TIME_COLOURS(scale(strobe.times[k])),
+            color=style.TIME_COLOURS(scale(times[k])),
             fontsize="small",
             fontweight="bold",
             va="center",

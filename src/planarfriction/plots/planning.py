@@ -11,12 +11,15 @@ import planarfriction as pf
 from planarfriction._support.shown import unit_for
 from planarfriction.planning.grip import slide_of
 from planarfriction.plots import style
-from planarfriction.plots.motion import placed
+from planarfriction.plots.motion import (
+    ROOM,
+    draw_path,
+    instants,
+    label_poses,
+    placed,
+)
 from planarfriction.plots.track import body_poses
 from planarfriction.scenes import simulate
-
-INSTANTS = 8
-"""Outlines that are drawn."""
 
 COLOURS = (style.REDUCED, *style.SHADES[1::2])
 """Colours of the friction of the scene, and of the least and the most."""
@@ -88,7 +91,7 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
 
 
 def plot_push(push: pf.planning.Push) -> style.PlotFigure:
-    """Draw the outline of the slider at 8 instants, coloured by time, and the path of the pusher by what it does."""
+    """Draw the slider at the start, half-way and at the end, its path, and that of the pusher by what it does."""
     figure = style.new_figure(6.4, 4.8)
     draw_push(figure.subplots(), push)
     figure.draw_without_rendering()  # the aspect sets the ticks, which the layout has to know
@@ -98,25 +101,31 @@ def plot_push(push: pf.planning.Push) -> style.PlotFigure:
 def draw_push(axes: Any, push: pf.planning.Push) -> None:
     """Draw `plot_push` into axes."""
     scale = Normalize(push.time[0], push.time[-1])
-    closed = np.concatenate([push.slider.outline, push.slider.outline[:1]])
-    for k in style.evenly(len(push.time), INSTANTS):
-        corners = placed(closed, push.pose[k])
+    outline = push.slider.outline
+    chosen = instants(push.pose, float(np.hypot(*outline.T).max()))
+    closed = np.concatenate([outline, outline[:1]])
+    corners = [1e3 * placed(closed, pose) for pose in push.pose[chosen]]
+    for k, each in zip(chosen, corners, strict=True):
         colour = style.TIME_COLOURS(scale(push.time[k]))
-        axes.plot(*(1e3 * corners.T), color=colour, linewidth=1.3, zorder=3)
+        axes.plot(*each.T, color=colour, linewidth=1.4, zorder=3)
         if push.pusher.width > 0.0:
             face = placed(push.pusher.ends, push.pusher_pose[k])
             axes.plot(*(1e3 * face.T), color="0.3", linewidth=2.0, zorder=4)
-    axes.plot(*(1e3 * push.pose[:, :2].T), color="0.5", linewidth=0.8, zorder=2)
+    draw_path(axes, push.time, push.pose, scale)
     for mode, (colour, marker) in MODES.items():
         here = push.mode == mode
         if here.any():
             places = 1e3 * push.pusher_pose[here, :2].T
             label = f"pusher: {mode}"
-            axes.scatter(
-                *places, s=9, zorder=5, color=colour, marker=marker, label=label
-            )
-    style.show_times(axes, push.time)
+            look = {"s": 9, "color": colour, "marker": marker, "zorder": 5}
+            axes.scatter(*places, **look, label=label)
+    every = np.concatenate(corners)
+    side = float(np.ptp(every, axis=0).max())
+    turns = push.pose[chosen, 2] - push.pose[0, 2]
+    label_poses(axes, push.time[chosen], turns, corners, side, scale)
+    axes.update_datalim(every + np.array([ROOM * side, 0.0]))
     style.show_lengths(axes, float(np.abs(push.pose[:, :2]).max()))
     axes.set_aspect("equal", adjustable="datalim")
-    axes.legend(fontsize="small")
+    place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2}
+    axes.legend(fontsize="small", frameon=False, **place)
     style.tidy(axes)

@@ -162,9 +162,10 @@ class PlotFigure(Figure):
 
 
 def new_figure(width: float, height: float, size: Any = None) -> PlotFigure:
-    """Return an empty figure of `width` x `height` inches, or of a `size` that a user asks for, 120 dots per inch.
+    """Return an empty figure of `width` x `height` inches, or of a `size` that a user asks for.
 
-    Letters larger than 10 pt, as on slides, enlarge the figure unless it has a `size`.
+    It has at least 120 dots per inch. Letters larger than 10 pt, as on slides, enlarge the figure unless it has a
+    `size`.
 
     Raises InvalidValueError unless `size` is two numbers > 0 and at most `LARGEST_SIDE`.
     """
@@ -177,7 +178,8 @@ def new_figure(width: float, height: float, size: Any = None) -> PlotFigure:
         if max(width, height) > LARGEST_SIDE:
             rule = f"be in inches, each side at most {LARGEST_SIDE:g}"
             raise InvalidValueError("size", rule, size)
-    return PlotFigure(figsize=(width, height), layout="constrained", dpi=120)
+    dpi = max(120.0, rcParams["figure.dpi"])
+    return PlotFigure(figsize=(width, height), layout="constrained", dpi=dpi)
 
 
 def place(ax: Any, width: float, height: float, size: Any) -> tuple[Any, Any]:
