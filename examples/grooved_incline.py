@@ -24,9 +24,11 @@ from scipy.optimize import brentq
 import planarfriction as pf
 from planarfriction.plots.style import (
     DISTRIBUTED,
+    PAGE,
     REDUCED,
     REFERENCE,
     new_figure,
+    paper,
     tidy,
 )
 
@@ -87,7 +89,7 @@ def drift_of(solution: pf.Solution) -> float:
 def draw(
     slopes: np.ndarray, found: dict[str, list[float]], path: pf.Solution, slope: float
 ):
-    figure = new_figure(8.8, 3.8)
+    figure = new_figure(PAGE, 3.1)
     axes = figure.subplots(1, 2, width_ratios=[1.1, 1.25])
     x, y = 1e3 * path.data.x.values, 1e3 * path.data.y.values
     outline = 1e3 * np.vstack([path.scene.body.outline, path.scene.body.outline[:1]])
@@ -123,10 +125,8 @@ def draw(
         zorder=3,
     )
     axes[0].set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-40.0, 130.0))
-    axes[0].set_title(
-        f"slope {np.degrees(slope):.0f} deg, {path.data.time[-1]:.2f} s", fontsize=9
-    )
-    axes[0].legend(fontsize=8, loc="upper right")
+    axes[0].set_title(f"slope {np.degrees(slope):.0f} deg, {path.data.time[-1]:.2f} s")
+    axes[0].legend(loc="upper right", frameon=False)
     fine = np.linspace(steepest_at_rest() + 1e-6, np.radians(62.0), 200)
     axes[1].plot(
         np.degrees(fine),
@@ -154,7 +154,7 @@ def draw(
         xlim=(10.0, 62.0),
         ylim=(0.0, None),
     )
-    axes[1].legend(fontsize=8)
+    axes[1].legend(frameon=False)
     for ax in axes:
         tidy(ax)
     return figure
@@ -195,7 +195,8 @@ def main(arguments: list[str] | None = None) -> None:
         )
     options.out.mkdir(parents=True, exist_ok=True)
     path, slope = options.out / "grooved_incline.png", np.radians(25.0)
-    draw(slopes, found, slide(slope), slope).savefig(path)
+    with paper():
+        draw(slopes, found, slide(slope), slope).savefig(path, dpi=160)
     print(path)
 
 

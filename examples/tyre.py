@@ -177,7 +177,7 @@ def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
             label="cells, convected",
         )
         axes.set(xlabel="slip angle [deg]", ylabel=label)
-        axes.legend(fontsize=8)
+        axes.legend()
     x = 1e3 * HALF_LENGTH * ((2.0 * np.arange(COLUMNS) + 1.0) / COLUMNS - 1.0)
     limit = (
         1.5
@@ -210,8 +210,8 @@ def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
     for axes in (force, torque, bent, built):
         tidy(axes)
     bent.set_ylim(top=1.35e3 * float(limit.max()))
-    bent.legend(fontsize=8, ncols=2, loc="upper center")
-    built.legend(fontsize=8)
+    bent.legend(ncols=2, loc="upper center")
+    built.legend()
     return figure
 
 

@@ -24,6 +24,9 @@ from planarfriction.scenes import simulate
 COLOURS = (style.REDUCED, *style.SHADES[1::2])
 """Colours of the friction of the scene, and of the least and the most."""
 
+DOTS = 40
+"""Most places of the pusher that are drawn."""
+
 MODES = {
     "stick": ("0.0", "o"),
     "slide left": (style.SLIPS, "<"),
@@ -100,29 +103,31 @@ def plot_push(push: pf.planning.Push) -> style.PlotFigure:
 
 def draw_push(axes: Any, push: pf.planning.Push) -> None:
     """Draw `plot_push` into axes."""
-    scale = Normalize(push.time[0], push.time[-1])
+    time = push.time - push.time[0]
+    scale = Normalize(0.0, time[-1])
     outline = push.slider.outline
     chosen = instants(push.pose, float(np.hypot(*outline.T).max()))
     closed = np.concatenate([outline, outline[:1]])
     corners = [1e3 * placed(closed, pose) for pose in push.pose[chosen]]
     for k, each in zip(chosen, corners, strict=True):
-        colour = style.TIME_COLOURS(scale(push.time[k]))
+        colour = style.TIME_COLOURS(scale(time[k]))
         axes.plot(*each.T, color=colour, linewidth=1.4, zorder=3)
         if push.pusher.width > 0.0:
             face = placed(push.pusher.ends, push.pusher_pose[k])
             axes.plot(*(1e3 * face.T), color="0.3", linewidth=2.0, zorder=4)
-    draw_path(axes, push.time, push.pose, scale)
+    draw_path(axes, time, push.pose, scale)
+    some = style.evenly(len(push.time), DOTS)
     for mode, (colour, marker) in MODES.items():
-        here = push.mode == mode
-        if here.any():
+        here = some[push.mode[some] == mode]
+        if len(here):
             places = 1e3 * push.pusher_pose[here, :2].T
             label = f"pusher: {mode}"
-            look = {"s": 9, "color": colour, "marker": marker, "zorder": 5}
+            look = {"s": 7, "color": colour, "marker": marker, "zorder": 5}
             axes.scatter(*places, **look, label=label)
     every = np.concatenate(corners)
     side = float(np.ptp(every, axis=0).max())
     turns = push.pose[chosen, 2] - push.pose[0, 2]
-    label_poses(axes, push.time[chosen], turns, corners, side, scale)
+    label_poses(axes, time[chosen], turns, corners, side, scale)
     axes.update_datalim(every + np.array([ROOM * side, 0.0]))
     style.show_lengths(axes, float(np.abs(push.pose[:, :2]).max()))
     axes.set_aspect("equal", adjustable="datalim")

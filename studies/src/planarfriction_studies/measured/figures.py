@@ -84,7 +84,7 @@ def _errors(figure: Any, benchmark: Benchmark, task: str) -> None:
             _intervals(axes, list(results), scores, open_dot=open_dot)
         sign = unit.replace("deg", "\N{DEGREE SIGN}")
         what = f"{measures[0][1].total.__name__} {measures[0][1].quantity}"
-        axes.set_xlabel(f"{what} [{sign}]")
+        axes.set(xlim=(0.0, None), xlabel=f"{what} [{sign}]")
         style.tidy(axes)
     names = [name for name, _ in next(iter(of_unit.values()))]
     look = {"ls": "", "marker": "o", "color": "0.3"}
@@ -107,7 +107,7 @@ def _intervals(
         axes.errorbar(
             score.value, -place, xerr=np.maximum(ends, 0.0), fmt="o", mfc=fill, **look
         )
-    axes.set(xlim=(0.0, None), yticks=-np.arange(len(names)), yticklabels=names)
+    axes.set(yticks=-np.arange(len(names)), yticklabels=names)
 
 
 def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
@@ -118,13 +118,17 @@ def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
     for axes, measure in zip(every, measures, strict=True):
         scores = [result.scores[measure.key] for result in results.values()]
         _intervals(axes, list(results), scores, open_dot=False)
+        axes.set_xlim(left=0.0)
         name, _, unit = measure.heading.partition(" [")
         axes.set_title(name.replace(", ", "\n").replace(" on ", "\non "), loc="left")
         sign = unit.replace("deg", "\N{DEGREE SIGN}")
-        axes.set_xlabel(
-            f"{measure.total.__name__} {measure.quantity}{sign and f' [{sign}'}"
-        )
+        what = f"{measure.total.__name__} {measure.quantity}"
+        axes.set_xlabel(f"{what}{sign and f' [{sign}'}")
         style.tidy(axes)
+    # One label below all axes of one quantity: several would meet.
+    if len({axes.get_xlabel() for axes in every}) == 1:
+        for axes in np.delete(every, len(every) // 2):
+            axes.set_xlabel("")
 
 
 def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
