@@ -125,7 +125,8 @@ def draw(
         zorder=3,
     )
     axes[0].set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-40.0, 130.0))
-    axes[0].set_title(f"slope {np.degrees(slope):.0f} deg, {path.data.time[-1]:.2f} s")
+    axes[0].set_ylim(top=85.0)
+    axes[0].set_title(f"slope {np.degrees(slope):.0f}°, {path.data.time[-1]:.2f} s")
     axes[0].legend(loc="upper right", frameon=False)
     fine = np.linspace(steepest_at_rest() + 1e-6, np.radians(62.0), 200)
     axes[1].plot(
@@ -149,8 +150,8 @@ def draw(
         10.0, np.degrees(steepest_at_rest()), color="0.9", label="stays at rest"
     )
     axes[1].set(
-        xlabel="slope [deg]",
-        ylabel="drift from the fall line [deg]",
+        xlabel="slope [°]",
+        ylabel="drift from the fall line [°]",
         xlim=(10.0, 62.0),
         ylim=(0.0, None),
     )

@@ -301,7 +301,7 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
         ylabel="y [mm]",
     )
     axes.set_title(
-        f"centres of rotation, feet as in {case.question.layout}",
+        f"centres of rotation, {case.question.layout}",
         fontsize="small",
         loc="left",
     )
