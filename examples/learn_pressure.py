@@ -162,6 +162,7 @@ def draw(truth: pf.ContactPatch, rich: Learnt, poor: Learnt):
         )
         ax.set_title(title)
         ax.set_xlabel("x [mm]")
+        ax.grid(False)
     axes[0].set_ylabel("y [mm]")
     figure.colorbar(
         image, ax=axes[:3].tolist(), label="load on a cell [%]", shrink=0.85

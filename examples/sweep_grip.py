@@ -80,7 +80,7 @@ def draw(data: xr.Dataset) -> Any:
         figure = style.new_figure(5.5, 3.4)
         axes = figure.subplots()
         mu = np.linspace(float(data.mu_c[0]), float(data.mu_c[-1]), 200)
-        turned = -np.degrees(data.angle.transpose("mu_c", "grip")).clip(0.0, 90.0)
+        turned = np.degrees(-data.angle.transpose("mu_c", "grip")).clip(0.0, 90.0)
         look = {"cmap": style.PRESSURE_MAP, "shading": "nearest", "rasterized": True}
         mesh = axes.pcolormesh(data.grip, data.mu_c, turned, **look)
         words = "angle turned in 0.5 s [°]"

@@ -274,9 +274,9 @@ def level_of(track: ContactTrack, frame: int) -> Any:
 
 
 def centre_mark(axes: Any) -> Any:
-    """Return the mark of a centre of rotation."""
-    look = {"ms": 8, "mfc": "none", "mew": 1.8, "color": "#111111", "zorder": 8}
-    return axes.plot([], [], "o", label="centre of rotation", **look)[0]
+    """Return the mark of a centre of rotation, a ring with a dot."""
+    look = {"ls": "none", "marker": r"$\odot$", "ms": 11, "color": "black", "zorder": 8}
+    return axes.plot([], [], label="centre of rotation", **look)[0]
 
 
 def put_centre(mark: Any, twist: np.ndarray, at: np.ndarray, *, still: float) -> None:
