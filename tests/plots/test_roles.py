@@ -67,11 +67,13 @@ def test_pictures_of_the_pages_have_the_colours_of_their_roles(name):
 
 
 def test_few_colours_keep_small_marks():
-    """A marker of 25 pixels of the published model beside much of all others: the median cut repaints it."""
+    """A marker of 25 pixels of the published model beside shades of all others: the median cut repaints it."""
     if not IMAGES.is_dir():
         pytest.skip("no docs beside these tests")
-    x, y = np.meshgrid(np.linspace(0.0, 1.0, 200), np.linspace(0.0, 1.0, 200))
-    shade = np.stack([0.9 - 0.3 * x * y, 0.62 + 0.1 * x, 0.4 * y], -1)
+    share = np.linspace(0.0, 1.0, 256)[:, None]
+    others = (style.REDUCED, style.SLIPS, style.ELLIPSOID, style.BUILT_IN, "black")
+    rows = [share * to_rgb(each) + 1.0 - share for each in others]
+    shade = np.repeat(rows, 40, axis=0)
     shade[100:105, 100:105] = to_rgb(style.PUBLISHED)
     picture = Image.fromarray(np.round(255.0 * shade).astype(np.uint8))
     few = script("docs/make_tables.py").few_colours(picture)
