@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.style import context
 
 from planarfriction._support import validation
 from planarfriction._support.shown import Unit, unit_for
@@ -127,6 +126,8 @@ LARGEST_SIDE = 100.0
 
 def paper() -> Any:
     """Return a context in which figures have the style sheet of a column or page of a paper."""
+    from matplotlib.style import context  # reads dozens of files
+
     return context("planarfriction.plots.print")
 
 
