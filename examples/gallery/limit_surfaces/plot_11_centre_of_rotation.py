@@ -32,8 +32,8 @@ for k in (1, 6, 23):
     x, at = 1e3 * centres[k, 0], 1e3 * offsets[k]
     symbols.load(ax, (at, -85), (0, 33))
     symbols.centre_of_rotation(ax, (x, 0))
-    for place in ((x, 9), (at, -85 + 36)):
-        ax.annotate(f"{at:.0f} mm", place, ha="center")
+    ax.annotate(f"{at:.0f} mm", (x, 9), ha="center")
+    ax.annotate(f"{at:.0f}", (at, -48), ha="center")
 ax.set(xlim=(-330, 80), ylim=(-90, 60), aspect="equal", xlabel="x [mm]")
 ax.set_ylabel("y [mm]")
 
