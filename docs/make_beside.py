@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Wedge
 from scipy.interpolate import CubicSpline
 
+from planarfriction.plots import style
 from planarfriction.plots.film_files import write_frames
 from planarfriction_studies.referee.case import all_cases
 from planarfriction_studies.referee.engines.mujoco import ENGINES
@@ -34,11 +35,7 @@ HEADS = dict(
 )
 """Engine -> heading of its panel."""
 
-BUILT_IN = "#D55E00"
-"""Colour of a simulator's built-in friction."""
-OURS = "#0072B2"
-"""Colour of the default model of the library."""
-DASHES = (0, (4.0, 2.2))
+DASHES = style.LINES[style.REFERENCE]
 """Line style of the exact motion."""
 
 WIDTH, HEIGHT = 840, 460
@@ -145,7 +142,7 @@ def main(folder: Path) -> None:
             x, y / HEIGHT, words, ha="center", va="center", **look
         )
         for k, (name, head) in enumerate(HEADS.items()):
-            colour = OURS if k == 2 else BUILT_IN
+            colour = style.REDUCED if k == 2 else style.BUILT_IN
             pose = np.array([np.interp(t, times, column) for column in runs[name][1].T])
             axes = figure.add_axes((k / 3, 100 / HEIGHT, 1 / 3, 270 / HEIGHT))
             draw(axes, pose, np.array(now), colour)
@@ -164,10 +161,10 @@ def main(folder: Path) -> None:
             434,
             "MuJoCo, built-in friction",
             fontsize=21,
-            color=BUILT_IN,
+            color=style.BUILT_IN,
             weight="bold",
         )
-        say(5 / 6, 434, "MuJoCo with", fontsize=21, color=OURS, weight="bold")
+        say(5 / 6, 434, "MuJoCo with", fontsize=21, color=style.REDUCED, weight="bold")
         say(
             0.5,
             18,

@@ -43,9 +43,9 @@ def discs(n: int) -> Callable[[pf.ContactPatch], pf.ReducedModel]:
 
 MODELS: dict[str, tuple[Callable[[pf.ContactPatch], Any], str]] = {
     "all cells": (lambda patch: pf.DistributedModel(patch, LAW), style.DISTRIBUTED),
-    "64 discs": (discs(64), style.PALETTE[2]),
+    "64 discs": (discs(64), style.SHADES[3]),
     "default": (discs(DEFAULT), style.OF_MODEL["reduced"]),
-    "8 discs": (discs(8), style.PALETTE[3]),
+    "8 discs": (discs(8), style.SHADES[0]),
     "published": (lambda patch: pf.ReducedModelPublished(patch, LAW), style.PUBLISHED),
 }
 """Models by the words of the tables: how they are made, and their colour."""
@@ -399,42 +399,34 @@ TABLES = {"models": table_of_models, "creep": table_of_creep, "cells": table_of_
 
 def draw(kept: dict[str, Any]) -> style.PlotFigure:
     """Draw each error of the load of slip by shape, and the largest over the price of a step."""
-    figure = style.new_figure(9.6, 4.0)
+    figure = style.new_figure(style.PAGE, 3.3)
     left, right = figure.subplots(1, 2, width_ratios=(2.2, 1.0), sharey=True)
+    handles = []
     for k, (name, (_, colour)) in enumerate(MODELS.items()):
         errors = [100 * np.abs(kept[f"breakaway {shape}"][name]) for shape in SHAPES]
         places = np.repeat(np.arange(len(SHAPES)) + 0.15 * (k - 2.0), len(errors[0]))
-        left.plot(
-            places,
-            np.maximum(np.concatenate(errors), 1e-3),
-            "o",
-            color=colour,
-            ms=3.5,
-            alpha=0.7,
-            label=TITLES.get(name, name),
-        )
+        role = next((r for r in style.MARKERS if r == colour), style.REDUCED)
+        look = {"color": colour, "marker": style.MARKERS[role], "mec": "white"}
+        drawn = np.maximum(np.concatenate(errors), 1e-3)
+        left.plot(places, drawn, ls="", ms=4.0, mew=0.3, alpha=0.8, **look)
         price = kept["prices"][name]["step"]
         worst = max(each.max() for each in errors)
-        right.plot(price, worst, "o", color=colour, ms=8)
-    left.set_xticks(range(len(SHAPES)), [shape.replace(" ", "\n") for shape in SHAPES])
+        handles += right.plot(price, worst, ls="", ms=7, **look, label=TITLES.get(name, name))  # fmt: skip
+    for edge in np.arange(0.5, len(SHAPES) - 1):
+        left.axvline(edge, color="0.9", lw=0.6)
+    names = [shape.replace(" ", "\n") for shape in SHAPES]
+    left.set_xticks(range(len(SHAPES)), names)
     left.set(yscale="log", ylabel="error of the slip-onset load [%]")
+    left.yaxis.set_major_formatter("{x:g}")
     right.set(xscale="log", xlabel="time of a step / 3-state model")
-    right.set_title("largest of all", fontsize="medium", loc="left")
-    right.annotate(
-        "better",
-        (0.06, 0.06),
-        (0.2, 0.16),
-        xycoords="axes fraction",
-        color="0.4",
-        arrowprops={"arrowstyle": "->"},
-    )
+    right.xaxis.set_major_formatter("{x:g}")
+    right.set_title("largest of all", loc="left")
+    right.margins(x=0.15)
     for axes in (left, right):
         style.tidy(axes)
+    left.grid(False, axis="x")
     figure.legend(
-        *left.get_legend_handles_labels(),
-        loc="outside upper center",
-        ncols=len(MODELS),
-        frameon=False,
+        handles=handles, loc="outside upper center", ncols=len(MODELS), frameon=False
     )
     return figure
 
@@ -487,7 +479,8 @@ def main() -> None:
         if (after := with_tables(before, kept)) != before:
             path.write_text(after, encoding="utf-8")
             print(f"{path.name}: new numbers")
-    draw(kept).savefig(PICTURE)
+    with style.paper():
+        draw(kept).savefig(PICTURE, dpi=160)
 
 
 if __name__ == "__main__":

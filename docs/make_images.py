@@ -12,11 +12,15 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import pyplot as plt
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.collections import PolyCollection
+from matplotlib.patches import Circle, PathPatch, Rectangle
 
 import planarfriction as pf
 from planarfriction import plots
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.plots import style, symbols
+from planarfriction.plots.motion import outline_of
+from planarfriction.plots.patch import cell_boxes
 
 LARGEST = 200_000
 """Largest size of a picture [bytes]."""
@@ -38,22 +42,25 @@ def figures() -> dict[str, plots.style.PlotFigure]:
     """The figures by the names of their files."""
     circle = PUBLISHED_PATCHES["Circle"]()
     pads = replace(PUBLISHED_PATCHES["NonConvex1"](), name="two pads")
-    models = {
-        "distributed": pf.DistributedModel(circle, LAW),
-        "reduced": pf.ReducedModel(circle, LAW),
-    }
     in_hand = {
-        name: pf.simulate(pf.scenes.in_hand(model)) for name, model in models.items()
+        model.__name__: pf.simulate(pf.scenes.in_hand(model(circle, LAW)))
+        for model in (pf.DistributedModel, pf.ReducedModel)
     }
+    beside = ["ellipsoid", pf.LimitSurfaceTablePublished(pads)]
+    motion = plots.plot_motion(in_hand["DistributedModel"], size=(5.5, 3.5))
     return {
-        "in-hand-motion": plots.plot_motion(in_hand["distributed"]),
-        "in-hand-histories": plots.plot_histories(in_hand),
-        "limit-surface": plots.plot_limit_surface(pf.LimitSurfaceExact(pads)),
+        "in-hand-motion": motion,
+        "in-hand-histories": plots.plot_histories(
+            in_hand, panels=("theta", "normal_force"), size=(5.5, 3.4)
+        ),
+        "limit-surface": plots.plot_sections(pf.LimitSurfaceExact(pads), beside=beside),
         "pre-sliding-cycles": pre_sliding_cycles(),
         "grip-plan": grip_plan(),
         "hold": hold(),
         "discs": discs(),
-        "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
+        "pressure-map": plots.plot_patch(
+            fingertip(), normal_force=5.0, size=(4.5, 3.0)
+        ),
         "concept-motions": motions(),
         "concept-bristle": bristle(),
         "over-an-edge": over_an_edge(),
@@ -61,73 +68,72 @@ def figures() -> dict[str, plots.style.PlotFigure]:
 
 
 def discs() -> plots.style.PlotFigure:
-    """Draw the discs that stand for three patches, the darker the more load they carry, over the cells."""
-    figure = plots.style.new_figure(9.0, 3.3)
+    """Draw the discs that stand for three patches, the darker the more load they carry, over outline or pressure."""
+    figure = plots.style.new_figure(style.PAGE, 2.6)
     circle, tee = (PUBLISHED_PATCHES[name]() for name in ("Circle", "NonConvex2"))
-    patches = {"a disc": circle, "a T": tee, "a fingertip": fingertip()}
-    for axes, (words, patch) in zip(
-        figure.subplots(1, 3), patches.items(), strict=True
-    ):
+    patches = {"disc": circle, "T": tee, "fingertip": fingertip()}
+    panels = figure.subplots(1, 3)
+    for axes, (words, patch) in zip(panels, patches.items(), strict=True):
         few = patch.discs(pf.ReducedModel.cells)
-        axes.plot(*1e3 * patch.positions.T, ".", color="0.6", ms=1.5)
+        boxes = 1e3 * cell_boxes(patch, patch.grid)
+        if words == "fingertip":
+            cells = PolyCollection(list(boxes), cmap=style.PRESSURE_MAP, alpha=0.55)
+            cells.set_array(patch.tile_weights(None) / patch.areas)
+            cells.set_clim(0.0, None)
+            axes.add_collection(cells)
+        else:
+            axes.add_patch(PathPatch(outline_of(boxes), fc=style.BODY, ec="none"))
         shares = few.weights() / few.weights().max()
         for centre, radius, share in zip(
             1e3 * few.positions, 1e3 * few.radii, shares, strict=True
         ):
-            axes.add_patch(
-                Circle(
-                    centre,
-                    radius,
-                    color=plots.style.OF_MODEL["reduced"],
-                    alpha=0.6 * share,
-                    lw=0.0,
-                )
-            )
-            axes.add_patch(Circle(centre, radius, fill=False, color="0.3", lw=0.6))
-        axes.set_title(
-            f"{words}: {few.cells} discs for {patch.cells} cells", fontsize="medium"
-        )
-        axes.set(aspect="equal", xticks=(), yticks=(), xlim=(-12, 12), ylim=(-12, 12))
-        axes.spines[:].set_visible(False)
+            look = {"color": style.REDUCED, "alpha": 0.6 * share, "lw": 0.0}
+            axes.add_patch(Circle(centre, radius, **look))
+            axes.add_patch(Circle(centre, radius, fill=False, ec=style.REDUCED, lw=0.7))
+        axes.set_title(f"{words}: {few.cells} discs for {patch.cells} cells")
+        axes.set(aspect="equal", xlim=(-12, 12), ylim=(-12.5, 11.5))
+        axes.axis("off")
+    symbols.scale_bar(panels[0], (-11.5, -12.0), 5.0, "5 mm")
     return figure
 
 
 def motions() -> plots.style.PlotFigure:
     """A pad that slides, turns about a point inside and spins: friction of each cell, and all of it together."""
-    pad = pf.ContactPatch.rectangle(0.03, 0.02, cells=12)
-    figure = plots.style.new_figure(9.0, 2.7)
+    pad = pf.ContactPatch.rectangle(0.03, 0.02, cells=8)
+    surface = pf.LimitSurfaceExact(pad)
+    figure = plots.style.new_figure(style.PAGE, 2.75)
+    grid = figure.add_gridspec(2, 3, height_ratios=(3.0, 1.0))
     twists = {
         "it slides": (1.0, 0.0, 0.0),
-        "it turns about the cross": (0.008, 0.0, 1.0),
+        "it turns about the ring": (0.008, 0.0, 1.0),
         "it spins": (0.0, 0.0, 1.0),
     }
-    for axes, (words, (vx, _, omega)) in zip(
-        figure.subplots(1, 3), twists.items(), strict=True
-    ):
+    corner = int(np.argmax(pad.positions @ [1.0, 1.0]))
+    for column, (words, (vx, _, omega)) in enumerate(twists.items()):
+        axes = figure.add_subplot(grid[0, column])
+        outline = {"fc": style.BODY, "ec": "0.6", "lw": 0.6}
+        axes.add_patch(Rectangle((-15.0, -10.0), 30.0, 20.0, **outline))
         x, y = 1e3 * pad.positions.T
         velocity = np.stack([vx - 1e-3 * omega * y, 1e-3 * omega * x])
-        away = -velocity / np.linalg.norm(velocity, axis=0)
-        axes.quiver(
-            x,
-            y,
-            *away,
-            color=plots.style.DISTRIBUTED,
-            scale=17,
-            width=0.006,
-            pivot="mid",
-        )
-        fx, _, tau = pf.LimitSurfaceExact(pad).wrench((vx, 0.0, omega))
-        axes.set_title(
-            f"{words}\nforce {abs(fx):.0%}, torque {abs(tau) / pad.contact_radius():.0%}",
-            fontsize="medium",
-        )
+        way = velocity / np.linalg.norm(velocity, axis=0)
+        for place, direction in zip(1e3 * pad.positions, -2.7 * way.T, strict=True):
+            symbols.friction(axes, place, direction, size=0.5)
+        symbols.velocity(axes, (x[corner], y[corner]), 6.0 * way[:, corner], size=1.2)
         if omega:
-            axes.plot(
-                0.0, 1e3 * vx / omega, "x", color=plots.style.PUBLISHED, ms=9, mew=2.5
-            )
-        axes.set(aspect="equal", xticks=(), yticks=(), xlim=(-18, 18), ylim=(-11, 11))
-        axes.add_patch(Rectangle((-15, -10), 30, 20, fill=False, color="0.6"))
-        axes.spines[:].set_visible(False)
+            symbols.centre_of_rotation(axes, (0.0, 1e3 * vx / omega))
+        axes.set_title(words)
+        axes.set(aspect="equal", xlim=(-19, 21), ylim=(-11.5, 15.0))
+        axes.axis("off")
+        fx, _, tau = surface.wrench((vx, 0.0, omega))
+        shares = 100.0 * np.array([abs(tau) / surface.contact_radius, abs(fx)])
+        below = figure.add_subplot(grid[1, column])
+        below.barh([0, 1], shares, color=style.REDUCED, height=0.6)
+        below.set_yticks([0, 1], ["torque", "force"] if not column else ["", ""])
+        for place, share in enumerate(shares):
+            below.text(share + 2.0, place, f"{share:.0f} %", va="center", fontsize=7)
+        below.set(xlim=(0.0, 118.0), xticks=(), ylim=(-0.6, 1.6))
+        below.grid(False)
+        below.spines[["bottom"]].set_visible(False)
     return figure
 
 
@@ -147,9 +153,9 @@ def bristle() -> plots.style.PlotFigure:
     twists = np.stack([speeds, 0.0 * speeds, 0.0 * speeds], axis=-1)
     force = -pf.derivatives.rollout(model, None, twists, 1.0, 1e-4).wrenches[:, 0]
     moved = 1e6 * np.cumsum(speeds) * 1e-4
-    figure = plots.style.new_figure(7.2, 3.2)
+    figure = plots.style.new_figure(5.5, 2.7)
     axes = figure.subplots()
-    axes.plot(moved, force, color=plots.style.DISTRIBUTED)
+    axes.plot(moved, force, color=style.REDUCED, linewidth=1.6)
     for words, at, text in (
         ("sticks: a spring", (18.0, 0.36), (30.0, 0.25)),
         ("breakaway", (38.0, 0.69), (45.0, 0.77)),
@@ -252,23 +258,28 @@ def small_cycles(
 def pre_sliding_cycles() -> plots.style.PlotFigure:
     """Small closed motions: the published reduced model ratchets and gives energy, discs do not."""
     law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, sigma_1=0.0, sigma_2=0.0)
-    figure = plots.style.new_figure(8.0, 3.2)
+    figure = plots.style.new_figure(style.PAGE, 2.7)
     force, energy = figure.subplots(1, 2)
-    for kind, mark in ((pf.ReducedModelPublished, ".-"), (pf.ReducedModel, "x-")):
+    words = {pf.ReducedModelPublished: "published", pf.ReducedModel: "ReducedModel"}
+    for kind, name in words.items():
         model = kind(PUBLISHED_PATCHES["Circle"](), law)
         fx, taken = small_cycles(model)
-        look = {
-            "color": plots.style.model_colour(model),
-            "label": kind.__name__,
-            "markersize": 5,
-        }
-        force.plot(fx, mark, **look)
-        energy.plot(1e9 * taken, mark, **look)
+        colour = style.model_colour(model)
+        look = {"color": colour, "marker": style.MARKERS[colour], "markersize": 3.5}
+        letters = {"color": style.LETTERS.get(colour, colour), "ha": "right"}
+        for axes, values in ((force, fx), (energy, 1e9 * taken)):
+            axes.plot(values, **look)
+            ours = kind is pf.ReducedModel
+            place = {
+                "xytext": (0, 5) if ours else (-12, -3),
+                "textcoords": "offset points",
+            }
+            axes.annotate(name, (len(values) - 1, values[-1]), **place, **letters)
     force.set(xlabel="cycles", ylabel="force left over, fx [N]")
     energy.set(xlabel="cycles", ylabel="energy that friction took [nJ]")
     for axes in (force, energy):
         plots.style.tidy(axes)
-        axes.legend()
+        axes.margins(y=0.14)
     return figure
 
 
@@ -291,9 +302,11 @@ def hold() -> plots.style.PlotFigure:
 def main(folder: Path) -> None:
     """Write every picture and say how large it is."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, figure in figures().items():
+    with style.paper():
+        drawn = figures()
+    for name, figure in drawn.items():
         path = folder / f"{name}.png"
-        figure.savefig(path, dpi=120, facecolor="white", metadata={"Software": None})
+        figure.savefig(path, dpi=160, facecolor="white", metadata={"Software": None})
         size = path.stat().st_size
         print(f"{name}.png: {size / 1000:.0f} kB")
         if size > LARGEST:

@@ -17,7 +17,13 @@ import numpy as np
 from make_moving import check_size
 
 import planarfriction as pf
-from planarfriction.joints import JointFriction, JointLog, Plant, identify_joint
+from planarfriction.joints import (
+    JointFit,
+    JointFriction,
+    JointLog,
+    Plant,
+    identify_joint,
+)
 from planarfriction.plots import style
 
 INERTIA, COULOMB, LOAD, SWING, FREQUENCY = 0.01, 0.8, 0.4, 0.1, 5.0
@@ -43,6 +49,9 @@ WAYS = {
 """Attributes of the joint, and its motor."""
 
 OURS = "elasto-plastic bristles"
+
+TOP = 60.0
+"""Largest angle that is drawn [mrad]."""
 
 
 def load(t: float) -> float:
@@ -86,12 +95,12 @@ def holds() -> style.PlotFigure:
         OURS: elasto_plastic()
     }
     each = round(1.0 / (FREQUENCY * DT))
-    figure = style.new_figure(6.4, 3.9)
+    figure = style.new_figure(5.5, 3.0)
     axes = figure.subplots()
     colours = dict(
-        zip(runs, (style.PUBLISHED, style.OTHER, style.DISTRIBUTED), strict=True)
+        zip(runs, (style.BUILT_IN, style.BUILT_IN, style.REDUCED), strict=True)
     )
-    for (name, run), line in zip(runs.items(), style.LINE_STYLES, strict=False):
+    for (name, run), line in zip(runs.items(), ("-", "--", "-"), strict=True):
         swings = run[each - 1 :: each]
         rate = (swings[-1] - swings[len(swings) // 2]) / (T_END / 2.0)
         words = (
@@ -100,18 +109,26 @@ def holds() -> style.PlotFigure:
             else f"below {1e6 * max(abs(rate), 1e-6):.0f} µrad/s"
         )
         print(f"{name}: {rate:.3g} rad/s")
-        axes.plot(DT * each * np.arange(1, len(swings) + 1), 1e3 * swings, ls=line, color=colours[name], lw=2.2,
-                  label=f"{name}: {words}")  # fmt: skip
-    axes.set(xlim=(0.0, T_END), ylim=(-3.0, 60.0))
-    axes.set_xlabel("time [s]", fontsize=13)
-    axes.set_ylabel("angle [mrad]", fontsize=13)
-    axes.tick_params(labelsize=12)
-    axes.legend(loc="upper right", fontsize=12.5, frameon=False)
+        time = DT * each * np.arange(1, len(swings) + 1)
+        axes.plot(time, 1e3 * swings, ls=line, color=colours[name], lw=1.8)
+        # Beside the curve, where it leaves the picture or ends.
+        last = int(np.argmax(1e3 * swings > TOP)) or len(swings) - 1
+        at = (time[last], min(1e3 * swings[last], TOP))
+        leaves = 1e3 * swings[last] > TOP
+        place = {"xytext": (8, -8) if leaves else (0, 5), "textcoords": "offset points"}
+        place |= {
+            "ha": "left" if leaves else "right",
+            "va": "top" if leaves else "bottom",
+        }
+        axes.annotate(f"{name}: {words}", at, color=colours[name], **place)
+    axes.set(xlim=(0.0, T_END), ylim=(-3.0, TOP))
+    axes.set(xlabel="time [s]", ylabel="angle [mrad]")
+    style.tidy(axes)
     return figure
 
 
-def from_torque() -> style.PlotFigure:
-    """Draw the fit of a noisy torque with six numbers of LuGre, the example of the page."""
+def from_torque() -> JointFit:
+    """Return the fit of a noisy torque with six numbers of LuGre, the example of the page."""
     t = 1e-3 * np.arange(12_000)
     fast = np.clip((t - 8.0) / 2.0, 0.0, 1.0)
     q = (
@@ -127,7 +144,7 @@ def from_torque() -> style.PlotFigure:
     torque += np.random.default_rng(0).normal(0.0, 0.01, len(t))
     return identify_joint(
         JointLog(t, q, torque=torque, name="ripples"), Plant(inertia=0.05)
-    ).plot()
+    )
 
 
 def main(folder: Path) -> None:
@@ -135,13 +152,12 @@ def main(folder: Path) -> None:
     from planarfriction_studies.measured.joints import fit_joints
 
     folder.mkdir(parents=True, exist_ok=True)
-    figures = {
-        "joint-torque": from_torque(),
-        "joint-holds": holds(),
-        "joint": fit_joints(progress=print).plot(),
-    }
+    fits = {"joint-torque": from_torque(), "joint": fit_joints(progress=print)}
+    with style.paper():
+        figures = {name: fit.plot() for name, fit in fits.items()}
+        figures["joint-holds"] = holds()
     for name, figure in figures.items():
-        figure.savefig(path := folder / f"{name}.png")
+        figure.savefig(path := folder / f"{name}.png", dpi=160)
         check_size(path)
 
 

@@ -18,7 +18,11 @@ from planarfriction.cli import main as planarfriction
 from planarfriction_studies.measured import TASKS
 
 MARK = re.compile(r"<!-- measured: (?P<task>.+?) -->\n\n(?:(?:\|.*\n)+\n)?")
-PICTURES = ("measured-slides.png", "measured-pushes.png")
+PICTURES = (
+    "measured-slides.png",
+    "measured-slides-paths.png",
+    "measured-pushes.png",
+)
 
 
 def scores(task: str, stored: Mapping[str, Any]) -> list[list[str]]:

@@ -67,24 +67,32 @@ def picture(measured: list[replayed_pushes.ReplayedPush]) -> None:
     plan = pf.planning.plan_push(
         slider, pf.planning.Pusher(0.4), (0.25, 0.08, 0.6), edges=[3]
     )
-    figure = style.new_figure(9.6, 4.2)
-    left, right = figure.subplots(1, 2)
-    draw_push(left, plan.push)
-    left.set_title("A planned push of a square", fontsize="medium")
     one = next(each for each in measured if each.name.endswith("3out_2 108"))
-    draw_push(right, one.by(pf.LimitSurfaceExact, samples=101))
-    closed = np.concatenate([one.outline, one.outline[:1]])
-    for pose, colour, words in (
-        (one.end, style.EXACT, "measured end"),
-        (one.by(pf.LimitSurfaceEllipsoid).end, style.ELLIPSOID, "end by the ellipsoid"),
-    ):
-        corners = pose[:2] + pf.geometry.rotate(closed, pose[2])
-        right.plot(
-            *(1e3 * corners.T), "--", color=colour, linewidth=1.2, zorder=6, label=words
-        )
-    right.legend(fontsize="small")
-    right.set_title("A measured push, followed from its start", fontsize="medium")
-    figure.savefig(Path(__file__).parent / "images" / "pushing.png", dpi=110)
+    with style.paper():
+        figure = style.new_figure(style.PAGE, 3.6)
+        left, right = figure.subplots(1, 2)
+        draw_push(left, plan.push)
+        draw_push(right, one.by(pf.LimitSurfaceExact, samples=101))
+        closed = np.concatenate([one.outline, one.outline[:1]])
+        for pose, colour, words, look in (
+            (one.end, style.MEASURED, "measured end", {"lw": 4.0, "zorder": 2}),
+            (
+                one.by(pf.LimitSurfaceEllipsoid).end,
+                style.ELLIPSOID,
+                "end by the ellipsoid",
+                {"lw": 1.3, "zorder": 6, "ls": style.LINES[style.ELLIPSOID]},
+            ),
+        ):
+            corners = 1e3 * (pose[:2] + pf.geometry.rotate(closed, pose[2]))
+            right.plot(*corners.T, color=colour, label=words, **look)
+        for axes, title in (
+            (left, "planned push of a square"),
+            (right, "measured push, predicted from its start"),
+        ):
+            place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 2}
+            axes.legend(**place, frameon=False)
+            axes.set_title(title, loc="left")
+        figure.savefig(Path(__file__).parent / "images" / "pushing.png", dpi=160)
 
 
 def main() -> None:

@@ -24,9 +24,6 @@ MARK = re.compile(
 )
 VERDICT = re.compile(r"<!-- verdict: (?P<name>.+?) -->\n\n(?:(?:[^\n#<!].*\n)+\n)?")
 
-SHRUNK = 0.6
-"""Pictures of the pages over those of the reports, whose dots are finer."""
-
 COST = {
     "in_hand.distributed": "in-hand run of 2 s, distributed",
     "in_hand.published": "in-hand run of 2 s, published reduced, load 1",
@@ -47,6 +44,11 @@ SECONDS = (("s", 1.0), ("ms", 1e3), ("µs", 1e6))
 
 LEFT_OUT = "tolerances of this report"
 """Columns whose heading begins so stay in the reports."""
+
+
+def few_colours(image: Image.Image) -> Image.Image:
+    """Return a picture in 128 colours; the median cut would repaint small marks of one role as those of another."""
+    return image.convert("RGB").quantize(128, method=Image.Quantize.FASTOCTREE)
 
 
 def markdown(table: Mapping[str, Any]) -> str:
@@ -197,10 +199,7 @@ def main(places: Sequence[Path]) -> None:
         picture = docs / "images" / drawn.name.replace("_", "-")
         if picture.exists():
             with Image.open(drawn) as image:
-                size = tuple(round(SHRUNK * side) for side in image.size)
-                image.convert("RGB").resize(size, Image.Resampling.LANCZOS).quantize(
-                    128
-                ).save(picture, optimize=True)
+                few_colours(image).save(picture, optimize=True)
             print(f"images/{picture.name}: {picture.stat().st_size / 1000:.0f} kB")
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 import planarfriction as pf
 import planarfriction.jax as pj
-from planarfriction.plots.style import PALETTE, new_figure, tidy
+from planarfriction.plots.style import SERIES, new_figure, tidy
 
 MASS, SIDE, GRAVITY = 0.5, 0.06, 9.81  # of the block [kg, m], [m/s^2]
 INERTIA = MASS * SIDE**2 / 6.0
@@ -105,7 +105,7 @@ def draw(times, states: State, forces: np.ndarray, file: Path) -> None:
     )
     for i, (label, values) in enumerate(rows):
         axes = figure.add_subplot(3, 1, i + 1)
-        axes.plot(times, values, color=PALETTE[i])
+        axes.plot(times, values, color=SERIES[i])
         axes.set_ylabel(label)
         axes.set_xlim(0.0, times[-1])
         tidy(axes)

@@ -24,10 +24,11 @@ from scipy.optimize import brentq
 import planarfriction as pf
 from planarfriction.plots.style import (
     DISTRIBUTED,
-    EXACT,
-    FEW,
-    PALETTE,
+    PAGE,
+    REDUCED,
+    REFERENCE,
     new_figure,
+    paper,
     tidy,
 )
 
@@ -88,7 +89,7 @@ def drift_of(solution: pf.Solution) -> float:
 def draw(
     slopes: np.ndarray, found: dict[str, list[float]], path: pf.Solution, slope: float
 ):
-    figure = new_figure(8.8, 3.8)
+    figure = new_figure(PAGE, 3.1)
     axes = figure.subplots(1, 2, width_ratios=[1.1, 1.25])
     x, y = 1e3 * path.data.x.values, 1e3 * path.data.y.values
     outline = 1e3 * np.vstack([path.scene.body.outline, path.scene.body.outline[:1]])
@@ -98,7 +99,7 @@ def draw(
         axes[0].plot(
             x[at] + outline[:, 0],
             y[at] + outline[:, 1],
-            color=PALETTE[6],
+            color="0.2",
             linewidth=1.0,
         )
         for offset in np.arange(-30.0, 31.0, 7.5):
@@ -107,38 +108,35 @@ def draw(
                 axes[0].plot(
                     x[at] + ends[:, 0],
                     y[at] + ends[:, 1],
-                    color=PALETTE[6],
+                    color="0.2",
                     linewidth=0.5,
                     alpha=0.5,
                 )
-    axes[0].plot(x, y, color=PALETTE[0], label="centre of the block")
+    axes[0].plot(x, y, color=DISTRIBUTED, label="centre of the block")
     far = 1.15 * np.hypot(x[-1], y[-1])
-    axes[0].plot(
-        [0.0, 0.0], [0.0, -far], color=PALETTE[6], linestyle=":", label="fall line"
-    )
+    axes[0].plot([0.0, 0.0], [0.0, -far], color="0.2", linestyle=":", label="fall line")
     angle = drift(slope)
     axes[0].plot(
         [0.0, far * np.sin(angle)],
         [0.0, -far * np.cos(angle)],
         "--",
-        color=EXACT,
+        color=REFERENCE,
         label="closed form",
         zorder=3,
     )
     axes[0].set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-40.0, 130.0))
-    axes[0].set_title(
-        f"slope {np.degrees(slope):.0f} deg, {path.data.time[-1]:.2f} s", fontsize=9
-    )
-    axes[0].legend(fontsize=8, loc="upper right")
+    axes[0].set_ylim(top=85.0)
+    axes[0].set_title(f"slope {np.degrees(slope):.0f}°, {path.data.time[-1]:.2f} s")
+    axes[0].legend(loc="upper right", frameon=False)
     fine = np.linspace(steepest_at_rest() + 1e-6, np.radians(62.0), 200)
     axes[1].plot(
         np.degrees(fine),
         np.degrees([drift(s) for s in fine]),
-        color=EXACT,
+        color=REFERENCE,
         label="closed form",
     )
     for (kind, values), mark, colour in zip(
-        found.items(), "ox", (DISTRIBUTED, FEW), strict=True
+        found.items(), "ox", (DISTRIBUTED, REDUCED), strict=True
     ):
         axes[1].plot(
             np.degrees(slopes),
@@ -152,12 +150,12 @@ def draw(
         10.0, np.degrees(steepest_at_rest()), color="0.9", label="stays at rest"
     )
     axes[1].set(
-        xlabel="slope [deg]",
-        ylabel="drift from the fall line [deg]",
+        xlabel="slope [°]",
+        ylabel="drift from the fall line [°]",
         xlim=(10.0, 62.0),
         ylim=(0.0, None),
     )
-    axes[1].legend(fontsize=8)
+    axes[1].legend(frameon=False)
     for ax in axes:
         tidy(ax)
     return figure
@@ -198,7 +196,8 @@ def main(arguments: list[str] | None = None) -> None:
         )
     options.out.mkdir(parents=True, exist_ok=True)
     path, slope = options.out / "grooved_incline.png", np.radians(25.0)
-    draw(slopes, found, slide(slope), slope).savefig(path)
+    with paper():
+        draw(slopes, found, slide(slope), slope).savefig(path, dpi=160)
     print(path)
 
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import planarfriction as pf
 from planarfriction.cli.console import print_table, work_progress
@@ -27,6 +26,7 @@ from planarfriction.identify import (
     identify_motion,
     predict_slide,
 )
+from planarfriction.plots import style
 from planarfriction_studies.measured import Case as Toss
 from planarfriction_studies.measured import slides as measured
 from planarfriction_studies.measured.scores import rms
@@ -176,18 +176,20 @@ def friction_of_each(slides: Sequence[Slide]) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def draw(speed: np.ndarray, mu: np.ndarray) -> Figure:
+def draw(speed: np.ndarray, mu: np.ndarray) -> style.PlotFigure:
     """Plot the friction of every slide against its initial speed."""
-    figure = Figure(figsize=(6.0, 3.6), dpi=110, layout="constrained")
-    axes = figure.add_subplot()
-    axes.plot(speed, mu, ".", color="#0072B2", markersize=5)
-    axes.axhline(
-        np.median(mu), color="0.4", linewidth=1.0, label=f"median {np.median(mu):.3f}"
-    )
-    axes.set(xlabel="initial speed [m/s]", ylabel="friction coefficient of the slide")
-    axes.legend(frameon=False)
-    axes.grid(True, color="0.9", linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
+    with style.paper():
+        figure = style.new_figure(5.5, 3.0)
+        axes = figure.add_subplot()
+        axes.plot(speed, mu, ".", color=style.MEASURED, markersize=5)
+        middle = np.median(mu)
+        axes.axhline(middle, color="black", linewidth=1.2)
+        place = {"xytext": (-4, 4), "textcoords": "offset points", "ha": "right"}
+        axes.annotate(f"median {middle:.3f}", (speed.max(), middle), **place)
+        axes.set(
+            xlabel="initial speed [m/s]", ylabel="friction coefficient of the slide"
+        )
+        style.tidy(axes)
     return figure
 
 

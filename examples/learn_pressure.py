@@ -29,7 +29,16 @@ import numpy as np
 import torch
 
 import planarfriction as pf
-from planarfriction.plots.style import PALETTE, PRESSURE_MAP, new_figure, tidy
+from planarfriction.plots.style import (
+    PAGE,
+    PRESSURE_MAP,
+    REDUCED,
+    REFERENCE,
+    SHADES,
+    new_figure,
+    paper,
+    tidy,
+)
 from planarfriction.torch import DistributedModel, rollout, tracking_loss
 
 CELLS, CELL = 8, 3e-3  # cells of a side, side of a cell [m]
@@ -134,7 +143,7 @@ def summary(truth: pf.ContactPatch, weights: np.ndarray) -> dict[str, float]:
 
 def draw(truth: pf.ContactPatch, rich: Learnt, poor: Learnt):
     """Plot three maps on one scale, and the misfits during the fit."""
-    figure = new_figure(10.5, 3.1)
+    figure = new_figure(PAGE, 2.3)
     axes = figure.subplots(1, 4, width_ratios=[1, 1, 1, 1.25])
     half = 0.5e3 * CELLS * CELL
     maps = {
@@ -151,27 +160,28 @@ def draw(truth: pf.ContactPatch, rich: Learnt, poor: Learnt):
             vmax=top,
             extent=(-half, half, -half, half),
         )
-        ax.set_title(title, fontsize=9)
+        ax.set_title(title)
         ax.set_xlabel("x [mm]")
+        ax.grid(False)
     axes[0].set_ylabel("y [mm]")
     figure.colorbar(
         image, ax=axes[:3].tolist(), label="load on a cell [%]", shrink=0.85
     )
     for learnt, label, colour in (
-        (rich, "many points", PALETTE[0]),
-        (poor, "one spin", PALETTE[1]),
+        (rich, "many points", REDUCED),
+        (poor, "one spin", SHADES[0]),
     ):
         axes[3].semilogy(np.sqrt(learnt.losses), color=colour, label=label)
     axes[3].axhline(
         np.sqrt(3) * NOISE * LAW.mu_c,
-        color=PALETTE[6],
+        color=REFERENCE,
         linewidth=0.8,
         linestyle="--",
         label="noise",
     )
     axes[3].set_xlabel("step of the optimiser")
     axes[3].set_ylabel("RMS misfit / load")
-    axes[3].legend(fontsize=8)
+    axes[3].legend(frameon=False)
     tidy(axes[3])
     return figure
 
@@ -211,7 +221,8 @@ def main(arguments: list[str] | None = None) -> None:
         )
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "learn_pressure.png"
-    draw(truth, rich, poor).savefig(path)
+    with paper():
+        draw(truth, rich, poor).savefig(path, dpi=160)
     print(path)
 
 

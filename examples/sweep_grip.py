@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 import planarfriction as pf
-from planarfriction import plots
+from planarfriction.plots import style
 
 PAD = pf.ContactPatch.disc(0.01, cells=15)
 OFFSET = 0.025
@@ -59,6 +59,10 @@ def run(points: int, folder: Path | None = None) -> xr.Dataset:
     return pf.sweep(plate, values, out=folder, measure=end, progress=print)
 
 
+SLIPS = (1.0, 5.0, 20.0)
+"""Slips that are drawn as contour lines [mm]."""
+
+
 def holding_grip(mu_s: np.ndarray) -> np.ndarray:
     """Smallest grip force of each of two fingers that holds the plate [N], from the limit surface of the pad."""
     weight = 9.81 * MASS
@@ -71,28 +75,31 @@ def holding_grip(mu_s: np.ndarray) -> np.ndarray:
 
 
 def draw(data: xr.Dataset) -> Any:
-    """Plot angle and slip against grip and friction, with the holding limit."""
-    figure = plots.style.new_figure(9.0, 3.6)
-    panels = figure.subplots(1, 2, sharey=True)
-    mu = np.linspace(float(data.mu_c[0]), float(data.mu_c[-1]), 200)
-    for axes, values, words in (
-        (panels[0], -np.degrees(data.angle), "angle turned in 0.5 s [deg]"),
-        (panels[1], 1e3 * data.slip, "slip of the pads in 0.5 s [mm]"),
-    ):
-        capped = values.transpose("mu_c", "grip").clip(
-            0.0, 90.0 if "angle" in words else 20.0
-        )
-        mesh = axes.pcolormesh(
-            data.grip, data.mu_c, capped, shading="nearest", rasterized=True
-        )
+    """Plot the angle against grip and friction, slip as contour lines, and the holding limit."""
+    with style.paper():
+        figure = style.new_figure(5.5, 3.4)
+        axes = figure.subplots()
+        mu = np.linspace(float(data.mu_c[0]), float(data.mu_c[-1]), 200)
+        turned = np.degrees(-data.angle.transpose("mu_c", "grip")).clip(0.0, 90.0)
+        look = {"cmap": style.PRESSURE_MAP, "shading": "nearest", "rasterized": True}
+        mesh = axes.pcolormesh(data.grip, data.mu_c, turned, **look)
+        words = "angle turned in 0.5 s [°]"
         figure.colorbar(mesh, ax=axes, label=words, extend="max")  # what is more is cut
-        axes.plot(holding_grip(RATIO * mu), mu, "w--", label="limit of holding")
+        slip = 1e3 * data.slip.transpose("mu_c", "grip")
+        levels = axes.contour(
+            data.grip, data.mu_c, slip, SLIPS, colors="white", linewidths=1.0
+        )
+        axes.clabel(levels, fmt="%g mm", fontsize=7)
+        axes.plot(holding_grip(RATIO * mu), mu, color="black", linewidth=1.6)
+        top = holding_grip(RATIO * mu[-1])
+        place = {"xytext": (5, -4), "textcoords": "offset points", "va": "top"}
+        axes.annotate("limit: to the right it holds", (top, mu[-1]), **place)
         axes.set(
             xlabel="grip of each finger [N]",
+            ylabel="friction coefficient mu_c",
             xlim=(float(data.grip[0]), float(data.grip[-1])),
         )
-    panels[0].set_ylabel("friction coefficient mu_c [-]")
-    panels[0].legend(loc="upper right", facecolor="tab:gray", labelcolor="white")
+        axes.grid(False)
     return figure
 
 
@@ -107,7 +114,7 @@ def main(arguments: list[str] | None = None) -> None:
         f"held or not, as the limit surface predicts: {int(agree.sum())} of {agree.size} runs"
     )
     path = options.out / "sweep_grip.png"
-    draw(data).savefig(path, dpi=120, facecolor="white", metadata={"Software": None})
+    draw(data).savefig(path, dpi=160, facecolor="white", metadata={"Software": None})
     print(f"wrote {path}")
 
 

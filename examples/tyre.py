@@ -30,7 +30,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
-from planarfriction.plots.style import PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import DISTRIBUTED, SHADES, PlotFigure, new_figure, tidy
 
 LOAD, MU = 4000.0, 0.9  # [N], [-]
 HALF_LENGTH, WIDTH = 0.06, 0.14  # a and the width of the patch [m]
@@ -172,12 +172,12 @@ def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
             degrees,
             found,
             "o",
-            color=PALETTE[1],
+            color=DISTRIBUTED,
             markersize=4,
             label="cells, convected",
         )
         axes.set(xlabel="slip angle [deg]", ylabel=label)
-        axes.legend(fontsize=8)
+        axes.legend()
     x = 1e3 * HALF_LENGTH * ((2.0 * np.arange(COLUMNS) + 1.0) / COLUMNS - 1.0)
     limit = (
         1.5
@@ -187,7 +187,7 @@ def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
         * (1.0 - (x / 1e3 / HALF_LENGTH) ** 2)
     )
     bent.plot(x, 1e3 * limit, color="0.6", linestyle="--", label="largest deflection")
-    for colour, angle in zip(PALETTE, (1.0, 3.0, 6.0), strict=False):
+    for colour, angle in zip(SHADES[1:], (1.0, 3.0, 6.0), strict=True):
         k = int(np.abs(degrees - angle).argmin())
         bent.plot(
             x,
@@ -210,8 +210,8 @@ def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
     for axes in (force, torque, bent, built):
         tidy(axes)
     bent.set_ylim(top=1.35e3 * float(limit.max()))
-    bent.legend(fontsize=8, ncols=2, loc="upper center")
-    built.legend(fontsize=8)
+    bent.legend(ncols=2, loc="upper center")
+    built.legend()
     return figure
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 import planarfriction as pf
-from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, new_figure
+from planarfriction.plots.style import ELLIPSOID, REDUCED, REFERENCE, new_figure
 from planarfriction.torch.reduced_planar import (
     ReducedPlanarLuGre,
     simulate,
@@ -134,11 +134,11 @@ axes = figure.subplots()
 axes.plot(
     time,
     1e3 * truth[:, 2],
-    color=DISTRIBUTED,
+    color=REDUCED,
     linewidth=2.6,
     label="distributed, the truth",
 )
-for name, colour in (("ellipsoid", ELLIPSOID), ("exact surface", EXACT)):
+for name, colour in (("ellipsoid", ELLIPSOID), ("exact surface", REFERENCE)):
     axes.plot(
         time,
         1e3 * fitted[name][:, 2],

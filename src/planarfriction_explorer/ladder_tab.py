@@ -11,7 +11,7 @@ import panel as pn
 from bokeh.models import ColumnDataSource, FixedTicker, NumeralTickFormatter
 from bokeh.plotting import figure
 
-from planarfriction.plots.style import DISTRIBUTED, FEW, OTHER, PUBLISHED, SECOND
+from planarfriction.plots.style import DISTRIBUTED, PUBLISHED, SHADES
 from planarfriction_explorer import looks
 from planarfriction_explorer.ladder import RUNGS, Rung, climb
 from planarfriction_explorer.live import Live, Task
@@ -22,7 +22,7 @@ _WORDS = (
     "to its opposite. The error is the root mean square difference from the distributed model."
 )
 
-_COLOURS = dict(zip(RUNGS, (DISTRIBUTED, SECOND, FEW, OTHER, PUBLISHED), strict=True))
+_COLOURS = dict(zip(RUNGS, (DISTRIBUTED, *SHADES[:0:-1], PUBLISHED), strict=True))
 
 _HEAD = (
     "model",

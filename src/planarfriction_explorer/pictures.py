@@ -11,7 +11,7 @@ from planarfriction import geometry
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceCells
 from planarfriction.plots.limit_surface import scaled_samples
-from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT
+from planarfriction.plots.style import ELLIPSOID, REDUCED, REFERENCE
 from planarfriction_explorer import looks
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.state import Answer, State
@@ -37,7 +37,7 @@ LEAST = 1e-9
 REACH = 0.4
 """Length of the arrow of a force of mu_c f_N, as a share of the width of the map."""
 
-COLOURS = {"friction": DISTRIBUTED, "surface": EXACT, "ellipsoid": ELLIPSOID}
+COLOURS = {"friction": REDUCED, "surface": REFERENCE, "ellipsoid": ELLIPSOID}
 """Colour of each wrench, the same in all pictures."""
 
 

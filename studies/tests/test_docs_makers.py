@@ -44,10 +44,6 @@ def explorer(made, folder, monkeypatch):
     made.pictures()
 
 
-def house(made, folder, monkeypatch):
-    made.draw().savefig(folder / "house.png")
-
-
 def images(made, folder, monkeypatch):
     simulate = pf.simulate
     # Tests of grips make that plan.
@@ -117,7 +113,7 @@ def joint(made, folder, monkeypatch):
 
 MAKERS = {
     f"make_{make.__name__}": make
-    for make in (beside, coverage, house, images, joint, measured, moving, pushing)
+    for make in (beside, coverage, images, joint, measured, moving, pushing)
 }
 SLOW = {"make_explorer": explorer}
 

@@ -219,7 +219,7 @@ def test_a_plan_draws_itself():
     figure = turning().plot()
     assert [axes.get_ylabel() for axes in figure.axes] == [
         "grip [N]",
-        "turn [deg]",
+        "turn [°]",
         "slide [mm]",
     ]
     assert len(figure.axes[1].lines) == 4  # three frictions and the goal
@@ -237,7 +237,7 @@ def test_a_plan_draws_itself():
     assert grip.lines[0].get_ydata()[-1] == pytest.approx(report.grip)
     assert grip.lines[1].get_ydata()[0] == pytest.approx(report.holding)
     assert [each.get_text() for each in turn.get_legend().get_texts()][1:] == [
-        "friction -5 %",
+        "friction \N{MINUS SIGN}5 %",
         "friction +5 %",
     ]
 

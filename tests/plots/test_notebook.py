@@ -135,5 +135,5 @@ def test_models_scenes_and_solutions_have_their_numbers(shown):
     )
     assert rows["end"] == f"(2.00, -1.25) mm, turned by {np.degrees(-0.075):.2f} deg"
     assert (
-        rows["status"] == "success: reached the end" and len(figure.axes[0].lines) == 13
+        rows["status"] == "success: reached the end" and len(figure.axes[0].lines) == 3
     )

@@ -12,6 +12,8 @@ import numpy as np
 import planarfriction as pf
 from planarfriction import derivatives
 
+plt.style.use("planarfriction.plots.print")
+
 patch = pf.ContactPatch.disc(0.01, cells=11)
 model = pf.ReducedModel(patch, pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9))
 

@@ -11,6 +11,8 @@ import matplotlib.pyplot as plt
 import planarfriction as pf
 from planarfriction.derivatives import scene_sensitivities
 
+plt.style.use("planarfriction.plots.print")
+
 law = pf.LuGre(
     mu_c=0.3, mu_s=0.3, sigma_0=1e4, sigma_1=20.0, sigma_2=0.0, elasto_plastic=0.9
 )
@@ -31,7 +33,7 @@ upper.set(ylabel="x [mm]")
 for i, name in enumerate(("friction", "size")):
     lower.plot(found.time, 10.0 * found.d_motion[:, 3, i], label=f"1 % more {name}")
 lower.set(xlabel="time [s]", ylabel="change of x [mm]")
-lower.legend(fontsize=8)
+lower.legend()
 
 # %%
 # More friction shortens the slide, a larger disc hardly changes it.

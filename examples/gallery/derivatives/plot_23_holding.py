@@ -12,6 +12,9 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction.planning import holding_load
+from planarfriction.plots import style
+
+plt.style.use("planarfriction.plots.print")
 
 pad = pf.ContactPatch.rectangle(0.018)
 weight = 0.5 * 0.2 * 9.81  # of a plate of 0.2 kg, on each of two fingers
@@ -25,9 +28,15 @@ exact = np.array(
 )
 ellipsoid = weight / 0.6 * np.hypot(1.0, levers / pad.contact_radius())
 figure, ax = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
-ax.plot(1e3 * levers, exact, label="exact")
-ax.plot(1e3 * levers, ellipsoid, "--", label="ellipsoid")
-ax.plot(1e3 * levers, np.full_like(levers, weight / 0.6), ":", label="force alone")
+ax.plot(1e3 * levers, exact, color="black", label="exact")
+ax.plot(1e3 * levers, ellipsoid, "-.", color=style.ELLIPSOID, label="ellipsoid")
+ax.plot(
+    1e3 * levers,
+    np.full_like(levers, weight / 0.6),
+    ":",
+    color="0.5",
+    label="force alone",
+)
 ax.set(xlabel="lever [mm]", ylabel="grip of a finger [N]")
 ax.legend()
 

@@ -13,6 +13,8 @@ import numpy as np
 import planarfriction as pf
 from planarfriction.identify import FitOptions, Log, identify_lugre
 
+plt.style.use("planarfriction.plots.print")
+
 patch = pf.ContactPatch.disc(0.01, cells=11)
 truth = pf.LuGre(
     mu_c=0.5,

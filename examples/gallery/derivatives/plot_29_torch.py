@@ -14,6 +14,8 @@ import torch
 import planarfriction as pf
 from planarfriction.torch import ReducedModel, rollout, tracking_loss
 
+plt.style.use("planarfriction.plots.print")
+
 torch.set_default_dtype(torch.float64)
 patch = pf.ContactPatch.disc(0.01, cells=11)
 truth = ReducedModel(

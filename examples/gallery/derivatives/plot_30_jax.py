@@ -15,6 +15,8 @@ import numpy as np
 import planarfriction as pf
 import planarfriction.jax as pj
 
+plt.style.use("planarfriction.plots.print")
+
 jax.config.update("jax_enable_x64", True)
 model = pj.ReducedModel(
     pf.ContactPatch.disc(0.01),
@@ -51,7 +53,7 @@ upper.set(ylabel="torque [N mm]")
 for name in ("sigma_0", "sigma_1", "mu_s", "mu_c"):
     lower.plot(time, 1e6 * change(name), label=name)
 lower.set(xlabel="time [ms]", ylabel="change with 1 % more [µN m]")
-lower.legend(fontsize=8)
+lower.legend()
 
 # %%
 # The same for the static coefficient by a difference:

@@ -10,6 +10,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import planarfriction as pf
+from planarfriction.plots import style
+
+plt.style.use("planarfriction.plots.print")
 
 patch = pf.ContactPatch.rectangle(0.02)
 law = pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_2=0.0, elasto_plastic=0.9)
@@ -24,7 +27,7 @@ force = np.hypot(wrenches[:, 0], wrenches[:, 1])
 figure, ax = plt.subplots(figsize=(4.6, 4.4), layout="constrained")
 ax.scatter(force, wrenches[:, 2] / r, s=4)
 angle = np.linspace(-np.pi / 2, np.pi / 2, 100)
-ax.plot(np.cos(angle), np.sin(angle), "k:", label="ellipsoid")
+ax.plot(np.cos(angle), np.sin(angle), "-.", color=style.ELLIPSOID, label="ellipsoid")
 ax.set(aspect="equal", xlabel="force [N]", ylabel="torque over contact radius [N]")
 ax.legend()
 

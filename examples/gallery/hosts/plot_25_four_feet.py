@@ -13,6 +13,8 @@ import numpy as np
 import planarfriction as pf
 from planarfriction.coupling import CoupledPatches, HostStep
 
+plt.style.use("planarfriction.plots.print")
+
 feet = [(0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03)]
 mass = np.array([0.2, 0.2, 2e-4])
 J = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in feet])

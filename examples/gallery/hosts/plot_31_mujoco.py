@@ -12,6 +12,9 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
+from planarfriction.plots import style
+
+plt.style.use("planarfriction.plots.print")
 
 PADS = "".join(
     f"""<body name="{side}" pos="{sign * 0.015} 0.012 0.5">
@@ -59,7 +62,7 @@ sides = {"left": ("pad left", "block"), "right": ("pad right", "block")}
 ours = heights([PatchContact(PAD, site=side, geoms=sides[side]) for side in sides])
 figure, ax = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
 time = 0.005 * np.arange(1, 401)
-ax.plot(time, 1e3 * own, label="MuJoCo's friction, condim 4")
+ax.plot(time, 1e3 * own, color=style.BUILT_IN, label="MuJoCo's friction, condim 4")
 ax.plot(time, 1e3 * ours, label="patches")
 ax.set(xlabel="time [s]", ylabel="height of the block [mm]")
 ax.legend()

@@ -12,6 +12,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 laws = {
     "LuGre": pf.LuGre(mu_c=0.5, mu_s=0.7, v_s=2e-3, sigma_2=0.6),
     "Dahl": pf.Dahl(mu_c=0.5),

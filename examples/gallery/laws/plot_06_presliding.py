@@ -12,6 +12,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 law = pf.LuGre(
     mu_c=0.5, mu_s=0.5, sigma_0=1e5, sigma_1=1.0, sigma_2=0.0, elasto_plastic=0.6
 )

@@ -10,6 +10,8 @@ import matplotlib.pyplot as plt
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 patch = pf.ContactPatch.disc(0.05, cells=11)
 
 # %%

@@ -12,7 +12,7 @@ from planarfriction.patch import PUBLISHED_PATCHES
 
 pads = PUBLISHED_PATCHES["NonConvex1"]()
 exact, ellipsoid = pf.LimitSurfaceExact(pads), pf.LimitSurfaceEllipsoid(pads)
-figure = pf.plots.plot_limit_surface(exact, beside=ellipsoid)
+figure = pf.plots.plot_sections(exact, beside=ellipsoid)
 
 # %%
 # How far the two are apart, over directions all around:

@@ -10,6 +10,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import planarfriction as pf
+from planarfriction.plots import style
+
+plt.style.use("planarfriction.plots.print")
 
 patches = {
     "disc": pf.ContactPatch.disc(0.01),
@@ -30,11 +33,11 @@ for name, patch in patches.items():
     )
     wrench = -surface.wrench(twists)
     ax.plot(wrench[:, 1], wrench[:, 2] / r, label=name)
-ax.plot(np.cos(mix), np.sin(mix), "k:", label="ellipsoid")
+ax.plot(np.cos(mix), np.sin(mix), "-.", color=style.ELLIPSOID, label="ellipsoid")
 ax.set(
     xlabel="force over mu f_N [-]", ylabel="torque over mu f_N r [-]", aspect="equal"
 )
-ax.legend(fontsize=8)
+ax.legend()
 
 # %%
 # Pure sliding has all the force, pure spin all the torque.

@@ -14,6 +14,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 line = pf.ContactPatch.line(0.02, cells=9)
 points = dataclasses.replace(line, radii=None)
 centres = np.linspace(-0.012, 0.012, 601)  # of rotation, along the line
@@ -31,7 +33,7 @@ for name, style, surface in (
 ):
     ax.plot(1e3 * centres, surface.wrench(twists)[:, 0], style, label=name)
 ax.set(xlabel="centre of rotation, y [mm]", ylabel="fx over mu f_N [-]")
-ax.legend(fontsize=8)
+ax.legend()
 
 # %%
 # Exact: the force is the share of the line on one side less that on the other.

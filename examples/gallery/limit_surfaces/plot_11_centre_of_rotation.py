@@ -11,6 +11,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import planarfriction as pf
+from planarfriction.plots import style, symbols
+
+plt.style.use("planarfriction.plots.print")
 
 box = pf.ContactPatch.rectangle(0.1)
 surface = pf.LimitSurfaceExact(box)
@@ -21,22 +24,18 @@ twists = surface.twist(-pushes)
 centres = np.stack([-twists[:, 1], twists[:, 0]], axis=1) / twists[:, 2:]
 
 # %%
-# Where it is pushed (triangles), and what it then turns about (dots of the same
-# colour):
-figure, ax = plt.subplots(figsize=(6.4, 3.4), layout="constrained")
-ax.add_patch(plt.Rectangle((-50, -50), 100, 100, fill=False))
-points = ax.scatter(*1e3 * centres.T, c=1e3 * offsets, cmap="viridis")
-ax.scatter(
-    1e3 * offsets,
-    np.full_like(offsets, -50),
-    c=1e3 * offsets,
-    cmap="viridis",
-    marker="^",
-)
-ax.set(
-    xlim=(-330, 80), ylim=(-70, 70), aspect="equal", xlabel="x [mm]", ylabel="y [mm]"
-)
-figure.colorbar(points, label="push at x [mm]", shrink=0.8)
+# Three of these pushes, as hollow arrows, and what the box then turns about:
+figure, ax = plt.subplots(figsize=(6.4, 2.6), layout="constrained")
+ax.add_patch(plt.Rectangle((-50, -50), 100, 100, fc=style.BODY, ec="0.4"))
+ax.plot(*1e3 * centres.T, color="0.6", zorder=1)
+for k in (1, 6, 23):
+    x, at = 1e3 * centres[k, 0], 1e3 * offsets[k]
+    symbols.load(ax, (at, -85), (0, 33))
+    symbols.centre_of_rotation(ax, (x, 0))
+    ax.annotate(f"{at:.0f} mm", (x, 9), ha="center")
+    ax.annotate(f"{at:.0f}", (at, -48), ha="center")
+ax.set(xlim=(-330, 80), ylim=(-90, 60), aspect="equal", xlabel="x [mm]")
+ax.set_ylabel("y [mm]")
 
 # %%
 # The further off the middle, the nearer the centre of rotation; it stays on the line

@@ -11,6 +11,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 metric = pf.friction_metric(np.radians(40.0), along=0.5, across=1.0)
 sole = pf.ContactPatch.rectangle(0.06, 0.04, 9).with_friction_metric(metric)
 heading = np.radians(np.arange(0, 360, 5))
@@ -34,7 +36,7 @@ for i in range(0, 72, 6):
     )
 ax.plot([], [], color="0.7", label="direction of sliding")
 ax.set(aspect="equal", xlabel="fx over mu f_N [-]", ylabel="fy over mu f_N [-]")
-ax.legend(loc="upper left", fontsize=8)
+ax.legend(loc="upper left")
 
 # %%
 # Along the grooves half of the friction is left.

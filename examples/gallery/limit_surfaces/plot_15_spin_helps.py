@@ -11,6 +11,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 surface = pf.LimitSurfaceExact(pf.ContactPatch.disc(0.05))
 ratio = np.geomspace(0.01, 100.0, 81)  # rim speed over sliding speed
 twists = np.stack([np.ones_like(ratio), 0 * ratio, ratio / 0.05], axis=1)

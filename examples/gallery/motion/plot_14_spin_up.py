@@ -12,6 +12,9 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.plots import style
+
+plt.style.use("planarfriction.plots.print")
 
 patch = PUBLISHED_PATCHES["NonConvex1"]().refined(3)
 law = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
@@ -30,11 +33,12 @@ figure, ax = plt.subplots(figsize=(6.4, 3.8), layout="constrained")
 torque = {}
 for name, model in models.items():
     torque[name] = -1e3 * pf.rollout(model, None, twists, 1.0, dt).wrenches[:, 2]
-    ax.plot(1e3 * time, torque[name], label=name)
+    colour = style.SHADES[0] if "8" in name else style.model_colour(model)
+    ax.plot(1e3 * time, torque[name], color=colour, label=name)
 ax.set(
     xlim=(5.0, 9.0), ylim=(8.5, 10.8), xlabel="time [ms]", ylabel="torque [N mm] at 1 N"
 )
-ax.legend(fontsize=8)
+ax.legend()
 
 # %%
 # Largest distance from the distributed model:

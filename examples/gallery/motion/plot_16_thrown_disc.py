@@ -11,6 +11,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 law = pf.LuGre(
     mu_c=0.3, mu_s=0.3, sigma_0=1e5, sigma_1=20.0, sigma_2=0.0, elasto_plastic=0.9
 )
@@ -30,7 +32,7 @@ for speed, spin in ((1.0, 5.0), (0.3, 25.0), (0.1, 25.0), (0.7, 15.0)):
     ax.loglog(slide[moving], rim[moving], label=f"{speed} m/s, {spin:.0f} rad/s")
 ax.loglog([5e-3, 1.0], [5e-3 / 0.653, 1.0 / 0.653], "k:", label="0.653")
 ax.set(xlabel="speed [m/s]", ylabel="speed of the rim from spin [m/s]", aspect="equal")
-ax.legend(fontsize=8)
+ax.legend()
 
 # %%
 # All paths bend towards one line, on which the speed is 0.653 of that of the rim

@@ -10,6 +10,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import planarfriction as pf
+from planarfriction.plots import style
+
+plt.style.use("planarfriction.plots.print")
 
 law = pf.LuGre(mu_c=0.8, mu_s=0.8, sigma_0=1e5, sigma_1=3e2, elasto_plastic=0.9)
 model = pf.ReducedModel(pf.ContactPatch.disc(0.01, cells=11), law)
@@ -34,13 +37,13 @@ data = pf.sweep(
 )
 
 # %%
-# Bright: the plate turns, as the grip is too weak for it.
+# Dark: the plate turns, as the grip is too weak for it.
 figure, ax = plt.subplots(figsize=(6.2, 3.8), layout="constrained")
 picture = ax.pcolormesh(
-    data.grip, data.mass, data.turned.T, cmap="viridis", shading="nearest"
+    data.grip, data.mass, data.turned.T, cmap=style.PRESSURE_MAP, shading="nearest"
 )
 ax.set(xlabel="grip [N]", ylabel="mass [kg]")
-figure.colorbar(picture, label="turned within 0.15 s [deg]")
+figure.colorbar(picture, label="turned within 0.15 s [°]")
 
 # %%
 # Harder grips hold heavier plates.

@@ -11,6 +11,8 @@ import matplotlib.pyplot as plt
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 law = pf.LuGre(mu_c=1.0, mu_s=1.5, v_s=1e-3, sigma_0=1e5, sigma_1=1e5**0.5, sigma_2=0.4)
 model = pf.DistributedModel(pf.ContactPatch.points([[0.0, 0.0]]), law)
 table = pf.Contact(model, 1.0, mounted_on="body")
@@ -30,7 +32,7 @@ figure, (place, force) = plt.subplots(
 place.plot(data.time, data.x, label="mass")
 place.plot(data.time, end(data.time.values)[:, 0], "k:", label="end of the spring")
 place.set(ylabel="displacement [m]")
-place.legend(fontsize=8)
+place.legend()
 force.plot(data.time, -data.fx[:, 0])
 force.set(xlabel="time [s]", ylabel="friction [N]")
 

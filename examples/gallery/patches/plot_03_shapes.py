@@ -12,6 +12,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 area = 1e-4  # of each [m^2]
 side = np.sqrt(area)
 patches = [
@@ -36,12 +38,12 @@ figure, axes = plt.subplots(
 for ax, patch in zip(axes.flat, patches, strict=True):
     at = 1e3 * (patch.positions - patch.centre_of_pressure())
     size, radius = 600 * patch.weights() ** 0.5, 1e3 * patch.contact_radius()
-    ax.scatter(*at.T, s=size, color="tab:blue", alpha=0.6, edgecolor="none")
+    ax.scatter(*at.T, s=size, color="0.6", edgecolor="none")
     ax.add_patch(
-        plt.Circle((0, 0), radius, fill=False, color="tab:red", lw=2, zorder=3)
+        plt.Circle((0, 0), radius, fill=False, color="black", ls="--", zorder=3)
     )
     ax.set(title=f"{patch.name}: {radius:.1f} mm", aspect="equal")
-figure.supxlabel("x [mm], contact radius in red")
+figure.supxlabel("x [mm], dashed: contact radius")
 
 # %%
 # A disc of radius R has 2R/3.

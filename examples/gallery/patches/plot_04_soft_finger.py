@@ -11,6 +11,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 finger = pf.SoftFinger(c=0.005, n=1 / 3, k=2.0, radius_max=0.02)
 patch = pf.ContactPatch.disc(0.012, cells=61, pressure=finger)
 loads = np.geomspace(0.5, 8.0, 25)

@@ -11,6 +11,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 x, y = np.meshgrid(np.arange(-6, 7) * 1e-3, np.arange(6, -7, -1) * 1e-3)
 light = np.maximum(1.0 - (x**2 + y**2) / 0.003**2, 0.0)
 heavy = np.sqrt(np.maximum(1.0 - (x**2 + (y - 1e-3) ** 2) / 0.005**2, 0.0))

@@ -12,6 +12,8 @@ import numpy as np
 
 import planarfriction as pf
 
+plt.style.use("planarfriction.plots.print")
+
 shape = np.zeros((20, 20))
 shape[:, :5] = shape[15:, :] = 1.0
 patch = pf.ContactPatch.from_pressure(shape, cell_size=1e-3)

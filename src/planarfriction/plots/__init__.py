@@ -13,6 +13,7 @@ from planarfriction.plots.limit_surface import (
 )
 from planarfriction.plots.motion import plot_motion, plot_solution
 from planarfriction.plots.patch import plot_patch
+from planarfriction.plots.sections import plot_sections
 
 __all__ = [
     "animate_solution",
@@ -21,6 +22,7 @@ __all__ = [
     "plot_limit_surface",
     "plot_motion",
     "plot_patch",
+    "plot_sections",
     "plot_solution",
 ]
 __dir__ = __all__.copy

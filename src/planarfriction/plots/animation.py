@@ -254,7 +254,7 @@ class Film:
                 (0, 0),
                 (1, 1),
                 arrowstyle="-|>,head_length=5,head_width=2.5",
-                color=style.PALETTE[2],
+                color=style.REDUCED,
                 linewidth=2.2,
                 shrinkA=0,
                 shrinkB=0,
@@ -282,7 +282,7 @@ class Film:
             f"friction on the body (longest {unit.factor * largest:.3g} {unit.label})"
         )
         handles: list[Any] = [
-            Line2D([], [], color=style.PALETTE[2], linewidth=2.2, label=words),
+            Line2D([], [], color=style.REDUCED, linewidth=2.2, label=words),
             self.centre,
         ]
         if len(contacts) > 1:  # one has its colours beside its cells

@@ -244,7 +244,7 @@ def _draw_panel(
     least = LEAST_SPAN * unit.factor * max(np.abs(values).max() for values in alike)
     span = max(1.1 * (high - low), least) or 1.0
     axes.set_ylim(0.5 * (low + high - span), 0.5 * (low + high + span))
-    axes.set_ylabel(f"{title} [{unit.label}]")
+    axes.set_ylabel(style.with_unit(title, unit))
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.margins(x=0.01)
     style.tidy(axes)
@@ -252,19 +252,19 @@ def _draw_panel(
 
 def _colours(solutions: Sequence[pf.Solution]) -> list[Any]:
     """Choose colours: one per model if all models differ, otherwise in order."""
-    if len(solutions) > len(style.PALETTE):
+    if len(solutions) > len(style.SERIES):
         return list(style.TIME_COLOURS(np.linspace(0.0, 1.0, len(solutions))))
     own = [
         each.scene and style.model_colour(each.scene.contacts[0].model)
         for each in solutions
     ]
     different = None not in own and len(set(own)) == len(own)
-    return own if different else list(style.PALETTE[: len(solutions)])
+    return own if different else list(style.SERIES[: len(solutions)])
 
 
 def _look(run: int, contact: int, colours: list[Any]) -> dict[str, Any]:
     # Later runs are drawn dashed over the earlier ones, so that curves that coincide are both seen.
-    many = len(colours) > len(style.PALETTE)
+    many = len(colours) > len(style.SERIES)
     which = contact if many else run + contact
     line = style.LINE_STYLES[which % len(style.LINE_STYLES)]
     width = 0.9 if many else None
@@ -282,7 +282,7 @@ def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
         for label, data in runs.items()
     ]
     title = None
-    if len(table) > len(style.PALETTE):
+    if len(table) > len(style.SERIES):
         some = style.evenly(len(table), NAMED)
         title = f"{len(some)} of {len(table)} runs, coloured in their order"
         table = [table[each] for each in some]

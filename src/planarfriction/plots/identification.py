@@ -116,8 +116,8 @@ def _draw_channel(
     shown = _unit_of(result, i)
     for number, (each, time) in enumerate(zip(result.histories, places, strict=True)):
         for key, words, colour, width in (
-            ("measured", "measured", "0.6", 2.2),
-            ("predicted", "fitted", style.PALETTE[0], 0.9),
+            ("measured", "measured", style.MEASURED, 2.2),
+            ("predicted", "fitted", style.REDUCED, 0.9),
         ):
             values = shown.factor * each[key][:, i]
             label = words if number == 0 else None
@@ -125,13 +125,13 @@ def _draw_channel(
         off = (each["measured"][:, i] - each["predicted"][:, i]) / result.noise[i]
         every = max(1, len(time) // MOST_POINTS)
         right.plot(
-            time[::every], off[::every], ".", color=style.PALETTE[0], markersize=1.5
+            time[::every], off[::every], ".", color=style.REDUCED, markersize=1.5
         )
         beyond = np.abs(off) > MOST_NOISE
         for sign, marker in ((1.0, "^"), (-1.0, "v")):
             there = time[beyond & (sign * off > 0.0)][::every]
             rim = np.full(len(there), 0.96 * sign * MOST_NOISE)
-            right.plot(there, rim, marker, color=style.PALETTE[1], markersize=2.5)
+            right.plot(there, rim, marker, color=style.REDUCED, markersize=2.5)
     right.axhspan(-2.0, 2.0, color="0.92", zorder=0)
     left.set_ylabel(f"{name} [{shown.label}]")
     style.tidy(left, right)
@@ -149,12 +149,19 @@ def _draw_speeds(axes: Any, result: pf.identify.Identification) -> None:
         return
     every = max(1, len(speed) // MOST_POINTS)
     slides = 1e3 * speed[::every]
-    axes.plot(slides, coefficient[::every], ".", color="0.6", ms=2.0, label="measured")
+    axes.plot(
+        slides,
+        coefficient[::every],
+        ".",
+        color=style.MEASURED,
+        ms=2.0,
+        label="measured",
+    )
     law = result.law
     grid = np.geomspace(max(speed.min(), 1e-4 * speed.max()), speed.max(), 200)
     steady = formulas.stribeck(np, grid, law) + law.sigma_2 * grid
     axes.plot(
-        1e3 * grid, steady, color=style.PALETTE[1], label="fitted law, steady sliding"
+        1e3 * grid, steady, color=style.REDUCED, label="fitted law, steady sliding"
     )
     axes.set(xscale="log", xlabel="sliding speed [mm/s]", ylabel="friction / load [-]")
     axes.set_ylim(0.0, 1.1 * max(steady.max(), np.quantile(coefficient, 0.995)))
@@ -172,7 +179,7 @@ def _draw_correlations(axes: Any, result: pf.identify.Identification) -> None:
     lags = 1e3 * step * np.arange(len(values))
     for i, (name, _) in enumerate(result.channels):
         if values[:, i].any():
-            axes.plot(lags, values[:, i], color=style.PALETTE[i], label=name)
+            axes.plot(lags, values[:, i], color=style.SERIES[i], label=name)
     axes.set(xlabel="lag [ms]", ylabel="correlation of residuals [-]")
     axes.legend(frameon=False, fontsize="small")
     style.tidy(axes)
@@ -192,9 +199,9 @@ def _draw_held_out(axes: Any, result: pf.identify.Identification, i: int) -> Non
     shown = unit_for(KINDS[unit], pairs[0])
     pairs = shown.factor * pairs
     every = max(1, pairs.shape[1] // MOST_POINTS)
-    axes.plot(*pairs[:, ::every], ".", color="0.6", markersize=2.0)
+    axes.plot(*pairs[:, ::every], ".", color=style.MEASURED, markersize=2.0)
     edges = [pairs[0].min(), pairs[0].max()]
-    axes.plot(edges, edges, color=style.PALETTE[1], linewidth=0.9, zorder=1)
+    axes.plot(edges, edges, color=style.REFERENCE, linewidth=0.9, zorder=1)
     axes.set(
         xlabel=f"measured {name} [{shown.label}]",
         ylabel=f"held-out prediction [{shown.label}]",
@@ -222,8 +229,11 @@ def _draw_loops(
         since = since - since[np.maximum(last - 1, 0)]
         near = np.where(np.abs(since) <= longest, since, np.nan)
         for key, look in (
-            ("measured", {"color": "0.6", "ls": "none", "marker": ".", "ms": 2.0}),
-            ("predicted", {"color": style.PALETTE[0], "lw": 0.8}),
+            (
+                "measured",
+                {"color": style.MEASURED, "ls": "none", "marker": ".", "ms": 2.0},
+            ),
+            ("predicted", {"color": style.REDUCED, "lw": 0.8}),
         ):
             values = force.factor * each[key][:, i]
             over_speed.plot(speed, values, **look)
@@ -242,23 +252,23 @@ SHARES = (0.0, 0.5, 1.0)
 def plot_joint(fit: Any) -> style.PlotFigure:
     """Draw the log that gains most from the fit, what is left of it, and friction over speed by load.
 
-    Grey is the fit of Coulomb and viscous friction alone. Friction over speed is left out while the fit has a term that
-    the logs do not show.
+    Orange is the fit of Coulomb and viscous friction alone, which simulators have. Friction over speed is left out
+    while the fit has a term that the logs do not show.
     """
     gains = [np.abs(each.baseline - each.measured).mean() - np.abs(each.fitted - each.measured).mean()
              for each in fit.series]  # fmt: skip
     series = fit.series[int(np.argmax(gains))]
     what = "angle" if fit.unit == "rad" else "torque"
-    figure = style.new_figure(9.6, 5.4)
+    figure = style.new_figure(7.4, 4.4)
     grid = figure.add_gridspec(2, 2, height_ratios=[1.4, 1.0], width_ratios=[1.6, 1.0])
     upper = figure.add_subplot(grid[0, 0])
     lower = figure.add_subplot(grid[1, 0], sharex=upper)
     side = figure.add_subplot(grid[:, 1])
     words = f"measured, {series.name}"
-    upper.plot(series.time, series.measured, color=style.EXACT, lw=1.0, label=words)
+    upper.plot(series.time, series.measured, color=style.MEASURED, lw=3.0, label=words)
     runs = (
-        (series.baseline, style.MEASURED, "Coulomb + viscous"),
-        (series.fitted, style.DISTRIBUTED, "fit"),
+        (series.baseline, style.BUILT_IN, "Coulomb + viscous"),
+        (series.fitted, style.REDUCED, "fit"),
     )
     for run, colour, name in runs:
         upper.plot(series.time, run, color=colour, lw=1.2, label=name)
@@ -294,7 +304,7 @@ def _plot_levels(fit: Any, axes: Any) -> None:
     pushed = max(float(np.abs(each).max()) for each in motor)
     shares = SHARES if friction.load_motor or friction.load_external else SHARES[:1]
     for share, colour, line in zip(
-        shares, style.PALETTE, style.LINE_STYLES, strict=False
+        shares, style.SHADES[::-1], style.LINE_STYLES, strict=False
     ):
         load = friction.load(share * pushed, -share * pushed)
         label = f"held load {share * pushed:.2g} N m"

@@ -127,7 +127,7 @@ def _sampled(
     validation.instance(
         "surface", surface, pf.limit_surface.LimitSurface, "a limit surface"
     )
-    shown = {f"{surface.patch.name}: {_kind(surface)}": surface}
+    shown = {f"{surface.patch.name}: {kind_of(surface)}": surface}
     if beside is not None:
         if isinstance(beside, str) and beside == "ellipsoid":
             beside = pf.LimitSurfaceEllipsoid(
@@ -135,7 +135,7 @@ def _sampled(
             )
         words = 'a limit surface, "ellipsoid" or None'
         validation.instance("beside", beside, pf.limit_surface.LimitSurface, words)
-        shown[_kind(beside)] = beside
+        shown[kind_of(beside)] = beside
     scaled = [scaled_samples(each, *even_mesh(each)) for each in shown.values()]
     return [*shown], scaled, 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
 
@@ -180,7 +180,8 @@ def scaled_samples(
     ) / scale
 
 
-def _kind(surface: Any) -> str:
+def kind_of(surface: Any) -> str:
+    """Return the words for the kind of a surface."""
     name = SURFACES.name_of(surface)
     return (name and SURFACES.words(name)) or type(surface).__name__
 
@@ -218,6 +219,7 @@ def draw_surface(
         linewidth=0,
         antialiased=False,
         shade=False,
+        rasterized=True,  # thousands of facets
     )
     narrow = style.axes_width(axes) < 0.5 * style.NARROW
     ticks = [-1.0, 0.0, 1.0] if narrow else [-1.0, -0.5, 0.0, 0.5, 1.0]

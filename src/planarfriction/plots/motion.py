@@ -1,11 +1,13 @@
-"""Motion of the body in the plane: a strobe of its outline with the contact patches."""
+"""Motion of the body in the plane: three outlines with the contact patches, and the path between them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
@@ -16,14 +18,26 @@ import planarfriction as pf
 from planarfriction import geometry
 from planarfriction._support import validation
 from planarfriction._support.shown import unit_for
-from planarfriction.plots import style
+from planarfriction.plots import style, symbols
 from planarfriction.plots.histories import draw_histories
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import body_poses
 from planarfriction.scenes.contact import contact_poses
 
-INSTANTS = 12
-"""Number of outlines in a strobe."""
+INSTANTS = 3
+"""Number of outlines: at the start, half-way and at the end."""
+
+ROOM = 0.3
+"""Share of the side of the view for the words beside the outlines."""
+
+APART = 0.07
+"""Least distance of these words over each other, as a share of the side of the view."""
+
+MASS = 0.018
+"""Radius of the mark of the centre of mass, as a share of the side of the view."""
+
+PIECES = 200
+"""Most pieces of a path that is coloured by time."""
 
 PAD_OPACITY = 0.35
 """Opacity of contact patches, so that those of a strobe show through each other."""
@@ -47,13 +61,14 @@ CORNERS = 12
 def plot_motion(
     solution: pf.Solution, *, size: Any = None, ax: Any = None
 ) -> style.PlotFigure:
-    """Draw the outline of the body and the patches at 12 instants, evenly spaced in time and coloured by time.
+    """Draw the body and its patches at the start, half-way and at the end, and the path of its centre of mass.
 
-    World axes, equal scales. Patches fixed to the world are drawn once; patches on the body, and pads that are driven,
-    at each instant. A body without an outline is drawn as the rim of its patches, with a line from its centre of mass
-    along its x axis. The thin line is the path of the centre of mass. A body that is tiny beside its path is drawn
-    larger, and the title says so, as it does where the body hardly moves. `size` is the width and the height of the
-    figure [inch]; `ax` are axes to draw into instead of a new figure.
+    World axes, equal scales. The path is coloured by time; the outlines, in the colours of their instants, are labelled
+    with time and turn. Half-way is where half of the motion is done. Patches fixed to the world are drawn once; patches
+    on the body, and pads that are driven, at each instant. A body without an outline is drawn as the rim of its
+    patches, with a line from its centre of mass along its x axis. A body that is tiny beside its path is drawn larger,
+    and the title says so, as it does where the body hardly moves. `size` is the width and the height of the figure
+    [inch]; `ax` are axes to draw into instead of a new figure.
 
     Raises InvalidValueError for what is not a solution of a scene, and for a wrong size or axes.
     """
@@ -105,7 +120,7 @@ def _strobe(solution: pf.Solution) -> _Strobe:
     validation.instance("solution", solution, pf.Solution, "a Solution")
     time = solution.histories["time"].values
     poses = body_poses(solution)
-    chosen = style.evenly(len(time), INSTANTS)
+    chosen = instants(poses, _reach(solution))
     limits = _limits(solution, time[chosen], poses[chosen], 1.0)
     side = 1e-3 * float(np.diff(limits, axis=-1).max())
     size = 2.0 * _reach(solution)
@@ -114,6 +129,16 @@ def _strobe(solution: pf.Solution) -> _Strobe:
         larger = float(f"{SEEN * side / size:.1g}")
         limits = _limits(solution, time[chosen], poses[chosen], larger)
     return _Strobe(solution, time[chosen], poses[chosen], poses, larger, limits)
+
+
+def instants(poses: np.ndarray, reach: float) -> np.ndarray:
+    """Return the indices of the first pose, of that at which half of the motion is done, and of the last."""
+    x, y, turn = np.diff(poses, axis=0).T
+    done = np.cumsum(np.hypot(np.hypot(x, y), reach * turn))
+    if not len(done) or done[-1] == 0.0:
+        return style.evenly(len(poses), INSTANTS)
+    half = 1 + int(np.searchsorted(done, 0.5 * done[-1]))
+    return np.unique([0, half, len(poses) - 1])
 
 
 def _draw(axes: Any, strobe: _Strobe) -> None:
@@ -137,20 +162,68 @@ def _draw(axes: Any, strobe: _Strobe) -> None:
             at = contact_poses(contact, np.array([time]), pose)[0]
             move([_draw_shape(axes, _pad_shape(contact), colour)], axes, at)
     for contact in (each for each in pads if each.support_velocity is None):
-        _draw_shape(axes, _on_mount(contact), style.PAD_COLOUR)
+        _draw_shape(axes, _on_mount(contact), style.PAD)
     style.show_lengths(axes, 1e-3 * float(np.abs(strobe.limits).max()))
     axes.locator_params(nbins=style.ticks(axes, 7))
-    axes.update_datalim(strobe.limits.T)
+    room = ROOM * float(np.diff(strobe.limits, axis=-1).max())
+    axes.update_datalim(strobe.limits.T + np.array([[0.0, 0.0], [room, 0.0]]))
     axes.margins(0.0)
     axes.set_aspect("equal", adjustable="datalim")  # narrow motions fill the panel too
     style.tidy(axes)
-    axes.plot(*(1e3 * strobe.path[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
-    dots = {"s": 14, "edgecolor": "white", "linewidth": 0.5, "zorder": 5}
-    colours = style.TIME_COLOURS(scale(times))
-    axes.scatter(*(1e3 * strobe.poses[:, :2].T), color=colours, **dots)
+    draw_path(axes, strobe.solution.histories["time"].values, strobe.path, scale)
+    side = float(np.diff(strobe.limits, axis=-1).max())
+    for pose in strobe.poses:
+        symbols.centre_of_mass(axes, 1e3 * pose[:2], MASS * side)
+    lines = [strobe.larger * each for each in body_lines(solution)]
+    body = np.concatenate(lines or [np.zeros((1, 2))])
+    corners = [1e3 * placed(body, pose) for pose in strobe.poses]
+    turns = strobe.poses[:, 2] - strobe.path[0, 2]
+    label_poses(axes, times, turns, corners, side, scale)
     axes.set_title(_remark(strobe), fontsize="small", loc="left")
-    if times[-1] > times[0]:
-        style.show_times(axes, times)
+
+
+def draw_path(axes: Any, time: np.ndarray, poses: np.ndarray, scale: Any) -> None:
+    """Draw the path of a body [mm], coloured by time on a `scale`."""
+    some = style.evenly(len(time), PIECES)
+    places = 1e3 * poses[some, :2]
+    pieces = np.stack([places[:-1], places[1:]], axis=1)
+    colours = style.TIME_COLOURS(scale(0.5 * (time[some][1:] + time[some][:-1])))
+    look = {"linewidth": 2.2, "capstyle": "round", "zorder": 4}
+    axes.add_collection(LineCollection(list(pieces), colors=colours, **look))
+
+
+def label_poses(
+    axes: Any,
+    times: np.ndarray,
+    turns: np.ndarray,
+    corners: Sequence[np.ndarray],
+    side: float,
+    scale: Any,
+) -> None:
+    """Write time and turn of each instant to the right of the body's corners [mm], clear of each other.
+
+    `side` is the larger side of the view [mm].
+    """
+    clock = unit_for("time", times)
+    angle = unit_for("angle", turns)
+    sign = "°" if angle.label == "deg" else f" {angle.label}"
+    # The upper one of corners that are about as far to the right.
+    ends = np.array([each[np.argmax(each @ [1.0, 0.1])] for each in corners])
+    last = np.inf
+    for k in np.argsort(-ends[:, 1], kind="stable"):
+        last = min(ends[k, 1], last - APART * side)
+        turn = f"{angle.factor * turns[k] + 0.0:.3g}{sign}"
+        words = f"{clock.factor * times[k]:.3g} {clock.label}: {turn}"
+        axes.text(
+            ends[k, 0] + 0.02 * side,
+            last,
+            words.replace("-", "\N{MINUS SIGN}"),
+            color=style.TIME_COLOURS(scale(times[k])),
+            fontsize="small",
+            fontweight="bold",
+            va="center",
+            zorder=10,
+        ).set_path_effects(list(symbols.HALO))
 
 
 def _remark(strobe: _Strobe) -> str:
@@ -185,14 +258,21 @@ def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> Artist:
     shape = 1e3 * shape
     # All boxes are one path, so that no seams show between neighbours.
     if shape.ndim == 3:
-        closed = np.concatenate([shape, shape[:, :1]], axis=1)
-        codes = [Outline.MOVETO, *3 * [Outline.LINETO], Outline.CLOSEPOLY]
-        path = Outline(closed.reshape(-1, 2), np.tile(codes, len(shape)))
-        drawn = PathPatch(path, fc=colour, ec="none", alpha=PAD_OPACITY, zorder=2)
+        drawn = PathPatch(
+            outline_of(shape), fc=colour, ec="none", alpha=PAD_OPACITY, zorder=2
+        )
     else:
         look = {"marker": "o", "ms": 4.5, "mew": 0.0, "ls": "none", "alpha": 0.8}
         drawn = Line2D(*shape.T, **look, color=colour, zorder=2)
     return axes.add_artist(drawn)
+
+
+def outline_of(boxes: np.ndarray) -> Outline:
+    """Return the path around polygons `[N, M, 2]`."""
+    closed = np.concatenate([boxes, boxes[:, :1]], axis=1)
+    lines = [Outline.LINETO] * (boxes.shape[1] - 1)
+    codes = [Outline.MOVETO, *lines, Outline.CLOSEPOLY]
+    return Outline(closed.reshape(-1, 2), np.tile(codes, len(boxes)))
 
 
 def move(

@@ -68,7 +68,7 @@ def law_html(law: Any) -> str:
     axes = figure.add_subplot()
     speed = np.linspace(0.0, _SPEEDS * law.numbers.v_s, 200)
     axes.plot(
-        1e3 * speed, law.steady_friction(speed), color=style.PALETTE[0], linewidth=1.5
+        1e3 * speed, law.steady_friction(speed), color=style.REDUCED, linewidth=1.5
     )
     axes.set(xlabel="mm/s", ylabel="f/f_N", ylim=(0.0, None))
     return _beside(figure, type(law).__name__, rows)
@@ -159,7 +159,7 @@ def _section(surface: pf.limit_surface.LimitSurface) -> style.PlotFigure:
     fx, _, torque = scaled_samples(surface, around, np.zeros(1))[1].T
     figure = style.new_figure(1.5, 1.5)
     axes = figure.add_subplot()
-    axes.plot(fx, torque, color=style.PALETTE[0], linewidth=1.5)
+    axes.plot(fx, torque, color=style.REDUCED, linewidth=1.5)
     for line in (axes.axhline, axes.axvline):
         line(0.0, color="0.8", linewidth=0.6, zorder=0)
     axes.set(aspect="equal")

@@ -21,10 +21,10 @@ from planarfriction.plots.limit_surface import draw_surface, scaled_samples
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import ContactTrack
 
-STICK = "#0072B2"
+STICK = style.STICKS
 """Colour of what sticks, which pales towards it as its bristles bend."""
 
-SLIP = "#E66100"
+SLIP = style.SLIPS
 """Colour of what slips."""
 
 PLAIN = "#9AA5B1"
@@ -54,7 +54,7 @@ STILL = 1e-3
 ARM = 1e-2
 """Lever of the spin of a body in its speed [m]."""
 
-_PALE = LinearSegmentedColormap.from_list("stick", ["#EAF1F7", STICK])(
+_PALE = LinearSegmentedColormap.from_list("stick", ["#F4F8FB", STICK])(
     np.linspace(0.0, 1.0, 230)
 )
 CELLS = ListedColormap([*_PALE, *[SLIP] * 26])
@@ -185,7 +185,7 @@ class SurfacePanel:
                 axis.label.set_fontsize("x-small")
         axes.set_title("limit surface, $\\mu_c f_N = 1$", fontsize="small", y=0.98)
         self.floor = -limit
-        colour = style.PALETTE[1]
+        colour = style.REDUCED
         self.shadow, self.tail, self.arm, self.head = (
             axes.plot([], [], [], **look)[0]
             for look in (
@@ -274,9 +274,9 @@ def level_of(track: ContactTrack, frame: int) -> Any:
 
 
 def centre_mark(axes: Any) -> Any:
-    """Return the mark of a centre of rotation."""
-    look = {"ms": 8, "mfc": "none", "mew": 1.8, "color": "#111111", "zorder": 8}
-    return axes.plot([], [], "o", label="centre of rotation", **look)[0]
+    """Return the mark of a centre of rotation, a ring with a dot."""
+    look = {"ls": "none", "marker": r"$\odot$", "ms": 11, "color": "black", "zorder": 8}
+    return axes.plot([], [], label="centre of rotation", **look)[0]
 
 
 def put_centre(mark: Any, twist: np.ndarray, at: np.ndarray, *, still: float) -> None:

@@ -12,7 +12,7 @@ import planarfriction as pf
 from planarfriction._support import validation
 from planarfriction._support.shown import Unit, unit_for
 from planarfriction.patch.grid import grid_sides
-from planarfriction.plots import style
+from planarfriction.plots import style, symbols
 
 MOST_EDGES = 5000
 """Cells whose edges are drawn: those of more would hide them."""
@@ -52,9 +52,7 @@ def plot_patch(
         pressure = patch.tile_weights(normal_force) * load / patch.areas
         drawn, label = _draw_cells(axes, patch, patch.grid, pressure, normal_force)
     figure.colorbar(drawn, ax=axes, label=label)
-    axes.plot(*centre, "+", ms=13, mew=4.0, color="white")
-    label = "centre of pressure"
-    axes.plot(*centre, "+", ms=13, mew=1.8, color=style.PAD_COLOUR, label=label)
+    symbols.centre_of_pressure(axes, centre, 12.0, label="centre of pressure")
     axes.set_aspect("equal")
     limits = 1e-3 * np.array([axes.get_xlim(), axes.get_ylim()])
     sides = np.diff(limits, axis=-1)[:, 0]

@@ -15,52 +15,104 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
 from planarfriction._support import validation
-from planarfriction._support.shown import unit_for
+from planarfriction._support.shown import Unit, unit_for
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""
+REFERENCE = "#000000"
+"""Colour of what is exact: a closed form, a fine grid; a thin dashed line on top."""
 
-DISTRIBUTED = PALETTE[0]
-"""Colour in every figure of sums over cells and of their model."""
+REDUCED = "#0072B2"
+"""Colour of `ReducedModel`, the default of the library."""
 
-PUBLISHED = PALETTE[1]
-"""Colour in every figure of the published table and of its model."""
+DISTRIBUTED = "#56B4E9"
+"""Colour of sums over cells and of their model: lines of 1.4 pt at least, no letters."""
 
-ELLIPSOID = PALETTE[2]
-"""Colour in every figure of the ellipsoid and of its model."""
+PUBLISHED = "#CC79A7"
+"""Colour of the published model and of its table."""
 
-OTHER = PALETTE[3]
-"""Colour in every figure of something else."""
+ELLIPSOID = "#009E73"
+"""Colour of the ellipsoid."""
 
-FEW = PALETTE[4]
-"""Colour in every figure of `ReducedModel` with few discs."""
+BUILT_IN = "#D55E00"
+"""Colour of the friction that a simulator has built in."""
 
-SECOND = PALETTE[5]
-"""Colour in every figure of a second thing else."""
+MEASURED = "0.62"
+"""Colour of what was measured: a broad line or dots below the rest."""
 
-EXACT = PALETTE[6]
-"""Colour in every figure of what is exact."""
+OF_MODEL = {
+    "distributed": DISTRIBUTED,
+    "reduced": REDUCED,
+    "reduced-published": PUBLISHED,
+}
+"""Name of a model -> its colour (Okabe and Ito: colour-blind readers tell them apart)."""
 
-MEASURED = "0.6"
-"""Colour of what was measured, drawn as a broad line below the rest."""
+OTHER = "0.35"
+"""Colour of a model or surface that has no role."""
 
-OF_MODEL = {"distributed": DISTRIBUTED, "reduced": FEW, "reduced-published": PUBLISHED}
-"""Name of a model -> its colour."""
+SHADES = ("#A9CBE5", "#5E9FCF", REDUCED, "#00456B")
+"""Shades of blue: few discs to many, little to much of what belongs to `ReducedModel`."""
+
+LETTERS = {DISTRIBUTED: "#1B7DB0", PUBLISHED: "#A44C81", MEASURED: "0.4"}
+"""Colour of a role -> that of words about it, if it is too pale for letters."""
+
+LINES: dict[str, Any] = {
+    REFERENCE: (0, (4, 2)),
+    PUBLISHED: (0, (1.2, 1.2)),
+    ELLIPSOID: (0, (5, 1.2, 1, 1.2)),
+}
+"""Colour of a role -> line style, if it is not solid."""
+
+MARKERS = {
+    REDUCED: "o",
+    DISTRIBUTED: "s",
+    PUBLISHED: "^",
+    ELLIPSOID: "D",
+    BUILT_IN: "X",
+    MEASURED: ".",
+}
+"""Colour of a role -> its marker."""
+
+SERIES = (REDUCED, "#000000", "0.55", "#00456B", "0.3", "#6C9CC4", "0.72")
+"""Colours of runs, shapes or loads, which have no role: blue for the one that is meant, then black and greys."""
+
+STICKS = "#B9D6EA"
+"""Fill of what sticks."""
+
+SLIPS = "#E69F00"
+"""Fill of what slips."""
+
+SLIP_DOT = "#7A4E00"
+"""Colour of the dot in each cell that slips, which tells it in grey print."""
+
+HOLDS = "#EAF3F9"
+"""Fill of loads that friction holds."""
+
+BEYOND = "#F3E2D8"
+"""Fill of loads beyond the limit."""
+
+BODY = "0.89"
+"""Fill of bodies."""
+
+PAD = "0.45"
+"""Fill of contact patches in the plane."""
 
 LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
 """Line styles that tell contacts, or overlaid runs, apart in print."""
 
-PRESSURE_MAP = "cividis"
-"""Colour map of loads and pressures: even in lightness, the same for colour-blind readers."""
+PRESSURE_MAP = ListedColormap(
+    colormaps["cividis_r"](np.linspace(0.04, 1.0, 256)), "pressure"
+)
+"""Colour map of amounts from 0 on, as loads and pressures: dark is much."""
 
-TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256)), "time")
-"""Colour map of time, and of an order: the last yellow of viridis is lost on white."""
+TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.8, 256)), "time")
+"""Colour map of time alone: the last greens and yellows of viridis are lost on white."""
 
-PAD_COLOUR = "#D55E00"
-"""Colour of contact patches in the plane."""
+COLUMN = 3.5
+"""Width of a column of a paper [inch]."""
 
+PAGE = 7.0
+"""Width of a page [inch]; pictures for the web have 160 dots per inch of it."""
 
 NARROW = 4.5
 """Width [inch] below which a figure, or axes and their share of it, have small titles and few ticks."""
@@ -70,6 +122,13 @@ WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 
 LARGEST_SIDE = 100.0
 """Largest side of a figure [inch]: 12,000 dots, of which a square takes 0.6 GB."""
+
+
+def paper() -> Any:
+    """Return a context in which figures have the style sheet of a column or page of a paper."""
+    from matplotlib.style import context  # reads dozens of files
+
+    return context("planarfriction.plots.print")
 
 
 class PlotFigure(Figure):
@@ -104,9 +163,10 @@ class PlotFigure(Figure):
 
 
 def new_figure(width: float, height: float, size: Any = None) -> PlotFigure:
-    """Return an empty figure of `width` x `height` inches, or of a `size` that a user asks for, 120 dots per inch.
+    """Return an empty figure of `width` x `height` inches, or of a `size` that a user asks for.
 
-    Letters larger than 10 pt, as on slides, enlarge the figure unless it has a `size`.
+    It has at least 120 dots per inch. Letters larger than 10 pt, as on slides, enlarge the figure unless it has a
+    `size`.
 
     Raises InvalidValueError unless `size` is two numbers > 0 and at most `LARGEST_SIDE`.
     """
@@ -119,7 +179,8 @@ def new_figure(width: float, height: float, size: Any = None) -> PlotFigure:
         if max(width, height) > LARGEST_SIDE:
             rule = f"be in inches, each side at most {LARGEST_SIDE:g}"
             raise InvalidValueError("size", rule, size)
-    return PlotFigure(figsize=(width, height), layout="constrained", dpi=120)
+    dpi = max(120.0, rcParams["figure.dpi"])
+    return PlotFigure(figsize=(width, height), layout="constrained", dpi=dpi)
 
 
 def place(ax: Any, width: float, height: float, size: Any) -> tuple[Any, Any]:
@@ -163,6 +224,11 @@ def ticks(axes: Any, most: int) -> int:
 def model_colour(model: Any) -> str | None:
     """Return the colour of a friction model; None if it is not one of the library's."""
     return OF_MODEL.get(MODELS.name_of(model) or "")
+
+
+def with_unit(name: str, unit: Unit) -> str:
+    """Return the label of an axis: the name of a quantity with its unit in brackets."""
+    return f"{name} [{unit.label.replace('deg', '°')}]"
 
 
 def show_lengths(axes: Any, largest: float) -> None:

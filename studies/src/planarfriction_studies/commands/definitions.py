@@ -340,10 +340,9 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
         write_text(path, json.dumps(to_dict(benchmark), indent=1) + "\n")
         note(f"wrote {path}")
         for name in benchmark.results:
-            picture = output.write_picture(
-                draw(benchmark, name), folder / f"measured-{name}.png"
-            )
-            note(f"wrote {picture}")
+            for picture, figure in draw(benchmark, name).items():
+                path = folder / f"measured-{picture}.png"
+                note(f"wrote {output.write_picture(figure, path)}")
 
 
 # ---------------------------------------------------------------------- reproduce

@@ -7,17 +7,25 @@ from typing import Any
 import numpy as np
 
 from planarfriction.plots import style
-from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, FEW, PlotFigure
+from planarfriction.plots.style import (
+    DISTRIBUTED,
+    ELLIPSOID,
+    PUBLISHED,
+    REDUCED,
+    REFERENCE,
+    PlotFigure,
+)
 from planarfriction_studies.experiments import facts
 
-__all__ = ["DISTRIBUTED", "ELLIPSOID", "EXACT", "FEW", "QUARTIC", "REDUCED"]
+__all__ = ["DISTRIBUTED", "ELLIPSOID", "PUBLISHED", "QUARTIC", "REDUCED", "REFERENCE"]
 
-REDUCED, QUARTIC = style.PUBLISHED, style.OTHER
+QUARTIC = style.OTHER
+"""Colour of the quartic surface."""
 
-OTHERS = ("#332288", "#882255", "#999933", "0.45")
-"""Colours of what is no model: shapes, solvers, components, loads, causes."""
+OTHERS = (REDUCED, "0.0", "0.45", "0.7")
+"""Colours of what is no model: shapes, solvers, components, loads, causes; blue for the one that is meant."""
 
-OF_MODEL = {"d": DISTRIBUTED, "r": REDUCED, "e": ELLIPSOID}
+OF_MODEL = {"d": DISTRIBUTED, "r": PUBLISHED, "e": ELLIPSOID}
 """Letter of a model in the names of curves -> its colour."""
 
 
@@ -78,6 +86,16 @@ def box(
     )  # fmt: skip
     if most:
         axes.plot(at, *most, marker="x", ms=5, mew=1.4, color=colour)
+
+
+def span(axes: Any, at: float, numbers: Any, colour: str) -> None:
+    """Draw the numbers of a box as a dot at the median, a broad line of quartiles, a thin range and a cross."""
+    low, first, median, third, high, *most = numbers
+    axes.vlines(at, low, high, color=colour, lw=1.0)
+    axes.vlines(at, first, third, color=colour, lw=4.0)
+    axes.plot(at, median, "o", ms=5, color=colour, mec="white", mew=0.6, zorder=4)
+    if most:
+        axes.plot(at, *most, marker="x", ms=4, mew=1.1, color=colour)
 
 
 def box_legend(

@@ -110,7 +110,7 @@ class Reproduction:
         make_folder(home)
         for picture in result.pictures:
             with replacing(home / f"{picture.name}.png") as file:
-                picture.figure.savefig(file, format="png", dpi=150)
+                picture.figure.savefig(file, format="png", dpi=160)
             picture.figure.set_layout_engine("none")  # laid out once is enough for both
             with replacing(home / f"{picture.name}.svg") as file:
                 picture.figure.savefig(file, format="svg", metadata={"Date": None})

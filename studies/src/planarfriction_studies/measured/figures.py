@@ -16,74 +16,119 @@ from planarfriction_studies.measured.tasks import TASKS
 DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
 """Models of an example, where they took part, besides those of the user."""
 
-COLOURS: dict[str, str] = dict(
-    zip(
-        DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PUBLISHED), strict=True
-    )
-)
-"""Model -> its colour; the others take what is left, one after the other."""
+COLOURS: dict[str, str] = {
+    "uncoupled": style.OTHER,
+    "ellipsoid": style.ELLIPSOID,
+    "exact surface": style.REFERENCE,
+    "toss by toss": style.REDUCED,
+}
+"""Model of an example -> its colour; the others take what is left, one after the other."""
 
+ROLES = COLOURS | {
+    "reduced": style.REDUCED,
+    "distributed": style.DISTRIBUTED,
+    "MuJoCo box": style.BUILT_IN,
+    "toss by toss": "0.45",
+}
+"""Model -> its colour among all models; the others are grey."""
 
 PEAKS = (0.8, 1.6)
 """Peaks of the force over its level that are drawn; a few lie outside."""
 
+PAIRS = 5
+"""Centres of rotation of which measured and predicted ones are joined."""
 
-def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
-    """Draw the picture of a task."""
+INSIDE = 0.98
+"""Largest coordinate of these, as a share of the view [-]."""
+
+
+def draw(benchmark: Benchmark, task: str) -> dict[str, style.PlotFigure]:
+    """Return the pictures of a task by their names; the first one has the name of the task."""
     rows = len(benchmark.results[task])
-    figure = style.new_figure(
-        10.0, max(3.2, 0.42 * rows + (3.4 if task == "slides" else 1.6))
-    )
-    figure.set_layout_engine("constrained", w_pad=0.06)
-    # An array of them, which its annotation does not say.
-    parts: Any = figure.subfigures
-    if task == "slides":
-        above, below = parts(2, 1, height_ratios=(0.42 * rows + 1.0, 2.6))
-        _dots(above, benchmark, task)
-        _draw_slides(below, benchmark)
-    else:
+    with style.paper():
+        if task == "slides":
+            figure = style.new_figure(style.PAGE, 0.9 + 0.21 * rows)
+            _errors(figure, benchmark, task)
+            paths = style.new_figure(style.PAGE, 3.6)
+            _draw_slides(paths, benchmark)
+            return {task: figure, f"{task}-paths": paths}
+        figure = style.new_figure(style.PAGE, max(2.8, 0.9 + 0.21 * rows))
+        # An array of them, which its annotation does not say.
+        parts: Any = figure.subfigures
         left, right = parts(1, 2, width_ratios=(1.5, 1.0))
         _dots(left, benchmark, task)
         {"pushes": _draw_centres, "series": _draw_series, "onsets": _draw_onsets}[task](
             right, benchmark
         )
-    return figure
+    return {task: figure}
+
+
+def _measures(benchmark: Benchmark, task: str) -> list[Any]:
+    """Return the measures that all models have."""
+    results = benchmark.results[task].values()
+    measures = TASKS[task].measures
+    return [m for m in measures if all(m.key in each.scores for each in results)]
+
+
+def _errors(figure: Any, benchmark: Benchmark, task: str) -> None:
+    """Draw the measures of each model, a panel for each unit: filled dots for the first one, open dots for the next."""
+    results = benchmark.results[task]
+    of_unit: dict[str, list[Any]] = {}
+    for measure in _measures(benchmark, task):
+        name, _, unit = measure.heading.partition(" [")
+        of_unit.setdefault(unit.rstrip("]"), []).append((name, measure))
+    panels = figure.subplots(1, len(of_unit), sharey=True, squeeze=False)[0]
+    for axes, (unit, measures) in zip(panels, of_unit.items(), strict=True):
+        for (_, measure), open_dot in zip(measures, (False, True), strict=False):
+            scores = [result.scores[measure.key] for result in results.values()]
+            _intervals(axes, list(results), scores, open_dot=open_dot)
+        sign = unit.replace("deg", "\N{DEGREE SIGN}")
+        what = f"{measures[0][1].total.__name__} {measures[0][1].quantity}"
+        axes.set(xlim=(0.0, None), xlabel=f"{what} [{sign}]")
+        style.tidy(axes)
+    names = [name for name, _ in next(iter(of_unit.values()))]
+    look = {"ls": "", "marker": "o", "color": "0.3"}
+    handles = [
+        panels[0].plot([], [], **look, mfc=fill, label=name)[0]
+        for name, fill in zip(names, ("0.3", "white"), strict=False)
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=2, frameon=False)
+
+
+def _intervals(
+    axes: Any, names: Sequence[str], scores: Sequence[Any], *, open_dot: bool
+) -> None:
+    """Draw the value of each score with its interval, in the colour of its model."""
+    for place, (name, score) in enumerate(zip(names, scores, strict=True)):
+        colour = ROLES.get(name, "0.45")
+        ends = [[score.value - score.low], [score.high - score.value]]
+        look = {"color": colour, "markersize": 4, "elinewidth": 1.1}
+        fill = "white" if open_dot else colour
+        axes.errorbar(
+            score.value, -place, xerr=np.maximum(ends, 0.0), fmt="o", mfc=fill, **look
+        )
+    axes.set(yticks=-np.arange(len(names)), yticklabels=names)
 
 
 def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
     """Draw each measure of each model, with its interval."""
     results = benchmark.results[task]
-    measures = [
-        m
-        for m in TASKS[task].measures
-        if all(m.key in result.scores for result in results.values())
-    ]
+    measures = _measures(benchmark, task)
     every = part.subplots(1, len(measures), sharey=True, squeeze=False)[0]
-    places = -np.arange(len(results))
     for axes, measure in zip(every, measures, strict=True):
         scores = [result.scores[measure.key] for result in results.values()]
-        value = np.array([score.value for score in scores])
-        ends = np.array(
-            [[score.value - score.low, score.high - score.value] for score in scores]
-        ).T
-        axes.errorbar(
-            value,
-            places,
-            xerr=np.maximum(ends, 0.0),
-            fmt="o",
-            color="0.25",
-            markersize=5,
-            elinewidth=1.2,
-        )
-        axes.set(xlim=(0.0, None), yticks=places, yticklabels=list(results))
+        _intervals(axes, list(results), scores, open_dot=False)
+        axes.set_xlim(left=0.0)
         name, _, unit = measure.heading.partition(" [")
-        axes.set_title(name.replace(", ", "\n"), fontsize="small", loc="left")
-        axes.set_xlabel(
-            f"{measure.total.__name__} {measure.quantity}{unit and f' [{unit}'}",
-            fontsize="small",
-        )
-        axes.tick_params(labelsize="small")
+        axes.set_title(name.replace(", ", "\n").replace(" on ", "\non "), loc="left")
+        sign = unit.replace("deg", "\N{DEGREE SIGN}")
+        what = f"{measure.total.__name__} {measure.quantity}"
+        axes.set_xlabel(f"{what}{sign and f' [{sign}'}")
         style.tidy(axes)
+    # One label below all axes of one quantity: several would meet.
+    if len({axes.get_xlabel() for axes in every}) == 1:
+        for axes in np.delete(every, len(every) // 2):
+            axes.set_xlabel("")
 
 
 def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
@@ -93,12 +138,12 @@ def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
     results = benchmark.results[task]
     own = [name for name in results if name not in LIBRARY]
     wanted = [name for name in (*DRAWN, *own) if name in results] or list(results)
-    return {name: results[name] for name in wanted[: len(style.PALETTE)]}
+    return {name: results[name] for name in wanted[: len(style.SERIES)]}
 
 
 def _colours(chosen: Mapping[str, Any]) -> dict[str, str]:
     """Return the colour of each of the chosen models."""
-    left = iter(colour for colour in style.PALETTE if colour not in COLOURS.values())
+    left = iter(colour for colour in style.SERIES if colour not in COLOURS.values())
     return {name: COLOURS.get(name) or next(left, style.OTHER) for name in chosen}
 
 
@@ -111,10 +156,13 @@ def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
         (name for name, result in chosen.items() if result.regions is not None), None
     )
     colours = _colours(chosen)
-    widths = (1.2, 1.0) * count + (1.2,) * (sure is not None)
-    every = part.subplots(1, len(widths), width_ratios=widths)
+    grid = part.add_gridspec(2, count + 1, height_ratios=(1.3, 1.0))
+    places = [grid[row, column] for column in range(count) for row in range(2)]
+    every = [part.add_subplot(each) for each in places]
     if sure is not None:
-        _draw_ends(every[-1], test, chosen[sure], colours[sure])
+        ends = part.add_subplot(grid[0, count])
+        _draw_ends(ends, test, chosen[sure], colours[sure])
+        style.tidy(ends)
     for i, case in enumerate(shown):
         way, turn = every[2 * i : 2 * i + 2]
         index = next(j for j, each in enumerate(test) if each is case)
@@ -154,9 +202,16 @@ def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
                 )
         way.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
         way.set_adjustable("datalim")
-        turn.set(xlabel="time [s]", ylabel="turned [deg]")
-        way.set_title(case.name, fontsize="small", loc="left")
-    _finish(part, every, 6)
+        turn.set(xlabel="time [s]", ylabel="turned [\N{DEGREE SIGN}]")
+        way.set_title(case.name, loc="left")
+        if i:
+            way.set_ylabel("")
+            turn.set_ylabel("")
+    for axes in every:
+        style.tidy(axes)
+    key = part.add_subplot(grid[1, count])
+    key.axis("off")
+    key.legend(*every[0].get_legend_handles_labels(), loc="center")
 
 
 def _finish(part: Any, every: Any, columns: int) -> None:
@@ -198,9 +253,7 @@ def _draw_ends(axes: Any, test: Sequence[Case], result: Result, colour: str) -> 
     axes.plot(*off[:, ::-1].T, ".", color="0.2", markersize=3)
     axes.plot(*ellipse(np.eye(3)).T, color=colour, linewidth=1.2)
     axes.set(aspect="equal", xlabel="along", ylabel="across")
-    axes.set_title(
-        f"{len(test)} ends,\nin half axes", fontsize="small", loc="left", color=colour
-    )
+    axes.set_title(f"{len(test)} ends, in half axes", loc="left", color=colour)
 
 
 def _shift(poses: np.ndarray, first: np.ndarray) -> np.ndarray:
@@ -219,10 +272,18 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
     name = "exact surface" if "exact surface" in chosen else list(chosen)[-1]
     measured = 1e3 * centres(case.answer)
     predicted = 1e3 * centres(chosen[name].answers[number])
-    for start, end in zip(measured, predicted, strict=True):
-        axes.plot(*np.stack([start, end], axis=1), color="0.8", linewidth=0.8, zorder=1)
-    axes.plot(*measured.T, "o", color=style.MEASURED, markersize=5, label="measured")
-    axes.plot(*predicted.T, "x", color=_colours(chosen)[name], markersize=5, label=name)
+    limit = 1.6e3 * np.abs(corners).max()
+    inside = (
+        np.maximum(np.abs(measured), np.abs(predicted)).max(axis=1) < INSIDE * limit
+    )
+    some = np.flatnonzero(inside)
+    some = some[style.evenly(len(some), PAIRS)] if len(some) else some
+    for start, end in zip(measured[some], predicted[some], strict=True):
+        axes.plot(*np.stack([start, end], axis=1), color="0.6", linewidth=0.9, zorder=1)
+    shown = measured[some].T
+    axes.plot(*shown, "o", color=style.MEASURED, markersize=6, label="measured")
+    shown = predicted[some].T
+    axes.plot(*shown, "x", color=ROLES.get(name, "0.45"), markersize=5, label=name)
     if len(corners) < 10:
         axes.plot(
             *1e3 * corners.T,
@@ -232,7 +293,6 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
             fillstyle="none",
             label="foot",
         )
-    limit = 1.6e3 * np.abs(corners).max()
     axes.set(
         xlim=(-limit, limit),
         ylim=(-limit, limit),
@@ -241,7 +301,7 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
         ylabel="y [mm]",
     )
     axes.set_title(
-        f"centres of rotation, feet as in {case.question.layout}",
+        f"centres of rotation, {case.question.layout}",
         fontsize="small",
         loc="left",
     )
@@ -287,8 +347,8 @@ def _draw_series(part: Any, benchmark: Benchmark) -> None:
             color=colour,
             linewidth=width,
         )
-    axes[0].set(ylabel="direction of force [deg]")
-    axes[1].set(xlabel="time [s]", ylabel="torque against force [deg]")
+    axes[0].set(ylabel="direction of force [\N{DEGREE SIGN}]")
+    axes[1].set(xlabel="time [s]", ylabel="torque against force [\N{DEGREE SIGN}]")
     axes[0].set_title(
         case.name.removesuffix(", wrenches"), fontsize="small", loc="left"
     )
@@ -304,7 +364,7 @@ def _draw_onsets(part: Any, benchmark: Benchmark) -> None:
         (name for name in ("distributed", "reduced") if name in results),
         list(results)[-1],
     )
-    for board, colour in (("feet", style.OTHER), ("flat", style.PUBLISHED)):
+    for board, colour in (("feet", style.REDUCED), ("flat", "0.45")):
         rows = [i for i, case in enumerate(test) if case.board == board]
         pairs = np.array(
             [[results[name].answers[i][3], test[i].answer[3]] for i in rows]

@@ -8,7 +8,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planarfriction.plots.style import PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import (
+    BODY,
+    HOLDS,
+    PAD,
+    REFERENCE,
+    PlotFigure,
+    new_figure,
+    tidy,
+)
 from planarfriction_studies.referee.case import Body, Case, Shape
 from planarfriction_studies.referee.run import Verdict
 
@@ -45,14 +53,14 @@ def scene(case: Case) -> PlotFigure:
     axes = figure.subplots()
     for corners, body in sorted(drawn, key=lambda each: _height(each[1], up)):
         fixed = body.joint == "fixed"
-        fill = "0.8" if fixed else PALETTE[5] if body.joint == "free" else PALETTE[4]
+        fill = PAD if fixed else BODY if body.joint == "free" else HOLDS
         axes.add_patch(
             Polygon(1e3 * corners, facecolor=fill, edgecolor="0.2", alpha=0.6)
         )
     for corners, body in ends:
         if any(end(case, body)):
             axes.add_patch(
-                Polygon(1e3 * corners, fill=False, edgecolor=PALETTE[1], linestyle="--")
+                Polygon(1e3 * corners, fill=False, edgecolor=REFERENCE, linestyle="--")
             )
     _arrows(axes, case, up, size)
     names = "x", "z" if up == 2 else "y"
@@ -104,7 +112,7 @@ def outline(
 def _arrows(axes, case: Case, up: int, size: float) -> None:
     """Draw velocities, and the largest force of each row of forces; and gravity where it lies in the picture."""
     throws = [
-        (np.array(body.position), np.array(body.velocity[:3]), PALETTE[2])
+        (np.array(body.position), np.array(body.velocity[:3]), "0.25")
         for body in case.moving
     ]
     of = {body.name: body for body in case.moving}
@@ -114,7 +122,7 @@ def _arrows(axes, case: Case, up: int, size: float) -> None:
         rows = np.array([*force.values, force.amplitude])[:, :3]
         at = body.centre_of_mass if force.at is None else force.at
         largest = rows[np.argmax(np.linalg.norm(rows[:, [0, up]], axis=1))]
-        pushes.append((np.array(body.position) + at, largest, PALETTE[3]))
+        pushes.append((np.array(body.position) + at, largest, "0.55"))
     for arrows in (throws, pushes):
         lengths = [float(np.hypot(*vector[[0, up]])) for _, vector, _ in arrows]
         for (place, vector, colour), length in zip(arrows, lengths, strict=True):

@@ -39,15 +39,15 @@ def plot_grip(record: GripRecord, row: int = -1) -> style.PlotFigure:
     time = record.time[past]
     truth = float(record.parts.mu_c[0])
     slips = record.slips[past] > 0.5
-    axes["grip"].plot(time, record.grip[past], color=style.PALETTE[0])
+    axes["grip"].plot(time, record.grip[past], color=style.REDUCED)
     axes["grip"].set(
         ylabel="grip force [N]", xlim=(0.0, end), ylim=(0.0, 1.08 * record.grip.max())
     )
     mean, low, high = record.mu_c[past].T
     axes["mu"].fill_between(
-        time, low, high, color=style.PALETTE[0], alpha=0.25, lw=0, label="95 % interval"
+        time, low, high, color=style.REDUCED, alpha=0.25, lw=0, label="95 % interval"
     )
-    axes["mu"].plot(time, mean, color=style.PALETTE[0], label="estimate")
+    axes["mu"].plot(time, mean, color=style.REDUCED, label="estimate")
     axes["mu"].axhline(truth, color="k", ls=style.LINE_STYLES[1], lw=1.0, label="truth")
     axes["mu"].set(
         xlabel="time [s]", ylabel="$\\mu_c$", xlim=(0.0, end), ylim=(0.0, 2.0 * truth)
@@ -60,7 +60,7 @@ def plot_grip(record: GripRecord, row: int = -1) -> style.PlotFigure:
             1.0,
             where=slips,
             transform=each.get_xaxis_transform(),
-            color=style.PALETTE[1],
+            color=style.REFERENCE,
             alpha=0.2,
             lw=0,
         )
@@ -82,9 +82,7 @@ def _draw_part(axes, record: GripRecord, row: int) -> None:
     axes.plot(*(1e3 * turn @ centre), "o", color="0.3", ms=5)
     first = 1e3 * turn @ (centre - spin @ record.parts.centre[0])
     axes.add_patch(
-        Circle(
-            (0.0, 0.0), 1e3 * record.radius[row], fc=style.PAD_COLOUR, alpha=0.6, ec="k"
-        )
+        Circle((0.0, 0.0), 1e3 * record.radius[row], fc=style.PAD, alpha=0.6, ec="k")
     )
     axes.plot(*first, "+", color="k", ms=12, mew=1.5)
     axes.set(

@@ -461,7 +461,7 @@ def figure(errors: dict[str, dict[str, float]]) -> PlotFigure:
         for name, each in errors.items()
         if name.endswith("discs")
     }
-    colours = (looks.FEW, looks.DISTRIBUTED, looks.OTHERS[0], looks.OTHERS[1])
+    colours = looks.OTHERS
     for words, colour in zip(LINES, colours, strict=True):
         axes.plot(
             list(rungs),

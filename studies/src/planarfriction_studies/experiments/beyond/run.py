@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction.plots.style import SHADES
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import (
     cells,
@@ -140,7 +141,7 @@ def run(work: Work) -> Result:
             "surface_staircase": tables.staircase(stairs),
             "driven_models": tables.driven_boxes(numbers["driven"]),
             "in_hand_ends": _ends_figure(numbers["in hand"]),
-            "ladder": tables.draw_ladder(rows),
+            "ladder": tables.draw_ladder(rows, shifts),
             "few_discs": cells.figure(numbers["few discs"]),
             "grooves": tables.grooves(numbers["grooves"]),
         },
@@ -191,7 +192,7 @@ def _runs_of(shape: str) -> Numbers:
 def _ends_figure(ends: Numbers) -> Any:
     """Draw the ends of the in-hand runs, and how far a change of friction moves them."""
     words = ladder.ENDS | {ladder.SHIFT: "0.1 % of friction"}
-    colours = (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0])
+    colours = (looks.PUBLISHED, SHADES[0], looks.REDUCED, SHADES[3])
     return end_shifts(
         {
             case: {words[name]: each[name] for name in words}

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from planarfriction.plots.style import PlotFigure
+from planarfriction.plots.style import (
+    LETTERS,
+    PAGE,
+    SHADES,
+    PlotFigure,
+    new_figure,
+    paper,
+    tidy,
+)
+from planarfriction.plots.symbols import HALO
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import contacts
 from planarfriction_studies.experiments.beyond.ladder import (
@@ -31,7 +40,7 @@ from planarfriction_studies.experiments.experiment import (
 )
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
 from planarfriction_studies.experiments.velocity_driven import boxes
-from planarfriction_studies.experiments.wording import fmt, short, span
+from planarfriction_studies.experiments.wording import fmt, short
 
 MODEL_WORDS = {
     "full": "distributed, 21 x 21 cells",
@@ -229,8 +238,8 @@ COLOURS = dict(
     zip(
         KINDS,
         (
+            looks.PUBLISHED,
             looks.REDUCED,
-            looks.OTHERS[0],
             looks.DISTRIBUTED,
             looks.QUARTIC,
             looks.ELLIPSOID,
@@ -242,7 +251,7 @@ COLOURS = dict(
 MODEL_COLOURS = dict(
     zip(
         MOVED,
-        (looks.REDUCED, looks.OTHERS[1], looks.FEW, looks.OTHERS[0], looks.DISTRIBUTED),
+        (looks.PUBLISHED, SHADES[0], looks.REDUCED, SHADES[3], looks.DISTRIBUTED),
         strict=True,
     )
 )
@@ -299,7 +308,7 @@ def staircase(stairs: Arrays) -> PlotFigure:
                 lw=1.1,
                 label="sum over the 21 x 21 grid's cells",
             )
-            axes.plot(place, exact, color=looks.EXACT, lw=1.3, label="exact")
+            axes.plot(place, exact, color=looks.REFERENCE, lw=1.3, label="exact")
             axes.set(ylabel=label, xlim=(0.0, place[-1]))
             axes.set_title(IN_WORDS[shape], fontsize="medium", loc="left")
     for axes in panels[1]:
@@ -337,8 +346,8 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     slopes = np.array(numbers["slope"])
     fine = np.linspace(slopes[0], slopes[-1], 100)
     closed = np.degrees([contacts.closed_drift(slope) for slope in fine])
-    axes.plot(np.degrees(fine), closed, color=looks.EXACT, label="closed form")
-    colours = (looks.DISTRIBUTED, looks.FEW, looks.REDUCED)
+    axes.plot(np.degrees(fine), closed, color=looks.REFERENCE, label="closed form")
+    colours = (looks.DISTRIBUTED, looks.REDUCED, looks.PUBLISHED)
     for kind, marker, colour in zip(
         contacts.GROOVED_MODELS, "ox+", colours, strict=True
     ):
@@ -351,123 +360,157 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     return figure
 
 
-class Family(NamedTuple):
-    """Models of the ladder that are one line."""
+RUNGS = {name: str(count) for count, name in NAMES.items()}
+RUNGS |= {"1 discs": "1 disc", ALL: "a disc\na cell"}
+"""Model of the ladder -> words beside its marker."""
 
-    words: str
-    rungs: dict[str, str]
-    """Model -> words beside its marker."""
-    colour: str
-    marker: str
+BESIDE = {
+    "1 discs": (-5, 0),
+    "4 discs": (-5, -5),
+    "8 discs": (6, 4),
+    "reduced": (-7, -8),
+    "64 discs": (5, 5),
+    ALL: (0, 9),
+}
+"""Model -> offset of its words from its marker [points]; the others have none."""
 
-
-PLACES = (4, 5), (4, -12)
-"""Offset [points] of words from a marker: above and below in turn, since neighbours may be close."""
-
-FAMILIES = (
-    Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
-    Family("ReducedModel, 1 disc to one a cell",
-           {name: str(n) for n, name in NAMES.items()} | {ALL: "all"}, looks.FEW, "o"),
-    Family("distributed, 21 x 21 points", {"full": ""}, looks.DISTRIBUTED, "D"),
+KINDS_OF_RUN = (
+    ("driven, ", "third quartile", 100.0, "error of the force [% of the load]",
+     "moved with a given velocity"),
+    ("load 2", "end", 1e3, "error of the final place [mm]", "slips in the hand"),
 )  # fmt: skip
-
-ROWS = (
-    (
-        "driven, ",
-        "third quartile",
-        "moved with a given velocity",
-        "force error, third quartile [mN]",
-    ),
-    ("load 2", "end", "in hand, load 2 (slips at once)", "distance of the end [mm]"),
-    ("load 1", "end", "in hand, load 1 (barely slips)", "distance of the end [mm]"),
-)
-"""Rows: part of the name of their cases, the error that is shown, their title, and their axis [thousandths]."""
+"""Part of the name of the cases, the error that is shown, its unit, its axis and the title of the panel."""
 
 FLOOR = 1e-4
-"""Smallest error that is drawn [mN, mm]."""
+"""Smallest error that is drawn [%, mm]."""
 
-TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10)
+TICKS = (0.05, 0.1, 0.2, 0.5, 1, 2, 5)
 
 
-def draw_ladder(rows: list[Row]) -> PlotFigure:
-    """Draw the error over the time of a run: patches of many cells on the left, of few on the right; a row a run."""
+def draw_ladder(rows: list[Row], shifts: dict[str, float]) -> PlotFigure:
+    """Draw the error over the time of a run, for patches of many cells; bars from the least to the largest error.
+
+    `shifts` says by case how far 0.1 % of friction moves the end [m]; the smallest one is drawn.
+    """
     from matplotlib.ticker import FixedLocator, NullLocator
 
     many = {shape_of(row.case) for row in rows if row.model == "64 discs"}
-    groups = [
-        group
-        for few in (False, True)
-        if (group := [row for row in rows if (shape_of(row.case) in many) ^ few])
-    ]
-    figure, panels = looks.panels(
-        8.3, 9.6, len(ROWS), len(groups), sharex="col", sharey="row", squeeze=False
-    )
-    for column, group in zip(panels.T, groups, strict=True):
-        cells = [row.states // 2 for row in group if row.model == "full"]
-        for axes, (case, quantity, title, label) in zip(column, ROWS, strict=True):
-            for family in FAMILIES:
-                _draw_family(
-                    axes, family, [row for row in group if case in row.case], quantity
-                )
-            axes.set(xscale="log", yscale="log", ylabel=label)
-            axes.label_outer()
-            axes.set_title(title, fontsize="medium", loc="left")
-            axes.set_title(
-                "better \N{SOUTH WEST ARROW}",
-                fontsize="medium",
-                loc="right",
-                color="0.35",
+    kept = [row for row in rows if not many or shape_of(row.case) in many]
+    with paper():
+        figure = new_figure(PAGE, 3.3)
+        panels = figure.subplots(1, 2)
+        for axes, (case, name, unit, label, title) in zip(
+            panels, KINDS_OF_RUN, strict=True
+        ):
+            some = [row for row in kept if case in row.case]
+            errors = lambda model, some=some, name=name, unit=unit: (
+                [row.time for row in some if row.model == model],
+                [
+                    max(unit * row.errors[name], FLOOR)
+                    for row in some
+                    if row.model == model
+                ],
             )
+            _draw_rungs(axes, errors)
+            _draw_whole(axes, errors("full"), reference=name == "end")
+            found = [1e3 * shifts[row.case] for row in some if row.case in shifts]
+            if found:
+                _draw_shift(axes, min(found))
+            axes.set(xscale="log", yscale="log", ylabel=label)
+            axes.set_xlabel("time of a run, all cells = 1")
+            axes.set_title(title, loc="left")
             axes.margins(x=0.12, y=0.1)
+            if some:
+                axes.set_xlim(left=0.45 * axes.dataLim.x0)
             axes.xaxis.set_major_locator(FixedLocator(TICKS))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_locator(NullLocator())
-        column[-1].set_xlabel(
-            f"time of a run / distributed model's [-],\npatches of {span(cells, 'd')} cells"
-        )
-    figure.align_ylabels(panels[:, 0])
-    look = {"ls": "-", "lw": 1.4, "ms": 6.5, "mec": "white"}
-    key = [
-        looks.line_key(each.words, marker=each.marker, color=each.colour, **look)
-        for each in FAMILIES
-    ]
-    looks.legend(figure, key, 2)
+            axes.yaxis.set_major_formatter("{x:g}")
+            axes.yaxis.set_minor_locator(NullLocator())
+        tidy(*panels)
     return figure
 
 
-def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> None:
-    """Draw medians joined by a line, bars from the smallest to the largest, the reference, without errors, dotted."""
-    medians: list[tuple[float, float]] = []
-    for model, words in family.rungs.items():
-        found = [row for row in rows if row.model == model]
-        if not found:
+def _draw_rungs(axes: Any, errors: Callable[[str], tuple[list, list]]) -> None:
+    """Draw the models of the ladder as one line, and the published one."""
+    medians = []
+    for model, words in RUNGS.items():
+        times, values = errors(model)
+        if not values:
             continue
-        cost = float(np.median([row.time for row in found]))
-        errors = np.maximum([1e3 * row.errors[quantity] for row in found], FLOOR)
-        if model == "full" and quantity == "end":
-            axes.axvline(cost, color=family.colour, lw=1.0, ls=":")
-            continue
-        middle = float(np.median(errors))
-        axes.vlines(
-            cost, errors.min(), errors.max(), color=family.colour, lw=1.6, alpha=0.35
-        )
-        place = PLACES[len(medians) % 2]
-        axes.annotate(
-            words,
-            (cost, middle),
-            place,
-            textcoords="offset points",
-            fontsize=9,
-            color=family.colour,
-        )
-        medians.append((cost, middle))
+        at = (float(np.median(times)), float(np.median(values)))
+        _bar(axes, at[0], values, looks.REDUCED)
+        medians.append(at)
+        if model in BESIDE:
+            words = f"{words},\nthe default" if model == "reduced" else words
+            _name(axes, words, at, BESIDE[model], looks.REDUCED)
+        if model == "reduced":
+            axes.plot(*at, "o", ms=8, color=looks.REDUCED, mec="black", zorder=5)
     if medians:
-        axes.plot(
-            *np.transpose(medians),
-            "-",
-            marker=family.marker,
-            ms=6.5,
-            mec="white",
-            lw=1.4,
-            color=family.colour,
+        look = {"color": looks.REDUCED, "ms": 4.5, "mec": "white", "lw": 1.4}
+        axes.plot(*np.transpose(medians), "-o", **look, zorder=4)
+    times, values = errors("published")
+    if values:
+        at = (float(np.median(times)), float(np.median(values)))
+        _bar(axes, at[0], values, looks.PUBLISHED)
+        axes.plot(*at, "^", color=looks.PUBLISHED, ms=7, mec="white", zorder=5)
+        rising = max(values) > 2.0 * at[1]  # where its bar is
+        _name(
+            axes,
+            "published",
+            at,
+            (-6, 0) if rising else (0, 6),
+            LETTERS[looks.PUBLISHED],
         )
+
+
+def _draw_whole(axes: Any, errors: tuple[list, list], *, reference: bool) -> None:
+    """Draw the model of all cells: a line where it is the reference, whose errors are zero."""
+    times, values = errors
+    if not values:
+        return
+    at = (float(np.median(times)), float(np.median(values)))
+    letters = LETTERS[looks.DISTRIBUTED]
+    if reference:
+        axes.axvline(at[0], color=looks.DISTRIBUTED, lw=1.4)
+        place = {"xycoords": ("data", "axes fraction"), "rotation": 90}
+        axes.annotate("all cells: the reference", (at[0], 0.0), (3, 4),
+                      textcoords="offset points", fontsize=7, color=letters, **place)  # fmt: skip
+        return
+    _bar(axes, at[0], values, looks.DISTRIBUTED)
+    axes.plot(*at, "s", color=looks.DISTRIBUTED, ms=6.5, mec="black", mew=0.6, zorder=5)
+    _name(axes, "all cells", at, (6, 2), letters)
+
+
+def _draw_shift(axes: Any, shift: float) -> None:
+    """Draw how far a change of friction moves the end."""
+    axes.axhline(shift, color="black", lw=0.8, ls=":")
+    place = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "top"}
+    words = axes.annotate("0.1 % of friction moves it as far", (0.99, shift), (0, -2),
+                          textcoords="offset points", fontsize=7, **place)  # fmt: skip
+    words.set_path_effects(list(HALO))
+
+
+def _bar(axes: Any, at: float, values: list[float], colour: str) -> None:
+    axes.vlines(at, min(values), max(values), color=colour, lw=3.5, alpha=0.25)
+
+
+def _name(
+    axes: Any, words: str, at: tuple[float, float], offset: tuple[int, int], colour: str
+) -> None:
+    """Write words beside a marker."""
+    sides = {-1: "right", 0: "center", 1: "left"}
+    heights = {-1: "top", 0: "center", 1: "bottom"}
+    name = axes.annotate(
+        words,
+        at,
+        offset,
+        textcoords="offset points",
+        ha=sides[int(np.sign(offset[0]))],
+        va=heights[int(np.sign(offset[1]))],
+        color=colour,
+        fontsize=7,
+        linespacing=0.95,
+        zorder=9,
+    )
+    name.set_path_effects(list(HALO))

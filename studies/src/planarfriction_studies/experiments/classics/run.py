@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.plots.style import FEW, PlotFigure
+from planarfriction.plots.style import PlotFigure
 from planarfriction_studies.experiments import experiment, looks, runs
 from planarfriction_studies.experiments.classics import reference, scenes
 from planarfriction_studies.experiments.experiment import (
@@ -185,7 +185,7 @@ def _figure(found: dict[str, Arrays], hunted: Arrays) -> PlotFigure:
         ylabel="largest friction [N]",
         xscale="log",
     )
-    for frequency, shade in zip(FREQUENCIES, (colour, looks.REDUCED, FEW), strict=True):
+    for frequency, shade in zip(FREQUENCIES, looks.OTHERS, strict=False):
         run = found[f"lag, {frequency:g} rad/s"]
         last = run["time"] >= 0.5 * run["time"][-1]
         lag.plot(

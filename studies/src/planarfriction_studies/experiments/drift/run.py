@@ -516,9 +516,9 @@ def _plateaus(found: Runs, straight: Arrays, closed: dict[str, Any]) -> PlotFigu
     figure, panels = looks.panels(9.6, 3.9, 1, 2)
     lines = {
         "d_ep": (looks.DISTRIBUTED, "-", 3.4, 0.5),
-        "r_ep": (looks.REDUCED, "-", 3.4, 0.5),
+        "r_ep": (looks.PUBLISHED, "-", 3.4, 0.5),
         "e_ep": (looks.ELLIPSOID, LINE_STYLES[1], 1.4, 1.0),
-        "straight": (looks.REDUCED, LINE_STYLES[3], 1.1, 1.0),
+        "straight": (looks.PUBLISHED, LINE_STYLES[3], 1.1, 1.0),
     }
     for axes, (name, label, factor) in zip(panels, _ROWS, strict=True):
         for model, (colour, line, width, opacity) in lines.items():

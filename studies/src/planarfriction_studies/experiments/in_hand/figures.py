@@ -17,14 +17,14 @@ from planarfriction_studies.experiments.experiment import WRENCH, Arrays
 from planarfriction_studies.experiments.looks import (
     AXES,
     DISTRIBUTED,
-    EXACT,
     OTHERS,
-    REDUCED,
+    PUBLISHED,
+    REFERENCE,
 )
 
 LOOKS: dict[str, dict[str, Any]] = {
     "distributed": {"color": DISTRIBUTED, "linewidth": 1.5},
-    "reduced": {"color": REDUCED, "linewidth": 1.5, "linestyle": LINE_STYLES[1]},
+    "reduced": {"color": PUBLISHED, "linewidth": 1.5, "linestyle": LINE_STYLES[1]},
 }
 """Model -> how its line looks."""
 
@@ -142,7 +142,7 @@ def end_shifts(
     for cause, marker in zip(causes, "<>oD^*", strict=False):
         places = [j for j, shifts in enumerate(rows.values()) if cause in shifts]
         shown = [1e3 * shifts[cause] for shifts in rows.values() if cause in shifts]
-        colour = colours.get(cause, EXACT)
+        colour = colours.get(cause, REFERENCE)
         axes.plot(
             shown,
             places,

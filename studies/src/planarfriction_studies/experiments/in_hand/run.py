@@ -347,7 +347,7 @@ def _figures(
     }
     shifts = {case: each["shift of the end [m]"] for case, each in numbers.items()}
     colours = {
-        REDUCED: looks.REDUCED,
+        REDUCED: looks.PUBLISHED,
         DEFAULTS: looks.OTHERS[0],
         FINER_GRID: looks.OTHERS[2],
     }

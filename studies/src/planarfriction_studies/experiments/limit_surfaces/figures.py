@@ -9,7 +9,15 @@ import numpy as np
 
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
 from planarfriction.plots.limit_surface import draw_surface, scaled_samples
-from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure
+from planarfriction.plots.style import (
+    LINE_STYLES,
+    LINES,
+    PAGE,
+    PlotFigure,
+    new_figure,
+    paper,
+    tidy,
+)
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.limit_surfaces.patches import spin_about
 from planarfriction_studies.experiments.runs import IN_WORDS
@@ -20,8 +28,8 @@ SUM, BESIDE, LINK = looks.DISTRIBUTED, looks.ELLIPSOID, "0.45"
 ACROSS_Y = ("NonConvex1", "NonConvex2")
 """Shapes that extend along x: their section is that of twists (0, vy, omega), of the others (vx, 0, omega)."""
 
-MATCHED = 28
-"""Twists marked on both surfaces of a section."""
+MATCHED = (120, 200, 1000)
+"""Twists of a section, of 1441, that are marked on both surfaces."""
 
 
 def overview(
@@ -74,43 +82,35 @@ def _circles(axes: Any) -> None:
 
 
 def correspondence(surfaces: Mapping[str, LimitSurfaceCells]) -> PlotFigure:
-    """Draw a section of both surfaces of each shape, the same twists marked on both and joined."""
-    figure, panels = looks.panels(9.6, 7.0, 2, 3)
-    for axes, (name, surface) in zip(panels.flat, surfaces.items(), strict=True):
-        column = 1 if name in ACROSS_Y else 0
-        _section(axes, surface, column)
-        axes.set_title(IN_WORDS[name], fontsize="medium")
-    looks.legend(figure, panels[0, 0], 3)
+    """Draw a section of both surfaces of each shape; for three twists a line joins the wrenches on both."""
+    with paper():
+        figure = new_figure(PAGE, 4.9)
+        panels = figure.subplots(2, 3)
+        for axes, (name, surface) in zip(panels.flat, surfaces.items(), strict=True):
+            _section(axes, surface, 1 if name in ACROSS_Y else 0)
+            axes.set_title(IN_WORDS[name], pad=3.0)
+        for axes in panels[:, 1:].flat:
+            axes.set_ylabel("")
+        looks.legend(figure, panels[0, 0], 3)
     return figure
 
 
-def _section(
-    axes: Any, surface: LimitSurfaceCells, column: int, count: int = MATCHED
-) -> None:
-    """Return points (f, tau/r) of twists (v, r omega) with velocity along one axis, f the force along it."""
+def _section(axes: Any, surface: LimitSurfaceCells, column: int) -> None:
+    """Draw points (f, tau/r) of twists (v, r omega) with velocity along one axis, f the force along it."""
     ellipsoid = LimitSurfaceEllipsoid(surface.patch)
-    fine = (_points_of(each, column, 1441) for each in (surface, ellipsoid))
-    for points, colour, name in zip(
-        fine, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True
-    ):
-        axes.plot(*points, color=colour, lw=1.4, label=name)
-    marked = [
-        _points_of(each, column, count, closed=False) for each in (surface, ellipsoid)
-    ]
-    for exact, beside in zip(*(points.T for points in marked), strict=True):
-        axes.plot(*np.stack([exact, beside]).T, color=LINK, lw=0.8, zorder=1)
-    axes.plot(*marked[0], ls="", marker="o", ms=3.8, color=SUM)
-    axes.plot(*marked[1], ls="", marker="s", ms=3.4, color=BESIDE)
-    axes.plot([], [], color=LINK, lw=0.8, label="same twist")
+    exact, beside = (_points_of(each, column, 1441) for each in (surface, ellipsoid))
+    axes.plot(*exact, color=looks.REFERENCE, lw=1.3, label="sum over the cells")
+    dashes = LINES[BESIDE]
+    axes.plot(*beside, color=BESIDE, lw=1.3, ls=dashes, label="ellipsoid")
+    for place, label in zip(MATCHED, ("same twist", None, None), strict=True):
+        ends = np.stack([exact[:, place], beside[:, place]], axis=1)
+        axes.plot(*ends, "o-", color=LINK, ms=2.6, lw=0.9, label=label)
     force = ("$f_x$", "$f_y$")[column]
-    axes.set(
-        xlabel=f"{force} [-]",
-        ylabel="$\\tau/r$ [-]",
-        aspect="equal",
-        xlim=(-1.12, 1.12),
-        ylim=(-1.12, 1.12),
-    )
-    axes.set(xticks=[-1, -0.5, 0, 0.5, 1], yticks=[-1, -0.5, 0, 0.5, 1])
+    axes.set_xlabel(f"{force} / $\\mu f_N$")
+    axes.set_ylabel("$\\tau$ / $\\mu f_N r$")
+    axes.set(aspect="equal", xlim=(-1.12, 1.12), ylim=(-1.12, 1.12))
+    axes.set(xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+    tidy(axes)
 
 
 def _points_of(
@@ -175,7 +175,7 @@ def _force_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -
     continuous = 1.0 - 2.0 * np.clip((y + half) / (2.0 * half), 0.0, 1.0) ** 2
     for each, colour in zip(sides, (SUM, BESIDE), strict=True):
         axes.plot(spin_about(each, y)[:, 0], 1e3 * y, color=colour, lw=1.4)
-    axes.plot(continuous, 1e3 * y, color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1])
+    axes.plot(continuous, 1e3 * y, color=looks.REFERENCE, lw=1.0, ls=LINE_STYLES[1])
     for _, at, colour, marker in centres:
         axes.axhline(1e3 * at, color=colour, lw=0.8)
         for each in sides:
@@ -204,7 +204,7 @@ def _spin_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) ->
     axes.plot(
         [],
         [],
-        color=looks.EXACT,
+        color=looks.REFERENCE,
         lw=1.0,
         ls=LINE_STYLES[1],
         label="continuous pressure",
@@ -228,7 +228,7 @@ def _spin_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) ->
         marker="*",
         ms=10,
         ls="",
-        color=looks.EXACT,
+        color=looks.REFERENCE,
         label="torque without force",
         zorder=1,
     )

@@ -288,7 +288,7 @@ def _figures(
     }
     first, *reduced = VARIANTS
     styles: dict[str, Any] = {first: {"color": looks.DISTRIBUTED, "linewidth": 1.5}} | {
-        variant: {"color": looks.REDUCED, "linestyle": style, "linewidth": 1.5}
+        variant: {"color": looks.PUBLISHED, "linestyle": style, "linewidth": 1.5}
         for variant, style in zip(reduced, LINE_STYLES, strict=True)
     }
     shown = {

@@ -41,8 +41,8 @@ STEP = 0.02
 
 LINES = {
     "plain": ("plain sum", "-", 1.3, looks.DISTRIBUTED),
-    "bilinear": ("bilinear smoothing", "-", 1.3, looks.REDUCED),
-    "rod": ("rod, exact", LINE_STYLES[1], 1.1, looks.EXACT),
+    "bilinear": ("bilinear smoothing", "-", 1.3, looks.PUBLISHED),
+    "rod": ("rod, exact", LINE_STYLES[1], 1.1, looks.REFERENCE),
 }
 """Wrenches that are compared -> words, style, width and colour of their lines."""
 

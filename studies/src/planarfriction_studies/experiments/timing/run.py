@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.plots.style import PlotFigure
+from planarfriction.plots.style import PAGE, PlotFigure, new_figure, paper, tidy
+from planarfriction.plots.symbols import HALO
 from planarfriction_studies.experiments import experiment, facts, looks
 from planarfriction_studies.experiments.experiment import (
     UNITS,
@@ -33,6 +34,12 @@ from planarfriction_studies.experiments.timing.runs import (
 from planarfriction_studies.experiments.wording import power, report, short
 
 KINDS = ("distributed", "reduced")
+
+DEFAULT = "RODAS4"
+"""Solver of the library by default."""
+
+GREYS = ("0.0", "0.35", "0.5", "0.65")
+"""Colours of the other solvers."""
 
 AGREEMENT = {"reduced": (1e-6, 1e-5), "distributed": (1e-8, 1e-7)}
 """Allowed difference of a general solver at its tightest tolerance from our reference: position [m], angle [rad].
@@ -272,33 +279,38 @@ def _precision(problem: Problem, points: Points) -> dict[str, Any]:
 
 
 def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
-    figure, (panels,) = looks.panels(9.6, 4.2, 1, len(points), squeeze=False)
-    for axes, (problem, solvers) in zip(panels, points.items(), strict=True):
-        for i, (solver, entries) in enumerate(solvers.items()):
-            errors, times, first, third = (
-                np.array([entry[name] for entry in entries])
-                for name in ("error", *TIMES)
-            )
-            bars = {
-                "yerr": [times - first, third - times],
-                "capsize": 2.5,
-                "elinewidth": 1.0,
-            }
-            look = {
-                "color": looks.OTHERS[i],
-                "markersize": 5,
-                "linewidth": 1.3,
-                "label": solver,
-            }
-            axes.errorbar(errors, times, fmt="osD^"[i] + "-", **bars, **look)
-        axes.set(
-            xscale="log",
-            yscale="log",
-            xlabel="largest position error [m]",
-            ylabel="wall time [s]",
-        )
-        axes.set_title(problem.name, fontsize="medium")
-    looks.legend(figure, panels[0], 4, "lower")
+    """Draw wall time over error: the default solver in blue, the others in greys with their markers."""
+    with paper():
+        figure = new_figure(PAGE, 3.0)
+        panels = figure.subplots(1, len(points), squeeze=False)[0]
+        for axes, (problem, solvers) in zip(panels, points.items(), strict=True):
+            for i, (solver, entries) in enumerate(solvers.items()):
+                errors, times, first, third = (
+                    np.array([entry[name] for entry in entries])
+                    for name in ("error", *TIMES)
+                )
+                bars = {"yerr": [times - first, third - times], "elinewidth": 1.0}
+                default = solver == DEFAULT
+                colour = looks.REDUCED if default else GREYS[i % len(GREYS)]
+                look = {"color": colour, "markersize": 4, "zorder": 4 if default else 3}
+                axes.errorbar(errors, times, fmt="osD^"[i] + "-", **bars, **look)
+                last = int(np.argmin(errors))
+                axes.annotate(
+                    solver,
+                    (errors[last], times[last]),
+                    (-5, 0),
+                    textcoords="offset points",
+                    ha="right",
+                    va="center",
+                    color=colour,
+                    fontsize=7,
+                    fontweight="bold" if default else None,
+                ).set_path_effects(list(HALO))
+            axes.set(xscale="log", yscale="log", xlabel="largest position error [m]")
+            axes.set_title(problem.name, loc="left")
+            axes.margins(x=0.26)
+            tidy(axes)
+        panels[0].set_ylabel("wall time [s]")
     return figure
 
 

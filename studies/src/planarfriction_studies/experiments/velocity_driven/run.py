@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.plots.style import LINE_STYLES, PlotFigure
+from planarfriction.plots.style import (
+    LINE_STYLES,
+    MEASURED,
+    PAGE,
+    PlotFigure,
+    new_figure,
+    paper,
+    tidy,
+)
 from planarfriction.scenes.ready import driven, published_velocity
 from planarfriction_studies.experiments import experiment, facts, looks, runs
 from planarfriction_studies.experiments.experiment import (
@@ -329,6 +337,15 @@ LOOKS: dict[str, dict[str, Any]] = {
 MARKERS = {"d": "o", "r": "s", "e": "^"}
 """Letter of a model -> marker of its published curves."""
 
+SHOWN = (
+    ("ft", "force error [% of the load]", 100.0),
+    ("tau", "torque error [N mm]", 1e3),
+)
+"""Quantity of the errors, label of its axis, and shown units per SI unit."""
+
+SHOWN_FLOOR = 1e-3
+"""Least error that is shown [%, N mm]: many are zero but for rounding."""
+
 SPEEDS = (
     ("vx", "$v_x$ [mm/s]", 1e3),
     ("vy", "$v_y$ [mm/s]", 1e3),
@@ -417,38 +434,39 @@ def _page(
 
 
 def _box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
-    """Draw errors of force [N] and torque [N mm] of all shapes, ours filled, the published boxes open beside them."""
-    colours = {"corrected": looks.REDUCED, "ellipsoid": looks.ELLIPSOID}
+    """Draw errors of force and torque of all shapes: medians, quartiles, ranges and maxima; grey: as published."""
+    colours = {"corrected": looks.PUBLISHED, "ellipsoid": looks.ELLIPSOID}
     table = facts.published_table("box")
-    figure, panels = looks.box_panels([runs.IN_WORDS[shape] for shape in every], 7.4)
-    rows = (
-        ("ft", "error of the force [N]", 1.0, 1e-5),
-        ("tau", "error of the torque [N mm]", 1e3, 1e-4),
-    )
-    for axes, (quantity, label, factor, linear) in zip(panels, rows, strict=True):
-        axes.set_yscale("symlog", linthresh=linear, linscale=0.5)
-        for place, (shape, each) in enumerate(every.items()):
-            for offset, (model, values) in zip(
-                (-0.28, 0.12), each[quantity].items(), strict=True
-            ):
-                ours = factor * np.array(list(boxes.statistics(values).values()))
-                looks.box(axes, place + offset, ours, colours[model], 0.14)
-                if published := table.get(f"{quantity}/{shape}/{model}"):
-                    theirs = [factor * published[name] for name in boxes.COLUMNS[:5]]
-                    looks.box(
-                        axes,
-                        place + offset + 0.16,
-                        theirs,
-                        colours[model],
-                        0.14,
-                        filled=False,
-                    )
-        axes.set(ylim=(0.0, None), ylabel=label)
-    named = {MODELS[model]: colour for model, colour in colours.items()}
-    looks.box_legend(
-        figure,
-        named,
-        5,
-        {f"{words}, published": colour for words, colour in named.items()},
-    )
+    with paper():
+        figure = new_figure(PAGE, 4.2)
+        panels = figure.subplots(2, 1, sharex=True)
+        for axes, (quantity, label, factor) in zip(panels, SHOWN, strict=True):
+            for place, (shape, each) in enumerate(every.items()):
+                for offset, (model, values) in zip(
+                    (-0.24, 0.12), each[quantity].items(), strict=True
+                ):
+                    found = factor * np.array([*boxes.statistics(values).values()])
+                    at = place + offset
+                    looks.span(axes, at, found, colours[model])
+                    if published := table.get(f"{quantity}/{shape}/{model}"):
+                        theirs = [
+                            factor * published[name] for name in boxes.COLUMNS[:5]
+                        ]
+                        looks.span(axes, at + 0.12, theirs, MEASURED)
+            axes.set(yscale="log", ylabel=label)
+            axes.set_ylim(bottom=SHOWN_FLOOR)
+            axes.yaxis.set_major_formatter("{x:g}")
+            tidy(axes)
+            axes.grid(False, axis="x")
+        panels[1].set_xticks(range(len(every)), [runs.IN_WORDS[name] for name in every])
+        figure.align_ylabels(panels)
+        key = [
+            looks.line_key(MODELS[model], color=colour, marker="o", ms=5, lw=2.5)
+            for model, colour in colours.items()
+        ]
+        key += [
+            looks.line_key("as published", color=MEASURED, marker="o", ms=5, lw=2.5),
+            looks.line_key("maximum", ls="", marker="x", ms=4, mew=1.1, color="0.3"),
+        ]
+        looks.legend(figure, key, 4)
     return figure
