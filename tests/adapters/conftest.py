@@ -12,10 +12,14 @@ PLAIN = "jax_disable_most_optimizations"
 @pytest.fixture(autouse=True, scope="module")
 def optimised():
     """Steps of simulators run longer than they compile: JAX optimises them, as it does for users."""
-    jax = sys.modules.get("jax")
-    if jax is None:
-        yield
-        return
-    jax.config.update(PLAIN, False)
+    before = os.environ.pop(PLAIN.upper(), None)  # JAX may be imported within
+    _set(False)
     yield
-    jax.config.update(PLAIN, os.environ.get(PLAIN.upper()) == "1")
+    if before is not None:
+        os.environ[PLAIN.upper()] = before
+    _set(before == "1")
+
+
+def _set(plain: bool) -> None:
+    if "jax" in sys.modules:
+        sys.modules["jax"].config.update(PLAIN, plain)
