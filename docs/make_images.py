@@ -200,23 +200,24 @@ def over_an_edge() -> plots.style.PlotFigure:
         used = stiffness * cover * np.hypot(*state[:2]) / limit
         pressure = 1e-3 * loads / square.areas
         maps = [
-            (pressure, "viridis", 30.0),
-            (np.where(loads > 0.0, used, 0.0), "magma", 1.0),
+            (pressure, 30.0),
+            (used, 1.0),
         ]
         drawn = []
-        for ax, (values, colours, most) in zip(column, maps, strict=True):
-            shown = np.where(borne, values, np.nan).reshape(40, 40)
+        for ax, (values, most) in zip(column, maps, strict=True):
+            shown = np.where(loads > 0.0, values, np.nan).reshape(40, 40)
             extent = np.array([-1.0, 1.0, -1.0, 1.0]) * 500.0 * side
             drawn.append(
                 ax.imshow(
                     shown,
                     origin="lower",
                     extent=extent,
-                    cmap=colours,
+                    cmap=plots.style.PRESSURE_MAP,
                     vmin=0.0,
                     vmax=most,
                 )
             )
+            ax.grid(False)
             ax.axvline(1e3 * (0.5 * side - off), color="0.4", linewidth=1.0)
             ax.set_xlabel("x [mm]")
         column[0].set_title(f"{1e3 * off:.0f} mm over the edge")
