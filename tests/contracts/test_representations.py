@@ -113,8 +113,8 @@ def test_notebooks_show_a_patch_with_its_pressure():
         for r in (0.3, 0.7)
         for c in (0.3, 0.7)
     }
-    # Row 0 is the top, and the most loaded is brightest.
-    assert corner[0.3, 0.3].sum() > corner[0.7, 0.7].sum() + 100
+    # Row 0 is the top, and the most loaded is darkest.
+    assert corner[0.3, 0.3].sum() < corner[0.7, 0.7].sum() - 100
     assert np.abs(corner[0.7, 0.3] - corner[0.7, 0.7]).max() < 2.0
     assert corner[0.3, 0.7].min() > 250  # no load, no colour
 

@@ -11,12 +11,6 @@ from planarfriction._support.shown import unit_for
 from planarfriction.planning.holding import forces_needed, surface_at
 from planarfriction.plots import style
 
-HOLDS = "#EAF3F9"
-"""Fill of loads that the grip holds with its margin."""
-
-BEYOND = "#F3E2D8"
-"""Fill of loads at which the part slips."""
-
 DOTTED = (0, (1.0, 1.5))
 """Line of the limit with margin."""
 
@@ -82,15 +76,18 @@ def _draw_section(
     x = np.hypot(*limits["limit"][:, :2].T)
     y = unit.factor * sign * limits["limit"][:, 2]
     right, top = 1.12 * grip * x.max(), 1.12 * grip * y.max()
-    axes.set_facecolor(BEYOND)
+    axes.set_facecolor(style.BEYOND)
     axes.fill(np.r_[0.0, grip * x], np.r_[0.0, grip * y], color="white", lw=0)
     axes.fill(
-        np.r_[0.0, with_margin * x], np.r_[0.0, with_margin * y], color=HOLDS, lw=0
+        np.r_[0.0, with_margin * x],
+        np.r_[0.0, with_margin * y],
+        color=style.HOLDS,
+        lw=0,
     )
-    axes.plot(grip * x, grip * y, color=style.EXACT, lw=1.5)
+    axes.plot(grip * x, grip * y, color=style.REFERENCE, lw=1.5)
     if plan.margin:
         axes.plot(
-            with_margin * x, with_margin * y, color=style.EXACT, lw=0.8, ls=DOTTED
+            with_margin * x, with_margin * y, color=style.REFERENCE, lw=0.8, ls=DOTTED
         )
     other = limits["ellipsoid"]
     axes.plot(grip * np.hypot(*other[:, :2].T), grip * unit.factor * sign * other[:, 2],
@@ -98,7 +95,7 @@ def _draw_section(
     flat = plan.elevations == 0.0
     torque = unit.factor * sign * plan.loads[:, 2]
     loop = np.append(np.flatnonzero(flat), 0)
-    axes.plot(force[loop], torque[loop], color=style.PALETTE[0], lw=1.6)
+    axes.plot(force[loop], torque[loop], color=style.REDUCED, lw=1.6)
     axes.plot(force[plan.worst], torque[plan.worst], "o", ms=6, color="k", mec="white")
     axes.annotate("worst", (force[plan.worst], torque[plan.worst]), (7, -5), weight="bold",
                   **_LABEL)  # fmt: skip
@@ -106,7 +103,7 @@ def _draw_section(
               color="0.25")  # fmt: skip
     names = {
         "by the ellipsoid": ("ellipsoid", 0.6, 0.85, style.ELLIPSOID),
-        f"limit at {grip:.3g} N": ("limit", 0.35, 0.72, style.EXACT),
+        f"limit at {grip:.3g} N": ("limit", 0.35, 0.72, style.REFERENCE),
     }
     for words, (name, place, height, colour) in names.items():
         point = grip * limits[name][int(place * SAMPLES)]
@@ -138,12 +135,12 @@ def _draw_directions(
     )
     degrees = np.append(np.degrees(angles), 360.0)
     top = 1.15 * max(grip, needed.max())
-    axes.axhspan(0.0, with_margin, color=HOLDS, lw=0)
-    axes.axhspan(grip, top, color=BEYOND, lw=0)
-    axes.axhline(grip, color=style.EXACT, lw=1.5)
+    axes.axhspan(0.0, with_margin, color=style.HOLDS, lw=0)
+    axes.axhspan(grip, top, color=style.BEYOND, lw=0)
+    axes.axhline(grip, color=style.REFERENCE, lw=1.5)
     if plan.margin:
-        axes.axhline(with_margin, color=style.EXACT, lw=0.8, ls=DOTTED)
-    axes.plot(degrees, np.append(needed, needed[0]), color=style.PALETTE[0], lw=1.6)
+        axes.axhline(with_margin, color=style.REFERENCE, lw=0.8, ls=DOTTED)
+    axes.plot(degrees, np.append(needed, needed[0]), color=style.REDUCED, lw=1.6)
     axes.plot(degrees, np.append(approximate, approximate[0]), color=style.ELLIPSOID,
               ls=style.LINE_STYLES[3], lw=1.1)  # fmt: skip
     at = np.degrees(plan.angles[plan.worst])

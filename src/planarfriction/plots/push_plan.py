@@ -18,7 +18,9 @@ def plot_push_plan(plan: pf.planning.PushPlan) -> style.PlotFigure:
     draw_push(axes, plan.push)
     outline = plan.push.slider.outline
     goal = placed(np.concatenate([outline, outline[:1]]), np.array(plan.report.goal))
-    axes.plot(*(1e3 * goal.T), "--", color=style.EXACT, lw=1.0, zorder=6, label="goal")
+    axes.plot(
+        *(1e3 * goal.T), "--", color=style.REFERENCE, lw=1.0, zorder=6, label="goal"
+    )
     axes.legend(fontsize="small")
     length = unit_for("length", plan.report.length)
     words = (
