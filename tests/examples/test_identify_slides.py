@@ -112,7 +112,7 @@ def test_friction_radius_and_ends_come_out(example, tmp_path, monkeypatch, capsy
         example.main([str(tmp_path), "--tosses", "4", "--out", str(tmp_path / "out")])
         == 0
     )
-    assert "square, mu alone" in capsys.readouterr().out
+    assert "square, mu" in capsys.readouterr().out
     assert (
         (tmp_path / "out" / "identify_slides.png").read_bytes().startswith(b"\x89PNG")
     )
