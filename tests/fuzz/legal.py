@@ -458,12 +458,22 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "scenes.curling": {"twist": (1.0, 0.0, 10.0), "start": "sliding"},
     "export_c": {"folder": "library", "precision": "double"},
     "ReducedModel": {"cells": 12},
-    "rollout": {"twist": TWISTS},
-    "derivatives.rollout": {"twist": TWISTS},
-    "derivatives.rollout_jvp": {"twist": TWISTS},
-    "derivatives.rollout_states": {"twist": TWISTS},
-    "derivatives.rollout_vjp": {"twist": TWISTS},
-    "derivatives.rollout_jacobian": {"twist": TWISTS, "names": ("mu_c",)},
+    **{
+        name: {"twist": TWISTS, "loads": None, "cover": None}
+        for name in (
+            "rollout",
+            "derivatives.rollout",
+            "derivatives.rollout_jvp",
+            "derivatives.rollout_states",
+            "derivatives.rollout_vjp",
+        )
+    },
+    "derivatives.rollout_jacobian": {
+        "twist": TWISTS,
+        "names": ("mu_c",),
+        "loads": None,
+        "cover": None,
+    },
     "derivatives.scene_sensitivities": {
         "parameters": ("mu",),
         "signals": {},
