@@ -279,7 +279,8 @@ def test_driven_pads_are_drawn_where_they_are(tmp_path):
     figure = pf.plots.plot_motion(run)
     axes = figure.axes[0]
     assert axes.get_xlim()[0] < -72.0  # the pads begin 60 mm behind the centre
-    boxes = [patch.get_window_extent() for patch in axes.patches]
-    assert len(boxes) == 2 * pf.plots.motion.INSTANTS
-    left = [box.x0 for box in boxes[1::2]]
+    motion = pf.plots.motion
+    pads = [each for each in axes.patches if each.get_alpha() == motion.PAD_OPACITY]
+    assert len(pads) == 2 * motion.INSTANTS
+    left = [pad.get_window_extent().x0 for pad in pads[1::2]]
     assert left == sorted(left) and left[-1] > left[0] + 1.0
