@@ -10,7 +10,13 @@ from planarfriction_studies.measured import TASKS, replayed_pushes
 from tests.support.repository import script
 
 DOCS = Path(__file__).parents[2] / "docs"
-ELSEWHERE = {"make_breakaway", "make_lines", "make_referee", "make_tables"}
+ELSEWHERE = {
+    "make_breakaway",
+    "make_cycles",
+    "make_lines",
+    "make_referee",
+    "make_tables",
+}
 """Scripts whose own tests run them: test_breakaway, test_docs, test_referee, test_bench."""
 
 
