@@ -17,7 +17,7 @@ ELSEWHERE = {
     "make_referee",
     "make_tables",
 }
-"""Scripts whose own tests run them: test_breakaway, test_docs, test_referee, test_bench."""
+"""Scripts whose own tests run them (test_breakaway, test_docs, test_referee, test_bench), or that need emulators."""
 
 
 def beside(made, folder, monkeypatch):
