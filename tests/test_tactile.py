@@ -127,6 +127,24 @@ def test_the_face_of_a_half_space_bends_as_the_boundary_element_method_says(shif
     assert most < 0.1 and mean < 0.04 and beside < 0.03
 
 
+def test_discs_of_single_cells_bend_a_half_space_as_cells_do():
+    """Fewer cells than discs: each has a disc of its own, with a bristle of its spin."""
+    patch = pf.ContactPatch.rectangle(0.02, cells=4)
+    cells = pf.DistributedModel(patch, SPRINGS, pad=HALF_SPACE)
+    few = pf.ReducedModel(patch, SPRINGS, pad=HALF_SPACE)
+    assert few.reduction.patch.cells == patch.cells
+    z = 1e-6 * np.random.default_rng(3).normal(size=(3, patch.cells))
+    face = np.zeros(3)
+    points = [[0.0, 0.0], [0.015, 0.002]]
+    moved, expected = (
+        tactile.displacement(
+            model, np.concatenate([z[:d].ravel(), face]), tactile.markers(model, points)
+        )
+        for model, d in ((few, 3), (cells, 2))
+    )
+    np.testing.assert_allclose(moved, expected, rtol=1e-12)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("cells, mean", [(None, 0.04), (64, 0.06), (24, 0.13)])
 @pytest.mark.parametrize("name", ["circle, Hertz", "square, uniform"])
@@ -193,6 +211,9 @@ def test_a_field_needs_cells():
     with refused("patch .* one line"):
         tactile.markers(line, [[0.0, 0.0]])
     model = MODELS["cells"]
+    other = tactile.markers(MODELS["discs"], [[0.0, 0.0]])
+    with refused("markers .* bristles"):
+        tactile.displacement(MODELS["cells"], MODELS["cells"].rest(), other)
     with refused("points"):
         tactile.markers(model, [0.0, 0.0, 0.0])
     with refused("above .* between 0 and 1"):

@@ -175,10 +175,13 @@ def displacement(model: Any, state: Any, markers: Markers) -> Any:
     The pad is on the moving body, whose face stays behind: `-z` where a cell is. On a half-space it is that by the
     forces `-K_i z_i`. A pad on what lies below has the opposite sign.
 
-    Raises InvalidValueError for a model without cells and a state of another shape.
+    Raises InvalidValueError for a model without cells, a state of another shape, and markers of another model.
     """
     xp, z = _bristles(model, state)
     points, axes, d, n = markers.response.shape
+    if z.shape[-2:] != (d, n):
+        rule = f"belong to a model with bristles {list(z.shape[-2:])}"
+        raise InvalidValueError("markers", rule, [d, n])
     response = markers.response.reshape(points * axes, d * n).T
     if xp is not NUMPY:
         response = xp.from_numpy(response, z)
@@ -201,7 +204,11 @@ def _by_forces(
     shears = shears / patch.areas
     pieces = -few.pad.pieces(few.patch, few.law)
     if few.patch.cells == patch.cells:
-        return shears * pieces
+        response = np.zeros((len(points), 2, few.patch.bristles, patch.cells))
+        response[:, :, :2] = (
+            shears * pieces
+        )  # no spin of a single cell moves its neighbours
+        return response
     members = clusters_of(patch, pad.shares(patch), model.cells)
     weights = patch.weights()
     x, y = patch.positions.T
@@ -248,10 +255,6 @@ def _cells_of(model: Any) -> DistributedModel:
         rule = "be one of NumPy with bristles in cells or discs"
         raise InvalidValueError("model", rule, type(model).__name__)
     return few
-
-
-def _array(xp: Any, array: np.ndarray, like: Any) -> Any:
-    return array if xp is NUMPY else xp.from_numpy(array, like)
 
 
 def _bristles(model: Any, state: Any) -> tuple[Any, Any]:

@@ -69,7 +69,7 @@ class Bars(NamedTuple):
     rows: np.ndarray
     """[B, N], comes in as zeros; changes are [B or 1, N]."""
     cells: np.ndarray
-    """Of the loads of cells, [B, T, n]; [B, 0, n] if none are wanted. Changes are [B or 1, T or 0, n]."""
+    """Changes of the loads of cells [B or 1, T or 0, n], or slopes by them [B, T or 0, n]; 0 if none are wanted."""
     own: float = 1.0
     """Share of the cotangents of these that comes by the law of a pad: 0 at a held ratio of stiffness to load."""
 
