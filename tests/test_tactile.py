@@ -145,6 +145,22 @@ def test_discs_of_single_cells_bend_a_half_space_as_cells_do():
     np.testing.assert_allclose(moved, expected, rtol=1e-12)
 
 
+def test_a_face_bends_alike_wherever_its_frame_lies():
+    """The frame of a patch lies anywhere: forces and torques of discs act about their own centres."""
+    points = np.array([[1e-3, 2e-3], [0.015, -0.004]])
+    offset = np.array([0.03, -0.02])
+    patch = pf.ContactPatch.rectangle(0.02, cells=6)
+    away = dataclasses.replace(patch, positions=patch.positions + offset)
+    here, there = (
+        tactile.markers(
+            pf.ReducedModel(each, SPRINGS, cells=4, pad=HALF_SPACE), points + by
+        ).response
+        for each, by in ((patch, 0.0), (away, offset))
+    )
+    assert np.abs(here[:, :, 2]).max() > 0.01 * np.abs(here).max()
+    np.testing.assert_allclose(there, here, rtol=0, atol=1e-3 * np.abs(here).max())
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("cells, mean", [(None, 0.04), (64, 0.06), (24, 0.13)])
 @pytest.mark.parametrize("name", ["circle, Hertz", "square, uniform"])
