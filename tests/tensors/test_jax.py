@@ -17,9 +17,10 @@ from tests.support.repository import script
 
 jax = pytest.importorskip("jax", reason="needs the extra [jax]")
 import jax.numpy as jnp  # noqa: E402
+from jax.extend.core import jaxprs_in_params  # noqa: E402
 
 import planarfriction.jax as pj  # noqa: E402
-from planarfriction.jax.namespace import xp  # noqa: E402
+from planarfriction.jax.namespace import pressing, xp  # noqa: E402
 from planarfriction.tensors import surfaces  # noqa: E402
 
 pytestmark = pytest.mark.jax
@@ -477,3 +478,26 @@ def test_floats_that_jax_does_not_know_are_converted(kind):
         for each in (twist.astype(kind), twist)
     )
     assert np.array_equal(given, wanted)
+
+
+def conditions(jaxpr):
+    """Yield the names of the operations in the conditions of all loops."""
+    for equation in jaxpr.eqns:
+        if equation.primitive.name == "while":
+            inner = equation.params["cond_jaxpr"].jaxpr
+            yield [each.primitive.name for each in inner.eqns]
+        for each in jaxprs_in_params(equation.params):
+            yield from conditions(each)
+
+
+def test_conditions_of_loops_round_nothing():
+    """Side by side, a loop whose condition is rounded differently inside and outside of its body never ends."""
+    cells = jnp.ones((5, 23))
+    centre = jnp.ones((5, 1))
+    found = jax.make_jaxpr(pressing)(
+        cells, cells, cells, centre, centre, jnp.zeros((5, 1), bool)
+    )
+    loops = list(conditions(found.jaxpr))
+    assert len(loops) == 2
+    exact = {"and", "or", "not", "lt", "gt", "convert_element_type"}
+    assert not set().union(*loops) - exact

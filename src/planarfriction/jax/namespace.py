@@ -68,15 +68,24 @@ class _Tilt(NamedTuple):
         )
 
     def share_of(self, plane: jax.Array, step: jax.Array) -> jax.Array:
-        """Return the share of a step to go."""
+        """Return the share of a step to go.
+
+        The loop keeps its condition. Of many loops side by side the compiler evaluates a condition in two places, and
+        rounds it differently there: with one that is computed again they may never end.
+        """
         most = OVERSHOT * abs(self.slope(plane, step))
-        return jax.lax.while_loop(
-            lambda far: (
-                (self.slope(plane + far * step, step) > most) & (far > 0.5**SHORTENINGS)
-            ),
-            lambda far: 0.5 * far,
-            jnp.ones_like(most),
-        )
+
+        def too_far(far):
+            return self.slope(plane + far * step, step) > most
+
+        def body(last):
+            far = 0.5 * last[0]
+            return far, too_far(far) & (far > 0.5**SHORTENINGS)
+
+        whole = jnp.ones_like(most)
+        return jax.lax.while_loop(lambda last: last[1], body, (whole, too_far(whole)))[
+            0
+        ]
 
     def pressing(self, narrow: jax.Array) -> jax.Array:
         """Return the cells that press in the end, bool `[N]`."""
