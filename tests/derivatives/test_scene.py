@@ -212,7 +212,8 @@ def test_derivatives_are_central_differences(kind, h, rtol):
                 near, back, far, far_back = (data[variable].values for data in tight)
                 expected = (8.0 * (near - back) - (far - far_back)) / (12.0 * h)
                 error = np.abs(values[..., i] - expected).max()
-                assert error <= rtol * np.abs(expected).max(), (
+                # and 1e-13 m of rounding in each run
+                assert error <= rtol * np.abs(expected).max() + 1e-13 / h, (
                     name,
                     variable,
                     error / np.abs(expected).max(),

@@ -289,7 +289,7 @@ def test_a_pendulum_may_hang_at_any_angle(offset):
     low, high = fit.intervals["offset"]
     assert low <= offset <= high
     # Friction holds the joint within some degrees.
-    assert fit.values["offset"] == pytest.approx(offset, abs=0.06)
+    assert fit.values["offset"] == pytest.approx(offset, abs=0.1)
 
 
 REFUSED = {
