@@ -604,8 +604,13 @@ def test_without_drake_the_extra_is_named(monkeypatch):
 # ---------------------------------------------------------------------- pressures of contact surfaces
 
 
-def spun(shape, height, model, beyond=0.0, hint=0.005, **options):
-    """Return torque, load, covers and contact surface of a shape of 0.2 kg that spins, `beyond` an edge in y."""
+def spun(
+    shape, height, model, beyond=0.0, hint=0.005, rolling=0.0, time=2e-3, **options
+):
+    """Return torque, load, covers and contact surface of a shape of 0.2 kg that spins, `beyond` an edge in y.
+
+    It may roll along x, so fast.
+    """
     builder, plant, scene_graph = bare(2e-3)
     inertia = SpatialInertia(0.2, [0, 0, 0], UnitInertia.SolidSphere(0.05))
     body = plant.AddRigidBody("body", inertia)
@@ -626,8 +631,8 @@ def spun(shape, height, model, beyond=0.0, hint=0.005, **options):
     friction = Friction.AddToBuilder(builder, plant, scene_graph, patches)
     run = running(builder, plant, friction)
     run.to(0.1)
-    plant.SetVelocities(run.context, [0, 0, 20.0, 0, 0, 0])
-    run.to(0.102)
+    plant.SetVelocities(run.context, [0, rolling / height, 20.0, rolling, 0, 0])
+    run.to(0.1 + time)
     torque = friction.get_wrenches_output_port().Eval(run.own)[2]
     load = friction.get_loads_output_port().Eval(run.own)[0]
     results = plant.get_contact_results_output_port().Eval(run.context)
@@ -645,6 +650,18 @@ def test_a_ball_presses_as_its_contact_surface_does():
     torque, load, _, surface = spun(Sphere(0.05), 0.05, model, **where)
     radius = np.sqrt(surface.total_area() / np.pi)
     assert torque == pytest.approx(-8.0 / 15.0 * 0.3 * load * radius, rel=0.01)
+
+
+@pytest.mark.parametrize(("few", "close"), [(False, 0.01), (True, 0.06)])
+def test_a_ball_that_rolls_presses_other_cells_all_the_time(few, close):
+    """Its spin goes on as that of a ball that rests, 40 mm from where it began."""
+    law = dataclasses.replace(COULOMB, sigma_0=1e5)
+    patch = pf.ContactPatch.rectangle(0.02, cells=24)
+    kind = pf.ReducedModel if few else pf.DistributedModel
+    where = {"beyond": -0.2, "centre": "contact", "rolling": 0.2, "time": 0.2}
+    torque, load, _, surface = spun(Sphere(0.05), 0.05, kind(patch, law), **where)
+    radius = np.sqrt(surface.total_area() / np.pi)
+    assert torque == pytest.approx(-8.0 / 15.0 * 0.3 * load * radius, rel=close)
 
 
 @pytest.mark.parametrize("few", [False, True])

@@ -122,8 +122,9 @@ def test_what_lifts_takes_its_force_along_and_comes_back_unstressed():
     assert wrench[0] == pytest.approx(-0.05)
 
 
+@pytest.mark.parametrize("steps", [30, pytest.param(5000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", [each for each in MODELS if "layer" in each])
-def test_no_pressure_makes_energy(name):
+def test_no_pressure_makes_energy(name, steps):
     """The energy of the bristles rises by no more than the work at their ends, with pressure and cover of any kind."""
     model = MODELS[name].with_law(LAW)
     cells = model.patch.cells
@@ -135,7 +136,7 @@ def test_no_pressure_makes_energy(name):
     loads = before
     energy = np.zeros(200)
     pressed = 1.0
-    for _ in range(30):
+    for _ in range(steps):
         cover = rng.uniform(0.0, 1.0, before.shape) ** 0.3
         new = rng.exponential(1.0 / cells, before.shape) * rng.integers(0, 2, before.shape)  # fmt: skip
         twist = rng.normal(size=(200, 3)) * [0.01, 0.01, 1.0]
