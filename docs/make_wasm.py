@@ -14,10 +14,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
+from matplotlib.colors import to_hex
 
 import planarfriction as pf
 from planarfriction._engine.bristles.discs import KAPPA
@@ -31,13 +34,40 @@ from planarfriction.export.library import PARAMETERS, PRECISIONS
 from planarfriction.export.pieces import pieces_of
 from planarfriction.export.slip import LARGEST_ANGLE
 from planarfriction.limit_surface.loops import cell_twists, twists
+from planarfriction.plots import style
 
 DOCS = Path(__file__).parent
+BROWSER = DOCS / "browser"
+LOOK = '<link rel="stylesheet" href="look.css">'
 MODULE = DOCS / "static" / "planarfriction.wasm"
-PAGES = "lesson.html", "try.html"
+PAGES = ("lesson.html",)
+HERTZ = pf.patch.SoftFinger(c=1.0, n=0.0, k=2.0)
+PADS = np.repeat([[1, 0, 1]], (3, 14, 3), axis=1).repeat(4, axis=0)
+SHAPES = {
+    "disc": lambda: pf.ContactPatch.disc(1.0),
+    "fingertip": lambda: pf.ContactPatch.disc(1.0, pressure=HERTZ),
+    "ring": lambda: pf.ContactPatch.ring(0.8, 1.0, cells=41),
+    "square": lambda: pf.ContactPatch.rectangle(2.0),
+    "bar": lambda: pf.ContactPatch.rectangle(2.0, 0.2, cells=(40, 4)),
+    "pads": lambda: pf.ContactPatch.from_pressure(PADS, width=2.0),
+}
+"""Shapes of the pages, half as wide as 1 m."""
+
+COLOURS = {
+    "friction": style.REDUCED,
+    "ellipsoid": style.ELLIPSOID,
+    "velocity": "0.25",
+    "load": "0.35",
+    "holds": style.HOLDS,
+    "beyond": style.BEYOND,
+    "body": style.BODY,
+    "pad": style.PAD,
+    "spin": style.SERIES[2],
+    "path": style.SERIES[5],
+}
 W = ["w[0]", "w[1]", "w[2]"]
 TEMPLATES = jinja2.Environment(
-    loader=jinja2.FileSystemLoader(DOCS / "browser"),
+    loader=jinja2.FileSystemLoader(BROWSER),
     undefined=jinja2.StrictUndefined,
     keep_trailing_newline=True,
 )
@@ -211,12 +241,54 @@ def compiled(text: str) -> bytes | None:
         return module.read_bytes()
 
 
+# ---------------------------------------------------------------------- the pages
+
+
+def data() -> str:
+    """The module, the discs of the shapes, and the colours of the library's plots, as constants of a script."""
+    with warnings.catch_warnings(action="ignore"):  # of patches that are as wide as 2 m
+        patches = {name: make().discs(24) for name, make in SHAPES.items()}
+    shapes = {
+        name: np.column_stack([each.positions, each.radii, each.weights()])
+        .round(12)
+        .tolist()
+        for name, each in patches.items()
+    }
+    pressures = style.PRESSURE_MAP(np.linspace(0.0, 1.0, 32))
+    constants = {
+        "MODULE": base64.b64encode(MODULE.read_bytes()).decode(),
+        "SHAPES": shapes,
+        "COLOURS": {name: to_hex(each) for name, each in COLOURS.items()},
+        "PRESSURES": [to_hex(each) for each in pressures],
+    }
+    return "\n".join(
+        f"const {name} = {json.dumps(each, separators=(',', ':'))};"
+        for name, each in constants.items()
+    )
+
+
+def page(name: str) -> str:
+    """A page with its style and its scripts in it."""
+
+    def script(found: re.Match[str]) -> str:
+        name = found[1]
+        text = data() if name == "data.js" else (BROWSER / name).read_text("utf-8")
+        return f"<script>\n{text.strip()}\n</script>"
+
+    text = (BROWSER / name).read_text("utf-8")
+    look = (BROWSER / "look.css").read_text("utf-8")
+    text = text.replace(LOOK, f"<style>\n{look.strip()}\n</style>")
+    return re.sub(r'<script src="([\w.]+)"></script>', script, text)
+
+
 def main(parts: list[str]) -> None:
     if "module" in parts:
         module = compiled(source())
         if module is None:
             raise SystemExit("needs clang, wasm-ld and the C library of WASI")
         MODULE.write_bytes(module)
+    for name in PAGES:
+        (DOCS / "static" / name).write_text(page(name), "utf-8")
 
 
 if __name__ == "__main__":

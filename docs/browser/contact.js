@@ -3,9 +3,7 @@
 
 class Contact {
   static async of(module, discs, law) {
-    const {instance} = await WebAssembly.instantiate(module instanceof WebAssembly.Module ? module : await WebAssembly.compile(module), {})
-      .then((made) => (made.instance ? made : {instance: made}));
-    const contact = new Contact(instance.exports);
+    const {instance} = await WebAssembly.instantiate(module, {}), contact = new Contact(instance.exports);
     contact.setPatch(discs);
     contact.setLaw(law);
     return contact;
@@ -48,6 +46,12 @@ class Contact {
   surface(twists, ellipsoid = false) {
     const room = this.call("surface", twists.flat(), twists.length, ellipsoid ? 1 : 0);
     return twists.map((_, i) => [...room.slice(3 * i, 3 * i + 3)]);
+  }
+
+  // Friction (fx, fy) of each disc in that.
+  pieces(twist) {
+    const room = this.call("pieces", twist);
+    return this.discs.map((_, i) => [room[2 * i], room[2 * i + 1]]);
   }
 
   // Least normal force that holds a load (fx, fy, tau), the twist in which it would begin to slip, and what the ellipsoid says.
