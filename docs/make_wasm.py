@@ -40,7 +40,7 @@ DOCS = Path(__file__).parent
 BROWSER = DOCS / "browser"
 LOOK = '<link rel="stylesheet" href="look.css">'
 MODULE = DOCS / "static" / "planarfriction.wasm"
-PAGES = ("lesson.html",)
+PAGES = "lesson.html", "try.html"
 HERTZ = pf.patch.SoftFinger(c=1.0, n=0.0, k=2.0)
 PADS = np.repeat([[1, 0, 1]], (3, 14, 3), axis=1).repeat(4, axis=0)
 SHAPES = {

@@ -132,52 +132,18 @@ function draw() {
     verdict.textContent = `${holds ? `Holds, ${(100 * (now.load / force - 1)).toFixed(0)} % in hand` : `Slips, ${(100 * (1 - now.load / force)).toFixed(0)} % too little`}: needs ${force.toFixed(2)} N. The ellipsoid says ${ellipsoid.toFixed(2)} N.`;
   }
 
-  const inertia = gyration(contact.discs);
+  const inertia = gyration(contact);
   rows = puckRun(contact, twist, now.mu, 1, inertia);
   player.end = rows[rows.length - 1].t || 1e-3;
   player.show();
-  const end = rows[rows.length - 1], slid = Math.hypot(end.x, end.y), ratio = Math.hypot(end.twist[0], end.twist[1]) / (Math.abs(end.twist[2]) * contact.radius);
-  $("ends").textContent = rows.length < 2 ? "It is at rest." : `It slides ${rounded(1e3 * slid, 2)} mm and turns ${rounded(end.angle * 180 / Math.PI, 1)}° in ${rounded(1e3 * end.t, 1)} ms, until 0.1 % of its motion is left.` +
-    (now.omega && (now.vx || now.vy) ? ` Then v/(ωr) is ${ratio.toPrecision(2)}.` : "") + ` Slide and spin of a disc, a ring and a square end together; those of a bar do not.`;
+  $("ends").textContent = `${puckEnd(rows, contact)} Slide and spin of a disc, a ring and a square end together; those of a bar do not.`;
 }
 
-function drawPuck(t) {
-  const now = rowAt(rows, t), end = rows[rows.length - 1], size = halfSize(state.values);
-  const made = pen($("puck"), 0.5), span = Math.max(2.6 * size + Math.abs(end.x), 2 * (2.6 * size + Math.abs(end.y)), 4.2 * size), px = made.wide / span;
-  const place = (x, y) => [made.wide / 2 + px * (x - end.x / 2), made.high / 2 - px * (y - end.y / 2)];
-  made.fillStyle = "white"; made.fillRect(0, 0, made.wide, made.high);
-  const body = (row, fill, edge) => {
-    made.save(); made.translate(...place(row.x, row.y)); made.rotate(-row.angle); made.scale(px, -px);
-    outline(made, state.values.shape, size, size);
-    if (fill) { made.fillStyle = fill; made.fill(); }
-    made.strokeStyle = edge; made.lineWidth = 1.2 / px; made.stroke();
-    made.beginPath(); made.moveTo(0.55 * size, 0); made.lineTo(0.95 * size, 0); made.strokeStyle = "black"; made.lineWidth = 2.5 / px; made.stroke();
-    made.restore();
-  };
-  body(rows[0], null, "#AAA");
-  body(now, COLOURS.body, "#555");
-  path(made, rows.map((row) => place(row.x, row.y)), COLOURS.path, 1.6);
-  const speed = Math.hypot(now.twist[0], now.twist[1]), first = Math.hypot(rows[0].twist[0], rows[0].twist[1], size * rows[0].twist[2]) || 1, at = place(now.x, now.y);
-  if (speed > 1e-3 * first) SYMBOLS.velocity(made, at, [0.15 * made.wide * now.twist[0] / first, -0.15 * made.wide * now.twist[1] / first]);
-  if (now.friction && t < end.t) { const weight = state.values.mu * G; SYMBOLS.friction(made, at, [0.2 * made.wide * now.friction[0] / weight, -0.2 * made.wide * now.friction[1] / weight]); }
-  const length = 1e-3 * nice(250 * span);
-  SYMBOLS.bar(made, 14, made.high - 12, px * length, `${rounded(1e3 * length)} mm`);
-
-  const radius = contact.radius, curve = (of) => rows.map((row) => [1e3 * row.t, 1e3 * of(row)]);
-  const slide = (row) => Math.hypot(row.twist[0], row.twist[1]), spin = (row) => radius * Math.abs(row.twist[2]);
-  const most = Math.max(1e-3, ...rows.map((row) => 1e3 * Math.max(slide(row), spin(row))));
-  const axes = new Axes(pen($("history"), 0.5), {x: [0, 1e3 * player.end], y: [0, 1.2 * most], xName: "time [ms]", yName: "speed [mm/s]", yTicks: 4});
-  axes.line(curve(slide), COLOURS.friction, 2.2); axes.line(curve(spin), COLOURS.spin, 2.2, [7, 4]);
-  axes.labels();
-  axes.dot([1e3 * now.t, 1e3 * slide(now)], COLOURS.friction, 4.5); axes.dot([1e3 * now.t, 1e3 * spin(now)], COLOURS.spin, 4.5);
-  const higher = slide(rows[0]) >= spin(rows[0]), early = rowAt(rows, 0.1 * player.end);
-  const name = (text, of, colour, above) => { const [x, y] = axes.at([1e3 * early.t, 1e3 * of(early)]); words(axes.pen, text, x + 6, above ? y - 12 : y + 14, {align: "left", colour, halo: true}); };
-  if (rows.length > 1) { name("slide v", slide, COLOURS.friction, higher); name("spin ωr", spin, "#555", !higher); }
-}
+const drawRun = (t) => drawPuck($("puck"), $("history"), {rows, t, contact, state: state.values, mu: state.values.mu});
 
 async function begin() {
   makeTasks();
-  player = new Player(drawPuck, 5);
+  player = new Player(drawRun, 5);
   $("player").append(player.row);
   $("key").append(key({velocity: "velocity of each piece (its length: the key in the map)", friction: "friction on the body, where it acts", ellipsoid: "what the ellipsoid says", rotation: "centre of rotation", pressure: "middle of the load", discs: "24 discs that stand for the contact"}));
   $("sectionkey").append(key({limit: "limit surface: inside, friction holds a load", other: "the ellipsoid", load: "load on the body (down, as a weight)"}));
@@ -196,7 +162,7 @@ async function begin() {
   const clip = (value, most) => Math.round(10 * Math.min(most, Math.max(-most, value))) / 10;
   draggable($("map"), (event) => map.back(event), (x, y) => {
     const omega = state.values.omega || 1, reach = 160 / Math.abs(omega);
-    state.set({omega, vx: clip(1e3 * y, reach) * omega, vy: -clip(1e3 * x, reach) * omega});
+    state.set({omega, vx: Number((clip(1e3 * y, reach) * omega).toFixed(2)), vy: Number((-clip(1e3 * x, reach) * omega).toFixed(2))});
   }, () => { const {vx, vy, omega} = state.values; return omega ? [-1e-3 * vy / omega, 1e-3 * vx / omega] : [0, 0]; }, () => 5e-4);
   const scales = () => { const strength = state.values.mu * state.values.load; return [strength, 1e3 * strength * contact.radius]; };
   draggable($("section"), (event) => section.back(event), (x, y) => {

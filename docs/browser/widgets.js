@@ -17,8 +17,9 @@ function element(tag, attributes = {}, ...children) {
 
 // ---------------------------------------------------------------------- shapes
 
-// Outlines for the eye, from half the size; discs of the shapes come from the library (SHAPES, half a size of 1).
-function outline(pen, name, a, b) {
+// Outlines for the eye [m]; discs of the shapes come from the library (SHAPES, half a size of 1).
+function outline(pen, state) {
+  const a = 0.5e-3 * state.width, b = 0.5e-3 * state.height, name = state.shape;
   const box = (x, y, w, h) => pen.rect(x - w, y - h, 2 * w, 2 * h);
   pen.beginPath();
   if (name === "disc" || name === "fingertip") pen.arc(0, 0, a, 0, TURN);
@@ -27,6 +28,7 @@ function outline(pen, name, a, b) {
   else if (name === "bar") box(0, 0, a, 0.1 * a);
   else if (name === "square") box(0, 0, a, a);
   else if (name === "rectangle") box(0, 0, a, b);
+  else if (name === "draw") for (const [x, y, radius] of discsOf(state)) { const half = radius * Math.sqrt(3) / 2; box(x, y, half, half); }
 }
 
 // Columns and rows of a rectangle that is cut into at most 24 pieces, about square ones.
@@ -56,10 +58,10 @@ const MAP = 12;  // cells of a side of a drawn map
 const halfSize = (state) => 1e-3 * (state.shape === "draw" ? 0.5 * MAP * state.cell
   : 0.5 * (state.shape === "rectangle" ? Math.max(state.width, state.height) : state.width));
 
-// Square radius of gyration of an evenly thick body of this shape, about the origin.
-const gyration = (discs) => {
+// Square radius of gyration of a body whose mass is spread like the pressure.
+const gyration = ({discs, x, y}) => {
   const total = discs.reduce((sum, disc) => sum + disc[3], 0);
-  return discs.reduce((sum, [x, y, radius, weight]) => sum + weight * (x * x + y * y + 0.5 * radius * radius), 0) / total;
+  return discs.reduce((sum, [dx, dy, radius, weight]) => sum + weight * ((dx - x) ** 2 + (dy - y) ** 2 + 0.5 * radius * radius), 0) / total;
 };
 
 // ---------------------------------------------------------------------- controls
@@ -99,7 +101,7 @@ class State {
   }
 }
 
-const rounded = (value, digits = 3) => Number(value.toPrecision(digits + 3)).toFixed(digits).replace(/\.?0+$/, "").replace(/^-0$/, "0");
+const rounded = (value, digits = 3) => String(Number(value.toFixed(digits)) || 0);
 
 // A slider with a field for its number. Arrow keys move either by a step.
 function slider(state, key, words, unit, [least, most, step]) {
@@ -210,7 +212,7 @@ function key(entries) {
     mass: `<circle cx="15" cy="9" r="7" fill="white" stroke="black"/><path d="M15 9 V2 A7 7 0 0 0 8 9 Z M15 9 V16 A7 7 0 0 0 22 9 Z"/>`,
     limit: `<line x1="1" y1="9" x2="33" y2="9" stroke="black" stroke-width="2"/>`,
     other: `<line x1="1" y1="9" x2="33" y2="9" stroke="${COLOURS.ellipsoid}" stroke-width="2" stroke-dasharray="9 3 2 3"/>`,
-    discs: `<circle cx="10" cy="9" r="7" fill="${PRESSURES[3]}"/><circle cx="25" cy="9" r="7" fill="${PRESSURES[9]}"/>`,
+    discs: `<circle cx="10" cy="9" r="7" fill="${PRESSURES[3]}"/><circle cx="25" cy="9" r="7" fill="${PRESSURES[6]}"/>`,
   };
   const made = element("div", {class: "key"});
   for (const [name, text] of Object.entries(entries)) {
@@ -221,25 +223,27 @@ function key(entries) {
   return made;
 }
 
-// Round number not above the given one.
-function nice(value) {
-  const power = 10 ** Math.floor(Math.log10(value));
-  return [5, 2, 1].find((each) => each * power <= value * 1.0001) * power;
+// Round number not above the given one, or not below it.
+function nice(value, up = false) {
+  const power = 10 ** Math.floor(Math.log10(value) + 1e-9);
+  return (up ? [1, 2, 5, 10].find((each) => each * power >= value * 0.9999) : [5, 2, 1].find((each) => each * power <= value * 1.0001)) * power;
 }
 
 // Axes around a box with light lines; `right` and `top` give labels in another unit, [factor, name].
 class Axes {
-  constructor(pen, {x, y, xName, yName, left = 58, bottom = 40, top = null, right = null, xTicks = 5, yTicks = 5}) {
+  constructor(pen, {x, y, xName, yName, left = 58, bottom = 40, top = null, right = null}) {
     Object.assign(this, {pen, x, y});
     this.box = [left, top ? 38 : 10, pen.wide - (right ? 52 : 12), pen.high - bottom];
     const [x0, y0, x1, y1] = this.box;
     pen.fillStyle = "white"; pen.fillRect(0, 0, pen.wide, pen.high);
     const digits = (step) => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
     const marks = ([least, most], count) => {
-      const step = nice((most - least) / count) || 1, first = Math.ceil(least / step - 1e-9);
+      const step = nice((most - least) / count, true), first = Math.ceil(least / step - 1e-9);
       return [range(Math.floor(most / step + 1e-9) - first + 1).map((i) => (first + i) * step), digits(step)];
     };
-    this.marks = {x: marks(x, xTicks), y: marks(y, yTicks)};
+    const counts = {x: (x1 - x0) / 44, y: (y1 - y0) / 30};
+    this.counts = counts;
+    this.marks = {x: marks(x, counts.x), y: marks(y, counts.y)};
     this.below = () => {
       for (const each of this.marks.x[0]) path(pen, [[this.X(each), y0], [this.X(each), y1]], "#E3E6EA", 1);
       for (const each of this.marks.y[0]) path(pen, [[x0, this.Y(each)], [x1, this.Y(each)]], "#E3E6EA", 1);
@@ -260,7 +264,7 @@ class Axes {
   // Ticks of a second unit at the largest and middle values.
   second([factor, name], axis, at) {
     const pen = this.pen, [x0, y0, x1, y1] = this.box, grey = {colour: "#777"};
-    const ends = this[axis].map((each) => each * factor), step = nice((ends[1] - ends[0]) / 4);
+    const ends = this[axis].map((each) => each * factor), step = nice((ends[1] - ends[0]) / (1.4 * this.counts[axis]), true);
     for (let k = Math.ceil(ends[0] / step); k * step <= ends[1]; k++) {
       const text = minus((k * step).toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))), place = k * step / factor;
       if (axis === "x") words(pen, text, this.X(place), at - 9, grey); else words(pen, text, at + 5, this.Y(place), {...grey, align: "left"});
@@ -294,7 +298,7 @@ const minus = (text) => text.replace(/^-(?=[\d.]*[1-9])/, "\u2212").replace(/^-/
 // ---------------------------------------------------------------------- the map of a contact
 
 // Draws discs, velocities and friction of a contact seen from above; `view` is half the width that is seen [m].
-function drawMap(canvas, {contact, state, twist, view, wrenches = [], friction = false}) {
+function drawMap(canvas, {contact, state, twist, view, wrenches = [], friction = false, speed = true}) {
   const made = pen(canvas, 1), px = made.wide / (2 * view), middle = made.wide / 2, [vx, vy, omega] = twist;
   const place = (x, y) => [middle + px * x, middle - px * y];
   made.fillStyle = "white"; made.fillRect(0, 0, made.wide, made.high);
@@ -304,10 +308,10 @@ function drawMap(canvas, {contact, state, twist, view, wrenches = [], friction =
     made.strokeStyle = "#E3E6EA"; made.lineWidth = 1 / px; made.beginPath();
     for (let k = 0; k <= MAP; k++) { made.moveTo(-half, k * side - half); made.lineTo(half, k * side - half); made.moveTo(k * side - half, -half); made.lineTo(k * side - half, half); }
     made.stroke();
-  } else { outline(made, state.shape, 0.5e-3 * state.width, 0.5e-3 * state.height); made.fillStyle = COLOURS.body; made.fill(); }
+  } else { outline(made, state); made.fillStyle = COLOURS.body; made.fill(); }
   const pressures = contact.discs.map(([, , radius, weight]) => weight / (radius * radius)), most = Math.max(...pressures);
   contact.discs.forEach(([x, y, radius], i) => {
-    made.fillStyle = PRESSURES[Math.round(1 + 8 * pressures[i] / most)];
+    made.fillStyle = PRESSURES[Math.round(1 + 5 * pressures[i] / most)];
     made.strokeStyle = "white"; made.lineWidth = 0.8 / px;
     if (state.shape === "draw") { const side = 1e-3 * state.cell; made.fillRect(x - side / 2, y - side / 2, side, side); }
     else { made.beginPath(); made.arc(x, y, radius, 0, TURN); made.fill(); made.stroke(); }
@@ -321,8 +325,8 @@ function drawMap(canvas, {contact, state, twist, view, wrenches = [], friction =
   } else if (fastest > 0) {
     const unit = 0.13 * made.wide / fastest, shown = nice(1e3 * fastest);
     speeds.forEach(([u, v], i) => { if (i % every === 0) SYMBOLS.velocity(made, place(...contact.discs[i]), [unit * u, -unit * v]); });
-    SYMBOLS.velocity(made, [made.wide - 18 - 1e-3 * unit * shown, made.high - 16], [1e-3 * unit * shown, 0]);
-    words(made, `${rounded(shown)} mm/s`, made.wide - 18, made.high - 30, {align: "right", halo: true});
+    if (speed) SYMBOLS.velocity(made, [made.wide - 18 - 1e-3 * unit * shown, made.high - 16], [1e-3 * unit * shown, 0]);
+    if (speed) words(made, `${rounded(shown)} mm/s`, made.wide - 18, made.high - 30, {align: "right", halo: true});
   }
   const at = place(contact.x, contact.y);
   wrenches.forEach(([fx, fy], k) => {  // the second beside the first
@@ -384,7 +388,7 @@ function sectionOf(contact, first, second, count = 96) {
 function drawSection(canvas, curves, {xName, yName, second, points = [], load = null, ratio = 0.86, wide = 1.25}) {
   const made = pen(canvas, ratio), [limit, ellipsoid] = curves;
   const most = wide * Math.max(1, ...limit.flat().map(Math.abs)) / 1;
-  const axes = new Axes(made, {x: [-most, most], y: [-most, most], xName, yName, top: second[0], right: second[1], xTicks: 4, yTicks: 4});
+  const axes = new Axes(made, {x: [-most, most], y: [-most, most], xName, yName, top: second[0], right: second[1]});
   const [x0, y0, x1, y1] = axes.box;
   made.fillStyle = COLOURS.beyond; made.fillRect(x0, y0, x1 - x0, y1 - y0);
   made.fillStyle = COLOURS.holds; made.beginPath(); limit.forEach((each, k) => made[k ? "lineTo" : "moveTo"](...axes.at(each))); made.fill();
@@ -465,6 +469,50 @@ class Player {
     this.clock.textContent = `${(ms * this.part).toFixed(digits)} of ${ms.toFixed(digits)} ms, ${rounded(1e3 * this.seconds / ms, 0)} times slower`;
     this.draw(this.part * this.end);
   }
+}
+
+// Draws a puck at a time of its run, with its path, and both speeds over time.
+function drawPuck(canvas, history, {rows, t, contact, state, mu}) {
+  const now = rowAt(rows, t), end = rows[rows.length - 1], size = halfSize(state);
+  const made = pen(canvas, 0.5), span = Math.max(2.6 * size + Math.abs(end.x), 2 * (2.6 * size + Math.abs(end.y)), 4.2 * size), px = made.wide / span;
+  const place = (x, y) => [made.wide / 2 + px * (x - end.x / 2), made.high / 2 - px * (y - end.y / 2)];
+  made.fillStyle = "white"; made.fillRect(0, 0, made.wide, made.high);
+  const body = (row, fill, edge) => {
+    made.save(); made.translate(...place(row.x, row.y)); made.rotate(-row.angle); made.scale(px, -px);
+    outline(made, state);
+    if (fill) { made.fillStyle = fill; made.fill(); }
+    if (state.shape !== "draw") { made.strokeStyle = edge; made.lineWidth = 1.2 / px; made.stroke(); }
+    made.beginPath(); made.moveTo(0.55 * size, 0); made.lineTo(0.95 * size, 0); made.strokeStyle = "black"; made.lineWidth = 2.5 / px; made.stroke();
+    made.restore();
+  };
+  body(rows[0], null, "#AAA");
+  body(now, COLOURS.body, "#555");
+  path(made, rows.map((row) => place(row.x, row.y)), COLOURS.path, 1.6);
+  const speed = Math.hypot(now.twist[0], now.twist[1]), first = Math.hypot(rows[0].twist[0], rows[0].twist[1], size * rows[0].twist[2]) || 1, at = place(now.x, now.y);
+  if (speed > 1e-3 * first) SYMBOLS.velocity(made, at, [0.15 * made.wide * now.twist[0] / first, -0.15 * made.wide * now.twist[1] / first]);
+  if (now.friction && t < end.t) { const weight = mu * G; SYMBOLS.friction(made, at, [0.2 * made.wide * now.friction[0] / weight, -0.2 * made.wide * now.friction[1] / weight]); }
+  const length = 1e-3 * nice(250 * span);
+  SYMBOLS.bar(made, 14, made.high - 12, px * length, `${rounded(1e3 * length)} mm`);
+
+  const radius = contact.radius, curve = (of) => rows.map((row) => [1e3 * row.t, 1e3 * of(row)]);
+  const slide = (row) => Math.hypot(row.twist[0], row.twist[1]), spin = (row) => radius * Math.abs(row.twist[2]);
+  const most = Math.max(1e-3, ...rows.map((row) => 1e3 * Math.max(slide(row), spin(row)))), all = 1e3 * (end.t || 1e-3);
+  const axes = new Axes(pen(history, 0.5), {x: [0, all], y: [0, 1.2 * most], xName: "time [ms]", yName: "speed [mm/s]"});
+  axes.line(curve(slide), COLOURS.friction, 2.2); axes.line(curve(spin), COLOURS.spin, 2.2, [7, 4]);
+  axes.labels();
+  axes.dot([1e3 * now.t, 1e3 * slide(now)], COLOURS.friction, 4.5); axes.dot([1e3 * now.t, 1e3 * spin(now)], COLOURS.spin, 4.5);
+  const higher = slide(rows[0]) >= spin(rows[0]), early = rowAt(rows, 0.1 * end.t);
+  const name = (text, of, colour, above) => { const [x, y] = axes.at([1e3 * early.t, 1e3 * of(early)]); words(axes.pen, text, x + 6, above ? y - 12 : Math.min(y + 14, axes.box[3] - 8), {align: "left", colour, halo: true}); };
+  if (rows.length > 1) { name("slide v", slide, COLOURS.friction, higher); name("spin ωr", spin, "#555", !higher); }
+}
+
+// Words about the end of a puck's run.
+function puckEnd(rows, contact) {
+  if (rows.length < 2) return "It is at rest.";
+  const end = rows[rows.length - 1], both = Math.hypot(rows[0].twist[0], rows[0].twist[1]) && rows[0].twist[2];
+  const ratio = Math.hypot(end.twist[0], end.twist[1]) / (Math.abs(end.twist[2]) * contact.radius);
+  return `It slides ${rounded(1e3 * Math.hypot(end.x, end.y), 2)} mm and turns ${minus(rounded(end.angle * 180 / Math.PI, 1))}° in ${rounded(1e3 * end.t, 1)} ms, until 0.1 % of its motion is left.` +
+    (both ? ` Then v/(ωr) is ${ratio.toPrecision(2)}.` : "");
 }
 
 const moduleBytes = () => Uint8Array.from(atob(MODULE), (letter) => letter.charCodeAt(0));

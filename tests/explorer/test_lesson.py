@@ -1,7 +1,6 @@
 """The lesson: its answers from the library, and its five tasks as a pupil walks through them in Chromium."""
 
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from scipy.optimize import brentq
 import planarfriction as pf
 from planarfriction.planning import holding_load
 from tests.support.browser_module import MODULE, law_of
+from tests.support.browser_pages import Pupil
 from tests.support.repository import ROOT, script
 
 SCRIPT = ROOT / "docs" / "browser" / "lesson.js"
@@ -31,7 +31,6 @@ PATCHES = {
 }
 WEIGHT = np.array([0.0, -0.1 * 9.81, -0.1 * 9.81 * 0.012])
 """Half of a plate of 0.2 kg, its centre of mass 12 mm beside the finger."""
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 
 
 def puck(patch, twist, mu=0.2, gravity=9.81):
@@ -130,75 +129,6 @@ def test_the_committed_pages_have_the_committed_module():
 
 
 # ---------------------------------------------------------------------- in Chromium
-
-
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip(
-        "playwright.sync_api", reason="needs Playwright, the extra [browser]"
-    )
-    if CHROMIUM is None:
-        pytest.skip("needs Chromium")
-    with playwright.sync_playwright() as driver:
-        chromium = driver.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox"]
-        )
-        yield chromium
-        chromium.close()
-
-
-class Pupil:
-    """A page from disk in a browser without a network."""
-
-    def __init__(self, browser, file, width=1280, height=900, **options):
-        context = browser.new_context(
-            viewport={"width": width, "height": height}, offline=True, **options
-        )
-        self.page = context.new_page()
-        self.errors = []
-        self.asked = []
-        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("request", lambda one: self.asked.append(one.url))
-        self.page.goto(file.as_uri())
-        self.page.wait_for_selector("#numbers td")
-
-    def frame(self):
-        """Wait until all is drawn."""
-        self.page.evaluate("new Promise((done) => setTimeout(done, 300))")
-
-    def drag(self, canvas, *points):
-        """Drag from one place of a canvas to others, in parts of its width and height from the top left."""
-        self.page.locator(canvas).scroll_into_view_if_needed()
-        box = self.page.locator(canvas).bounding_box()
-        places = [
-            (box["x"] + x * box["width"], box["y"] + y * box["height"])
-            for x, y in points
-        ]
-        self.page.mouse.move(*places[0])
-        self.page.mouse.down()
-        for place in places:
-            self.page.mouse.move(*place, steps=3)
-        self.page.mouse.up()
-        self.frame()
-
-    def table(self):
-        """Friction and ellipsoid: force x and y, torque [N, N, N mm]."""
-        rows = self.page.locator("#numbers tr")
-        return np.array(
-            [
-                [
-                    float(each.replace("\N{MINUS SIGN}", "-"))
-                    for each in rows.nth(k).inner_text().split("\t")[1:4]
-                ]
-                for k in (1, 2)
-            ]
-        )
-
-    def put(self, name, value):
-        field = self.page.locator(f"input#{name}")
-        field.fill(str(value))
-        field.press("Enter")
-        self.frame()
 
 
 @pytest.mark.slow
