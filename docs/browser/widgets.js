@@ -412,7 +412,8 @@ function drawSection(canvas, curves, {xName, yName, second, points = [], load = 
 
 // ---------------------------------------------------------------------- motions
 
-// A free body on its contact until rest: rows {t, x, y, angle, twist}. Steps are short beside the time that is left.
+// A free body on its contact until rest: rows {t, x, y, angle, twist}. Steps are short while the bristles bend at first, and
+// beside the time that is left.
 function puckRun(contact, twist, mu, mass, inertia) {
   const lever = Math.sqrt(inertia / mass), size = ([vx, vy, omega]) => Math.hypot(vx, vy, lever * omega), first = size(twist);
   const rows = [{t: 0, x: 0, y: 0, angle: 0, twist}];
@@ -420,7 +421,7 @@ function puckRun(contact, twist, mu, mass, inertia) {
   for (let k = 0; k < 3000 && first > 0; k++) {
     const last = rows[rows.length - 1], left = size(last.twist) / (mu * G);
     if (size(last.twist) < 1e-3 * first) break;
-    const dt = Math.min(first / (mu * G) / 250, 0.02 * left);
+    const dt = Math.min(1e-7 * 1.3 ** k, first / (mu * G) / 250, 0.02 * left);
     const angle = last.angle + 0.5 * dt * last.twist[2];
     const next = contact.bodyStep({twist: last.twist, applied: [0, 0, 0], load: mass * G, dt, mass, inertia, place: [0, 0, angle]});
     const mean = range(3).map((i) => 0.5 * (last.twist[i] + next.twist[i]));
