@@ -174,6 +174,8 @@ async function begin() {
   state.read();
   contact = await Contact.of(moduleBytes(), discsOf(state.values), law(1));
   onResize(draw);
+  window.addEventListener("beforeprint", () => { for (const card of document.querySelectorAll("details.card")) card.open = true; });
+  window.addEventListener("afterprint", () => state.show());
   state.show();
 }
 

@@ -169,10 +169,10 @@ function drawHand(t) {
   const most = 1.15 * Math.max(now.grip, now.eased, ...rows.map((each) => each.need || 0));
   const needs = new Axes(pen($("needs"), 0.55), {x, y: [0, most], xName: "time [ms]", yName: "grip of a finger [N]"});
   const pause = Math.min(now.pause, x[1]);
-  needs.line([[0, now.eased], [pause, now.eased], [pause, now.grip], [x[1], now.grip]], COLOURS.friction, 2.2);
+  needs.line([[0, now.eased], [pause, now.eased], ...(pause < x[1] ? [[pause, now.grip], [x[1], now.grip]] : [])], COLOURS.friction, 2.2);
   needs.line(rows.filter((each) => each.need !== null).map((each) => [1e3 * each.t, each.need]), "black", 1.6, DASHES.reference); needs.labels();
-  words(needs.pen, "grip", needs.X(0.97 * x[1]), needs.Y(now.grip) - 10, {align: "right", colour: COLOURS.friction, halo: true});
-  words(needs.pen, "needed at rest", needs.X(0.97 * x[1]), needs.Y(last.need) + (last.need > 0.8 * now.grip && last.need < 1.2 * now.grip ? 14 : -10), {align: "right", halo: true});
+  words(needs.pen, "grip", needs.X(0.97 * x[1]), needs.Y(last.grip) - 10, {align: "right", colour: COLOURS.friction, halo: true});
+  words(needs.pen, "needed at rest", needs.X(0.97 * x[1]), needs.Y(last.need) + (Math.abs(last.need / last.grip - 1.1) < 0.25 ? 14 : -10), {align: "right", halo: true});
   needs.dot([1e3 * row.t, row.grip], COLOURS.friction, 4.5);
 }
 

@@ -342,7 +342,7 @@ function drawMap(canvas, {contact, state, twist, view, wrenches = [], friction =
       path(made, [[middle + 0.8 * reach * c, middle + 0.8 * reach * s], end], "black", 1, [3, 3]);
       SYMBOLS.rotation(made, end, 5);
       const text = far < 10 ? `centre of rotation ${rounded(1e3 * far, 0)} mm away` : "centre of rotation far away";
-      const across = Math.min(Math.max(end[0], 100), made.wide - 100);
+      const room = made.measureText(text).width / 2 + 6, across = Math.min(Math.max(end[0], room), made.wide - room);
       words(made, text, across, end[1] + (end[1] > middle ? -16 : 18), {halo: true});
     }
   }
@@ -503,7 +503,7 @@ function drawPuck(canvas, history, {rows, t, contact, state, mu}) {
   axes.labels();
   axes.dot([1e3 * now.t, 1e3 * slide(now)], COLOURS.friction, 4.5); axes.dot([1e3 * now.t, 1e3 * spin(now)], COLOURS.spin, 4.5);
   const higher = slide(rows[0]) >= spin(rows[0]), early = rowAt(rows, 0.1 * end.t);
-  const name = (text, of, colour, above) => { const [x, y] = axes.at([1e3 * early.t, 1e3 * of(early)]); words(axes.pen, text, x + 6, above ? y - 12 : Math.min(y + 14, axes.box[3] - 8), {align: "left", colour, halo: true}); };
+  const name = (text, of, colour, above) => { const [x, y] = axes.at([1e3 * early.t, 1e3 * of(early)]); words(axes.pen, text, x + 6, above ? y - 12 : Math.min(y + 20, axes.box[3] - 8), {align: above ? "left" : "center", colour, halo: true}); };
   if (rows.length > 1) { name("slide v", slide, COLOURS.friction, higher); name("spin ωr", spin, "#555", !higher); }
 }
 

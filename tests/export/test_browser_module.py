@@ -118,7 +118,10 @@ def test_limit_surfaces_are_those_of_the_library(name, module):
     twists = rng.normal(size=(200, 3)) / ARM
     patch = PATCHES[name]
     calls = [["surface", twists.tolist()], ["surface", twists.tolist(), True]]
-    place, exact, ellipsoid = called(patch, PLAIN, calls, module)
+    calls += [["pieces", twists[0].tolist()]]
+    place, exact, ellipsoid, pieces = called(patch, PLAIN, calls, module)
+    assert np.shape(pieces) == patch.positions.shape
+    np.testing.assert_allclose(np.sum(pieces, axis=0), exact[0][:2], atol=1e-14)
     np.testing.assert_allclose(
         place, [*patch.centre_of_pressure(), patch.contact_radius()], atol=1e-12
     )
