@@ -96,10 +96,12 @@ def source() -> str:
         law = pf.LuGre(mu_c=1.0, elasto_plastic=elasto_plastic)
         model = pf.DistributedModel(patch, law)
         pieces = pieces_of(model, count=MOST)
+        assert pieces.turns is not None
+        turns = pieces.turns()
         outputs = [f"next[k + {MOST * i}]" for i in range(3)] + W
         kinds[kind] = {
             "step": lines(writer, pieces.step, outputs),
-            "turns": lines(writer, pieces.turns(), [f"w[{i}]" for i in range(12)]),
+            "turns": lines(writer, turns, [f"w[{i}]" for i in range(12)]),
         }
     body = body_of(model, pieces, "double", 1)
     parameters = list(pieces.parameters)

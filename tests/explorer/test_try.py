@@ -78,6 +78,14 @@ def test_all_that_can_be_dragged(browser, width):
     omega, vy = page.evaluate("[state.values.omega, state.values.vy]")
     side = page.evaluate("2.2 * 2 * halfSize(state.values)")
     assert -vy / omega == pytest.approx(1e3 * 0.2 * side, rel=0.05)
+    if width == 400:
+        box = page.locator("#map").bounding_box()
+        page.touchscreen.tap(
+            box["x"] + 0.3 * box["width"], box["y"] + 0.5 * box["height"]
+        )
+        visitor.frame()
+        assert page.evaluate("state.values.vy / state.values.omega") > 0.0
+        vy = page.evaluate("state.values.vy")
     page.locator("#shape").select_option("draw")
     visitor.frame()
     map_before = page.evaluate("state.values.map")
