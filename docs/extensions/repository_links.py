@@ -19,6 +19,7 @@ LINKS = {
 """Link in a file of the repository -> link to the page."""
 
 DRESSED = {
+    r"\[([^\]]+)\]\(static/([\w-]+\.html)\)": r'<a href="_static/\2">\1</a>',
     r"\[([^\]]+)\]\(\.\./examples/(gallery|notebooks)\)": r"{doc}`\1 <\2/index>`",
     r"\[([^\]]+)\]\(\.\./examples/((?:gallery|notebooks)/[\w/]+)\.py\)": r"{doc}`\1 <\2>`",
     r"\[([^\]]+)\]\(\.\./src/planarfriction\)": r"{doc}`\1 <api/index>`",

@@ -19,8 +19,9 @@ def explore(port: int, browser: bool) -> None:
     """Open a page in the browser: draw or load a pressure map, choose a law, drag a twist, and see the friction.
 
     The page shows the wrench, the limit surface, the centre of rotation, the error of the ellipsoid, and the Python
-    code or scene file to copy. It can only be reached from this computer. Ctrl-C stops it. Needs Panel
-    (pip install 'planarfriction[explore]').
+    code or scene file to copy. It is for pressure files, all laws, comparisons of models, and scenes: the page
+    docs/static/try.html shows the rest without an installation. It can only be reached from this computer. Ctrl-C
+    stops it. Needs Panel (pip install 'planarfriction[explore]').
 
     \b
     Examples:

@@ -16,8 +16,10 @@ ELSEWHERE = {
     "make_lines",
     "make_referee",
     "make_tables",
+    "make_wasm",
 }
-"""Scripts whose own tests run them (test_breakaway, test_docs, test_referee, test_bench), or that need emulators."""
+"""Scripts whose own tests run them (test_breakaway, test_docs, test_referee, test_bench, test_browser_module), or that
+need emulators."""
 
 
 def beside(made, folder, monkeypatch):
