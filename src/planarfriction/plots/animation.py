@@ -181,7 +181,7 @@ class Film:
             shown = self.figure.add_axes(bar) if bar and each.slip is not None else None
             self.panels.append(CellPanel(self.figure.add_axes(cells), each, bar=shown))
             if panels.has_surface(each):
-                axes = self.figure.add_axes(surface, projection="3d")
+                axes = self.figure.add_axes(surface)
                 self.panels.append(SurfacePanel(axes, each, beside=len(chosen) - 1))
         self._draw_body(solution)
         box = self.axes.bbox
@@ -308,7 +308,7 @@ class Film:
         for words, kind, column in (
             ("moved by x", "length", 0),
             ("y", "length", 1),
-            ("turned by", "angle", 2),
+            ("rotated by", "angle", 2),
         ):
             unit = unit_for(kind, moved[:, column])
             # No -0.00.
@@ -322,14 +322,14 @@ def _places(contacts: int) -> tuple[tuple, list[tuple]]:
     if contacts == 1:
         cells = (0.665, 0.6, 0.2, 0.355)
         bar = (0.88, 0.6, 0.014, 0.355)
-        return (0.072, 0.145, 0.5, 0.745), [(cells, bar, (0.605, 0.03, 0.35, 0.48))]
+        return (0.072, 0.145, 0.5, 0.745), [(cells, bar, (0.665, 0.1, 0.2, 0.355))]
     height = 1.0 / contacts
     places: list[tuple] = []
     for number in range(contacts):
         low = 1.0 - (number + 1) * height
         side = height - 0.17
         cells = (0.57, low + 0.105, side * HEIGHT / WIDTH, side)
-        places.append((cells, None, (0.775, low + 0.02, 0.21, height - 0.04)))
+        places.append((cells, None, (0.81, low + 0.105, *cells[2:])))
     return (0.072, 0.145, 0.43, 0.745), places
 
 
