@@ -34,13 +34,6 @@ SMALL = {"dpi": 25.0, "slow": 0.1}
 """Pictures of few and small frames."""
 
 
-@pytest.fixture(autouse=True)
-def coarse(monkeypatch):
-    """Draw limit surfaces with few facets: nothing here depends on their number."""
-    for name in ("POLAR", "AZIMUTH"):
-        monkeypatch.setattr(f"planarfriction.plots.panels.{name}", 12)
-
-
 def film_of(run, frames=5, follow=True):
     times = np.asarray(run.histories["time"].values)
     track = track_of(run, np.linspace(times[0], times[-1], frames))
