@@ -352,7 +352,7 @@ def test_the_table_has_the_power_and_the_largest_errors():
     (force, angle) = PAINTED.largest_errors
     said = pictures.numbers_table(state, found, 0.0123)
     assert (
-        "none, no spin" in said
+        "none, no rotation" in said
         and f"power: {1e3 * found.power:.4g} mW" in said
         and "in 12.3 ms" in said
     )

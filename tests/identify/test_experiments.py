@@ -104,7 +104,7 @@ def test_what_is_missing_comes_next(motions, slide):
         for wanted in [plan(motions.values(), logs=slide, wanted=["contact_radius"])]
         for each, gain in zip(wanted.motions, wanted.gains, strict=True)
     }
-    assert gains["slide from slow to fast"] < 0.01 < 5.0 < gains["spin during a slide"]
+    assert gains["slide from slow to fast"] < 0.01 < 5.0 < gains["rotation during a slide"]
     damping = plan(motions.values(), logs=slide, wanted=["sigma_1"])
     assert damping.best.name == "quick reversals"
 

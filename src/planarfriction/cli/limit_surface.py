@@ -17,7 +17,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.families import SURFACES
 
 HTML = ".html"
-"""A picture to be turned with the mouse."""
+"""A picture to be rotated with the mouse."""
 
 FINER = 3
 """Refinement whose errors stand beside those of a patch."""

@@ -379,7 +379,7 @@ class Log(ByValue):
     ) -> Log:
         """Make a log of one coordinate: a slide with a force gauge, or with `axis="theta"` a joint with a torque.
 
-        `force` `[T]` is the friction on the moving body [N, or N m], against the motion: minus the pull of a gauge.
+        `force` `[T]` is the friction on the moving body [N, or N m], against the motion: minus the force of a gauge.
         `velocity` `[T]` [m/s or rad/s] is used as it is; `position` `[T]` [m or rad] is differentiated over `window`
         samples. The other coordinates stay at 0 and take no part in a fit.
 
@@ -604,7 +604,7 @@ def unwrapped(
 
     An angle whose range exceeds a turn was not wrapped and stays as it is.
 
-    Raises InvalidValueError for a jump that no whole turn explains, and where a wrapped angle turns by more than a
+    Raises InvalidValueError for a jump that no whole turn explains, and where a wrapped angle rotates by more than a
     quarter of a turn between two samples, so that its direction is unknown.
     """
     if len(angle) < 2:
