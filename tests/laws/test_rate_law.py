@@ -301,7 +301,7 @@ def test_what_needs_the_bristles_of_lugre_refuses_it_in_one_line():
 @pytest.mark.torch
 def test_tensors_refuse_it():
     torch = pytest.importorskip("planarfriction.torch")
-    with refused(r"for .*not a rate of its own"):
+    with refused(r"for .*not a separate rate"):
         torch.DistributedModel(DISC, BoucWen())
 
 

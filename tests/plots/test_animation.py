@@ -334,7 +334,8 @@ def test_a_frame_draws_and_says_where_body_and_contacts_are():
         start = 1e3 * (origin + turned(patch.centre_of_pressure(), theta + 0.5))
         assert arrow._posA_posB[0] == pytest.approx(start, abs=1e-9)
     assert (
-        film.words.get_text() == "moved by x 4.50 mm, y -11.25 mm, rotated by -38.67 deg"
+        film.words.get_text()
+        == "moved by x 4.50 mm, y -11.25 mm, rotated by -38.67 deg"
     )
     assert film.clock.get_text() == "t = 1.50 s"
     longest = max(np.hypot(*each.forces.T).max() for each in film.track.contacts)

@@ -105,7 +105,7 @@ def verdicts_on_samples(logs: Sequence[Log]) -> list[Verdict]:
 
 
 def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
-    """Return a verdict that counts the jumps by whole turns which were removed from the angles of logs or slides."""
+    """Return a verdict that counts the jumps by full rotations which were removed from the angles of logs or slides."""
     turned = {each.name: each.turns for each in measured if each.turns}
     if not turned:
         return []

@@ -54,9 +54,10 @@ def animate_solution(
 
     On the left, the body in the world: outline, contact patches, the path of its centre, the friction force on it at
     each contact (world axes, all identical contacts) and its centre of rotation. On the right, for each contact (the
-    three of the largest normal force): its cells, from pale to blue as their bristles bend and orange where they slip,
-    and its wrench inside its limit surface, for mu_c f_N = 1. Which cells slip is computed by a distributed model with the
-    contact's law on the recorded path, whatever the model of the contact, less accurately from samples far apart.
+    three of the largest normal force): its cells, from pale to blue as their bristles bend and orange where they
+    slip, and its wrench inside its limit surface, for mu_c f_N = 1. Which cells slip is computed by a distributed
+    model with the contact's law on the recorded path, whatever the model of the contact, less accurately from
+    samples far apart.
 
     `.mp4` needs ffmpeg or the extra `[ffmpeg]`. `slow` is how many times slower than real time it runs [-], below 1
     faster; None takes real time if that makes 75 to 300 frames, else the next of 1, 2, 5, 10, ... that does. `fps` are
