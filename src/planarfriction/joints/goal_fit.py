@@ -44,7 +44,7 @@ LONG = 0.1
 WORDS = {
     "load": (
         "the level grows with the torque through the gears",
-        "load dependence not identifiable from these logs",
+        "not load-dependent within the accuracy of these logs",
     ),
     "stribeck": (
         "friction falls with speed from rest on",
