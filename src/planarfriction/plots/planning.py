@@ -85,7 +85,7 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
         turn.axhline(angle.factor * wanted["angle"], **dotted)
     else:
         slide.axhline(length.factor * np.hypot(*wanted["slide"]), **dotted)
-    turn.set_ylabel(style.with_unit("turn", angle))
+    turn.set_ylabel(style.with_unit("rotation", angle))
     slide.set_ylabel(f"slide [{length.label}]")
     slide.set_xlabel("time [s]")
     turn.legend(frameon=False, fontsize="small")
