@@ -12,7 +12,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 from matplotlib.patches import Polygon
-from scipy.spatial import ConvexHull
 
 import planarfriction as pf
 from planarfriction import geometry
@@ -218,6 +217,8 @@ class SurfacePanel:
 
     def _side(self, surface: Any) -> np.ndarray:
         """Return the outline of a surface as it is seen from the side `[P, 2]`, convex as the surface is."""
+        from scipy.spatial import ConvexHull
+
         points = self._seen(scaled_samples(surface, *even_mesh(surface))[1])
         points = points.reshape(-1, 2)
         return points[ConvexHull(points).vertices]
