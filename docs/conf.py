@@ -105,6 +105,11 @@ ENDS = {"torch": "torch", "jax": "jax", "mujoco": "mujoco", "plotly": "interacti
 WITHOUT = "|".join(
     f"_{end}" for name, end in ENDS.items() if importlib.util.find_spec(name) is None
 )
+NOTEBOOK = """\
+%matplotlib inline
+# Colab and other new environments: install the library first. It is not on PyPI yet.
+# %pip install /path/to/a/clone"""
+"""First cell of every notebook."""
 THEMES = ("patches", "laws", "limit_surfaces", "motion", "derivatives", "hosts")
 sphinx_gallery_conf = {
     "examples_dirs": ["../examples/gallery", "../examples/notebooks"],
@@ -118,6 +123,7 @@ sphinx_gallery_conf = {
     "min_reported_time": 10,
     "show_signature": False,
     "download_all_examples": False,
+    "first_notebook_cell": NOTEBOOK,
     "write_computation_times": False,
     "nested_sections": False,
     "subsection_order": [*(f"../examples/gallery/{theme}" for theme in THEMES), "*"],

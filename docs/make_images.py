@@ -104,9 +104,9 @@ def motions() -> plots.style.PlotFigure:
     figure = plots.style.new_figure(style.PAGE, 2.75)
     grid = figure.add_gridspec(2, 3, height_ratios=(3.0, 1.0))
     twists = {
-        "it slides": (1.0, 0.0, 0.0),
-        "it turns about the ring": (0.008, 0.0, 1.0),
-        "it spins": (0.0, 0.0, 1.0),
+        "translates": (1.0, 0.0, 0.0),
+        "rotates about the ring": (0.008, 0.0, 1.0),
+        "rotates about its centre": (0.0, 0.0, 1.0),
     }
     corner = int(np.argmax(pad.positions @ [1.0, 1.0]))
     for column, (words, (vx, _, omega)) in enumerate(twists.items()):

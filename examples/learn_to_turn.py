@@ -31,7 +31,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import planarfriction as pf
 from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
 from planarfriction.plots.film_files import write_frames
-from planarfriction.plots.style import new_figure
+from planarfriction.plots.style import REDUCED, new_figure
 
 WORLDS, CANDIDATES, ELITE, ROUNDS = (
     64,
@@ -53,6 +53,7 @@ LIGHT, FIRM, DROPPED = (
     6.0,
     0.02,
 )  # forces of each finger [N]; how far a plate that is held may slide down [m]
+SHOWN = 3, 4  # rows and columns of plates in the film
 RADIUS, MASS, ARM = (
     0.012,
     0.1,
@@ -243,7 +244,7 @@ def draw(
     left.plot(
         np.arange(STEPS + 1) * HELD * DT,
         np.degrees(history[:, :, 0]),
-        color="C0",
+        color=REDUCED,
         linewidth=0.5,
     )
     left.set(
@@ -261,42 +262,37 @@ def draw(
 
 
 def film(angles: np.ndarray, targets: np.ndarray, path: Path) -> None:
-    """Write an animation of all plates at `angles` `[T, worlds]` [rad] at half speed, with the angles to turn by."""
-    side = int(np.sqrt(len(targets)))
-    figure = new_figure(5.4, 5.6)
+    """Write an animation of the first plates at `angles` `[T, worlds]` [rad] at half speed, with the angles wanted."""
+    figure = new_figure(7.0, 4.9)
     axes = figure.subplots()
-    axes.set(xlim=(-0.4, side), ylim=(-0.9, side - 0.7), aspect="equal")
+    rows, columns = SHOWN
+    axes.set(xlim=(-0.3, columns), ylim=(-0.85, rows - 0.7), aspect="equal")
     axes.axis("off")
-    x, y = np.divmod(np.arange(side**2), side)
-    plates = []
-    for e in range(side**2):
-        plates.append(
-            axes.plot(
-                [], [], color="C0", linewidth=7.0, solid_capstyle="butt", alpha=0.6
-            )[0]
-        )
-        axes.plot(
-            *_line(x[e], y[e], targets[e], 0.0, 0.92),
-            color="C3",
-            linewidth=1.8,
-            zorder=3,
-        )
-    pads = axes.plot(x, y, "o", color="black", markersize=5.0, zorder=4)[0]
-    shown = {"plate": plates[0], "angle to turn by": axes.lines[1], "fingers": pads}
+    y, x = np.divmod(np.arange(rows * columns), columns)
+    look = {"solid_capstyle": "butt", "alpha": 0.6, "color": REDUCED, "linewidth": 16.0}
+    plates = [axes.plot([], [], **look)[0] for _ in x]
+    for e in range(len(x)):
+        goal = _line(x[e], y[e], targets[e], 0.0, 0.85)
+        axes.plot(*goal, "--", color="black", linewidth=1.8, zorder=3)
+    pads = axes.plot(x, y, "o", color="0.45", markersize=11.0, zorder=4)[0]
+    shown = {"plate": plates[0], "angle wanted": axes.lines[len(x)], "fingers": pads}
     figure.legend(
         shown.values(),
         shown.keys(),
-        loc="outside upper center",
+        loc="outside lower center",
         ncols=3,
-        fontsize=13,
+        fontsize=14,
         frameon=False,
+        handlelength=2.5,
     )
-
     canvas, file = FigureCanvasAgg(figure), io.BytesIO()
+    error = np.degrees(abs(angles - targets)).mean(axis=1)
 
     def frame(k: int) -> np.ndarray:
         for e, plate in enumerate(plates):
             plate.set_data(*_line(x[e], y[e], angles[k, e]))
+        words = f"{k * HELD * DT:.2f} s: mean error {error[k]:.0f}°"
+        axes.set_title(f"{words} in {len(targets)} worlds", fontsize=16)
         canvas.draw()
         return np.array(canvas.buffer_rgba())[:, :, :3]
 

@@ -83,7 +83,7 @@ def draw(data: xr.Dataset) -> Any:
         turned = np.degrees(-data.angle.transpose("mu_c", "grip")).clip(0.0, 90.0)
         look = {"cmap": style.PRESSURE_MAP, "shading": "nearest", "rasterized": True}
         mesh = axes.pcolormesh(data.grip, data.mu_c, turned, **look)
-        words = "angle turned in 0.5 s [°]"
+        words = "rotation in 0.5 s [°]"
         figure.colorbar(mesh, ax=axes, label=words, extend="max")  # what is more is cut
         slip = 1e3 * data.slip.transpose("mu_c", "grip")
         levels = axes.contour(
@@ -91,9 +91,9 @@ def draw(data: xr.Dataset) -> Any:
         )
         axes.clabel(levels, fmt="%g mm", fontsize=7)
         axes.plot(holding_grip(RATIO * mu), mu, color="black", linewidth=1.6)
-        top = holding_grip(RATIO * mu[-1])
-        place = {"xytext": (5, -4), "textcoords": "offset points", "va": "top"}
-        axes.annotate("limit: to the right it holds", (top, mu[-1]), **place)
+        look = {"transform": axes.transAxes, "fontweight": "bold"}
+        axes.text(0.97, 0.95, "holds", ha="right", va="top", **look)
+        axes.text(0.03, 0.05, "slips", color="white", **look)
         axes.set(
             xlabel="grip of each finger [N]",
             ylabel="friction coefficient mu_c",

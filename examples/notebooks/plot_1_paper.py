@@ -103,7 +103,7 @@ held = pf.simulate(pf.scenes.in_hand(pf.ReducedModel(disc, law)))
 motion = pf.plots.plot_motion(held)
 end = held.data.isel(time=-1)
 print(
-    f"down by {-1e3 * float(end.y):.1f} mm, turned by {np.degrees(float(end.theta)):.1f} deg"
+    f"down by {-1e3 * float(end.y):.1f} mm, rotated by {np.degrees(float(end.theta)):.1f} deg"
 )
 
 # %%

@@ -1,6 +1,6 @@
 """
-Holding what is not known
-=========================
+Grip control with unknown friction
+==================================
 
 A gripper picks parts whose friction, mass and centre of mass it does not know. This walk lets it find the friction
 while it holds, compares its grip with a rule that was told the friction, and then turns a part on purpose.

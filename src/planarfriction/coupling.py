@@ -76,7 +76,7 @@ class HostStep(NamedTuple):
     normal_force: Any
     """Normal forces `[..., k]` [N]."""
     wrench: Any
-    """Guess of the wrenches, `[..., k, 3]` [N, N, N m]: those of the last step, or zeros."""
+    """Initial guess of the wrenches, `[..., k, 3]` [N, N, N m]: those of the last step, or zeros."""
     twist_response: Any
     """d twist / d wrench, `[..., 3k, 3k]`: for rigid bodies `dt J M^-1 J'`; `W.twist_response W >= 0`."""
     load_response: Any = None
@@ -215,7 +215,7 @@ class CoupledPatches(ByValue):
         }
         pressings = self._pressings(host.loads, host.cover)
         if pressings and host.moments is not None:
-            rule = "be None beside loads of cells"
+            rule = "be None if loads of cells are given"
             raise InvalidValueError("moments", rule, host.moments)
         problems, batch = self._problems(arrays, pressings)
         parts = self._parts

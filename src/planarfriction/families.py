@@ -114,7 +114,10 @@ PADS = Family(
     "pad",
     {
         "layer": ("a thin layer bonded to a rigid back", "pads:Layer"),
-        "half-space": ("a body that is thick beside the patch", "pads:HalfSpace"),
+        "half-space": (
+            "a body that is thick compared with the patch",
+            "pads:HalfSpace",
+        ),
         "measured": ("by the stiffness of a stuck patch", "pads:Measured"),
         "at-load": ("with the stiffness of the law under a load", "pads:AtLoad"),
     },
@@ -199,11 +202,11 @@ PUBLISHED_PATCHES = Family(
         "Circle": ("a disc", "patch.published:circle"),
         "Line": ("a line along y", "patch.published:line"),
         "LineGrad": (
-            "a line along y, pressed harder at its top",
+            "a line along y, with higher pressure at its top",
             "patch.published:line_grad",
         ),
         "LineGradX": (
-            "a line along x, pressed harder at its left",
+            "a line along x, with higher pressure at its left",
             "patch.published:line_grad_x",
         ),
         "NonConvex1": ("two square pads", "patch.published:non_convex_1"),
@@ -219,7 +222,7 @@ SCENES = Family(
     "scene",
     {
         "in-hand": (
-            "a plate that slips and turns between finger pads",
+            "a plate that slips and rotates between finger pads",
             "scenes.ready:in_hand",
         ),
         "drift": (
@@ -233,15 +236,15 @@ SCENES = Family(
             "scenes.ready:pushed",
         ),
         "pivot": (
-            "a part that swings down in a loosened grip and is caught",
+            "a part that rotates down in a loosened grip and is caught",
             "scenes.ready:pivot",
         ),
         "foot": (
-            "a robot that turns on one foot as its weight moves",
+            "a robot that rotates on one foot as its weight moves",
             "scenes.ready:foot",
         ),
         "curling": (
-            "a curling stone that slides and spins to rest",
+            "a curling stone that slides and rotates to rest",
             "scenes.ready:curling",
         ),
     },

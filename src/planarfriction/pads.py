@@ -1,4 +1,4 @@
-"""Pads: how a soft face bends, apart from how it is pressed (docs/pads.md)."""
+"""Pads: tangential stiffness of a soft face, apart from its pressure (docs/pads.md)."""
 
 from __future__ import annotations
 
@@ -47,9 +47,9 @@ def _bodies(name: str, value: Any) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Pad(ByValue):
-    """Elastic pad under a patch: it bends where it is soft and slips where it is lightly pressed.
+    """Elastic pad under a patch: it deforms where it is soft and slips where its pressure is low.
 
-    Piece i has a stiffness `K_i` [N/m] of its own and carries the load `N_i`, so that a patch slips partly before it
+    Piece i has a stiffness `K_i` [N/m] and carries the load `N_i`, so that a patch slips partly before it
     slips as a whole. All pieces may hang on a compliance C that they have in common, as on a half-space. Make pads with
     `layer`, `half_space`, `measured` and `at_load`.
 
@@ -71,7 +71,7 @@ class Pad(ByValue):
     def half_space(
         shear_modulus: float, poisson_ratio: float = 0.5, *, bodies: int = 1, lag: float = LAG
     ) -> Pad:  # fmt: skip
-        """Return a body that is thick beside the patch, against a rigid face, or two alike (`bodies`).
+        """Return a body that is thick compared with the patch, against a rigid face, or two alike (`bodies`).
 
         Pieces share the stiffness as the tractions of the stuck patch; what they do not explain of its stiffness in
         shift and rotation is common. `shear_modulus` [Pa]; `lag` [s] is that of the material.
@@ -114,7 +114,7 @@ class Pad(ByValue):
                 "patch", "have no asymmetry for a pad", "an asymmetry"
             )
         if patch.anisotropic and not self.springs_of_law:
-            rule = "have no friction metric for a pad with a stiffness of its own"
+            rule = "have no friction metric for a pad with a separate stiffness"
             raise InvalidValueError("patch", rule, "a metric")
         refuse_damping(law.numbers.sigma_1, self.compliance(patch))
 

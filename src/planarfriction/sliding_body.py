@@ -301,7 +301,7 @@ class SlidingBody(ByValue):
         if normal_force is None and all(p in given for p in range(count)):
             return np.zeros(count)
         if 0 in given and isinstance(self.models, FrictionModel):
-            rule = "be None beside loads of cells"
+            rule = "be None if loads of cells are given"
             raise InvalidValueError("normal_force", rule, normal_force)
         load = validation.non_negative_numbers("normal_force", normal_force)
         if isinstance(self.models, FrictionModel):

@@ -27,7 +27,7 @@ _INSTANT = SolverOptions(t_end=1e-3)
 def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float]:
     """Compile everything now and keep it on disk; returns the time that each part took [s].
 
-    Each processor compiles other parts, in a process of its own. Code that was compiled before is read from the
+    Each processor compiles other parts, in a separate process. Code that was compiled before is read from the
     cache. `progress` is called with the description of each part before it begins; without it, a line on the
     terminal or in the notebook names the part. Compiled functions are kept, so Ctrl-C loses only the current one.
     Machine code is stored beside the sources, or in the user's cache if that folder is not writable, or in the

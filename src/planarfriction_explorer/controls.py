@@ -36,7 +36,7 @@ TOOLTIPS = {
     "undo": "Goes back by one change, or by one drag as a whole.",
     "link": "Puts all that is on the screen into the address of the page.",
     "patch": "Published contact patch, of which the map shows the pressure.",
-    "sides": "Width and height of an evenly pressed rectangle: 12x20mm, 1.2x2cm, or 0.012x0.02 in metres.",
+    "sides": "Width and height of a rectangle with uniform pressure: 12x20mm, 1.2x2cm, or 0.012x0.02 in metres.",
     "file": "Table or picture of relative pressures, of at most 64 x 64 cells; only their ratios matter.",
     "clear": "Takes all pressure away, for a map of your own.",
     "tool": "Effect of a drag over the map.",
@@ -44,7 +44,7 @@ TOOLTIPS = {
     "pressure": "Relative pressure that the brush leaves [-]; only ratios matter.",
     "vx": "Velocity of the origin along x [mm/s].",
     "vy": "Velocity of the origin along y [mm/s].",
-    "omega": "Spin, positive from x to y [rad/s].",
+    "omega": "Angular velocity, positive from x to y [rad/s].",
 }
 """Tooltips of what is no field of a record."""
 
@@ -87,7 +87,7 @@ class Controls:
             label="Mass of the part [g]", value=_thousandfold(state.mass), step=10.0
         )
         self.lever = widgets.FloatInput(
-            label="Off the middle by [mm]", value=_thousandfold(state.lever), step=1.0
+            label="Off-centre by [mm]", value=_thousandfold(state.lever), step=1.0
         )
         vx, vy, omega = state.twist
         self.vx = widgets.FloatSlider(
@@ -222,7 +222,7 @@ class Controls:
             self.law,
             self.parameters,
             self.load,
-            _heading("Held by two such contacts"),
+            _heading("Grasped by two such contacts"),
             pn.Row(
                 self.mass, pn.Spacer(width=8), self.lever, sizing_mode="stretch_width"
             ),

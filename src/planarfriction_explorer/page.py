@@ -151,7 +151,7 @@ class Page:
         location: Any = pn.state.location
         location.hash = to_link(self.state)
         self._say(
-            "The address of this page now holds what is on the screen: keep it or pass it on."
+            "The address of this page now holds the state of the screen: keep it or pass it on."
         )
 
     def _follow_link(self, link: str) -> None:

@@ -273,7 +273,7 @@ def numbers_table(state: State, found: Answer, seconds: float) -> str:
     (force, angle) = state.drawing.largest_errors
     centre = state.centre_of_rotation
     where = (
-        "none, no spin"
+        "none, no rotation"
         if centre is None
         else f"({1e3 * centre[0]:.2f}, {1e3 * centre[1]:.2f}) mm"
     )
@@ -297,7 +297,7 @@ def holding_line(state: State) -> str:
         if state.normal_force > needed
         else "<span style='color:#C0392B'>slips</span>"
     )
-    what = f"{1e3 * state.mass:g} g, {MM * state.lever:g} mm beside the origin"
+    what = f"{1e3 * state.mass:g} g, {MM * state.lever:g} mm off-centre"
     return (
         f"<p id='hold'>Will it hold? A part ({what}) between two such contacts <b>{holds}</b>: each has to press with "
         f"<b>{needed:.3g} N</b>, and presses with {state.normal_force:g} N.</p>"

@@ -19,6 +19,9 @@ from planarfriction_explorer.state import Answer, State
 ROOM = 0.6
 """Half of the side of the view, in the longer side of the map [-]."""
 
+PRESSURE = Cividis256[::-1]
+"""Colours of the pressure: dark is much, as in `plots`."""
+
 
 class MapView:
     """The picture of the map, as `figure`; `dragged` is called with a place [m], `released` at the end of a drag."""
@@ -51,7 +54,7 @@ class MapView:
         plot.toolbar.logo = None
         plot.grid.visible = False
         shades = LinearColorMapper(
-            palette=Cividis256, low=0.0, high=1.0, nan_color="#FFFFFF00"
+            palette=PRESSURE, low=0.0, high=1.0, nan_color="#FFFFFF00"
         )
         plot.image(
             "image",
@@ -84,11 +87,11 @@ class MapView:
             )
         centre = {
             "source": self._sources["centre"],
-            "size": 18,
-            "line_width": 3,
-            "color": "#D00000",
+            "size": 16,
+            "line_width": 2,
+            "line_color": "black",
         }
-        plot.scatter("x", "y", marker="circle_cross", fill_alpha=0.0, **centre)
+        plot.scatter("x", "y", marker="circle_dot", fill_color="white", **centre)
         for kind in (events.PanStart, events.Pan, events.Tap):
             plot.on_event(kind, lambda event: dragged(1e-3 * event.x, 1e-3 * event.y))
         for kind in (events.PanEnd, events.Tap):
@@ -111,11 +114,11 @@ class MapView:
 
 def legend() -> str:
     """Return what the shades and marks of the map stand for."""
-    colours = ", ".join(Cividis256[::51])
+    colours = ", ".join(PRESSURE[::51])
     bar = f"display:inline-block;width:70px;height:10px;background:linear-gradient(90deg, {colours})"
     return (
         f"<div style='font-size:13px'>0 <span style='{bar}'></span> 1 of the highest pressure. Thin arrows: slip. "
-        "Thick arrows: forces, as in the table. <span style='color:#D00000'>⊕</span>: centre of rotation.</div>"
+        "Thick arrows: forces, as in the table. ⊙: centre of rotation.</div>"
     )
 
 

@@ -45,7 +45,7 @@ def test_numbers_that_pass_are_floats(value):
         (1j, "be a number and not complex"),
         ("0.02", "be a number, got '0.02'"),
         ([1.0], "be a number"),
-        (np.timedelta64(1, "s"), "no time with a unit of its own"),
+        (np.timedelta64(1, "s"), "no time with a separate unit"),
         (np.datetime64("2026-01-01"), "no date"),
         (np.ma.masked_array(1.0, True), "not masked"),
         (None, "be a number"),

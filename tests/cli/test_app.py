@@ -461,7 +461,7 @@ def coarse(monkeypatch):
         monkeypatch.setattr(f"planarfriction.plots.limit_surface.{name}", 12)
 
 
-def test_limit_surface_of_a_map_is_the_exact_one_alone_or_to_be_turned(
+def test_limit_surface_of_a_map_is_the_exact_one_alone_or_to_be_rotated(
     coarse, capsys, tmp_path
 ):
     pytest.importorskip("plotly")
@@ -480,8 +480,12 @@ def test_limit_surface_of_a_map_is_the_exact_one_alone_or_to_be_turned(
     assert "(exact)" in capsys.readouterr().out
     for path in (both, page):
         assert main([*command, "--surface", "ellipsoid", "--out", str(path)]) == 0
-    with Image.open(alone) as one, Image.open(both) as two:
-        assert two.width == 2 * one.width
+    # three sections, and the ellipsoid in green over them
+    green = np.array([0, 158, 115])
+    for path, expected in ((alone, False), (both, True)):
+        with Image.open(path) as picture:
+            pixels = np.asarray(picture.convert("RGB")).astype(int)
+        assert (np.abs(pixels - green).max(axis=-1) < 20).any() == expected
     assert page.read_text(encoding="utf-8").count('"type":"surface"') >= 2
 
 

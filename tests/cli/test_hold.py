@@ -36,6 +36,8 @@ def test_the_force_the_factor_of_a_grip_and_a_picture(tmp_path, capsys):
     [
         (["--pad", "12x20in"], "patch must be a length such as 60mm, 6cm or 0.06"),
         (["--pad", "12mm"], "patch must have two sides such as 12x20mm"),
+        (["--pad", "12y20"], "patch must have two sides such as 12x20mm"),
+        (["--pad", "12.5y20mm"], "patch must have two sides such as 12x20mm"),
         (["--offset", "1mm,"], "--offset must be a length"),
         (["--width", "20mm"], "--width must be given only for a pressure map"),
         (["--out", "hold.txt"], "a picture ends in .png or .pdf or .svg"),

@@ -19,7 +19,7 @@ RATE = 148.0  # samples per second, as measured
 def slides(count=8):
     """Slides of a uniform square with friction MU, in the columns of the measured file.
 
-    The first ends before the cube stops; the last two are one slide and its copy, turned by 1 rad.
+    The first ends before the cube stops; the last two are one slide and its copy, rotated by 1 rad.
     """
     patch = pf.ContactPatch.rectangle(0.1048, cells=11)
     law = pf.LuGre(

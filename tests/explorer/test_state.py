@@ -352,7 +352,7 @@ def test_the_table_has_the_power_and_the_largest_errors():
     (force, angle) = PAINTED.largest_errors
     said = pictures.numbers_table(state, found, 0.0123)
     assert (
-        "none, no spin" in said
+        "none, no rotation" in said
         and f"power: {1e3 * found.power:.4g} mW" in said
         and "in 12.3 ms" in said
     )
@@ -587,12 +587,7 @@ def test_a_scene_is_run_with_the_contact_on_the_screen():
 
 def test_a_film_is_one_file_beside_its_histories_and_can_be_cancelled(monkeypatch):
     monkeypatch.setattr(films, "DPI", 20.0)  # quick to draw
-    for name, few in {
-        "animation.LEAST_FRAMES": 6,
-        "panels.POLAR": 6,
-        "panels.AZIMUTH": 12,
-    }.items():
-        monkeypatch.setattr(f"planarfriction.plots.{name}", few)
+    monkeypatch.setattr("planarfriction.plots.animation.LEAST_FRAMES", 6)
     scene = ready_scene(State(Drawing.published("Line")), "free-slide", "reduced")
     told = []
     page, histories = film(scene, lambda doing, share: told.append((doing, share)))

@@ -104,7 +104,9 @@ def test_what_is_missing_comes_next(motions, slide):
         for wanted in [plan(motions.values(), logs=slide, wanted=["contact_radius"])]
         for each, gain in zip(wanted.motions, wanted.gains, strict=True)
     }
-    assert gains["slide from slow to fast"] < 0.01 < 5.0 < gains["spin during a slide"]
+    assert (
+        gains["slide from slow to fast"] < 0.01 < 5.0 < gains["rotation during a slide"]
+    )
     damping = plan(motions.values(), logs=slide, wanted=["sigma_1"])
     assert damping.best.name == "quick reversals"
 
@@ -114,7 +116,7 @@ def test_a_second_load_tells_how_a_soft_finger_grows():
         0.01, cells=11, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
     )
     motions = candidate_motions(patch, LAW, normal_force=[2.0, 6.0], duration=0.5)
-    spins = [each for each in motions if each.name.startswith("spin during")]
+    spins = [each for each in motions if each.name.startswith("rotation during")]
     options = {"parameters": ("mu_c", "c", "n"), "noise": NOISE, "nuisance": ()}
     log = design_experiment(patch, LAW, motions=spins[0], **options).best
     found = design_experiment(patch, LAW, logs=log, motions=spins, **options)

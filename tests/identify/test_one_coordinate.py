@@ -185,13 +185,13 @@ def test_a_fit_says_what_it_holds_and_where_it_would_go(slide):
         .replace("\n", " ")
     )
     assert (
-        "Sigma_2 is held at 0.75 s/m; the residuals agree" in fine
+        "Sigma_2 is fixed at 0.75 s/m; the residuals agree" in fine
         and "contradict" not in fine
     )
     start["sigma_2"] = 0.5
     off = fitted(slide, PATCH, parameters=names, start=start, **QUICK)
     text = off.table().replace("\n", " ")
-    assert "Sigma_2 is held at 0.5 s/m; the residuals contradict it: 0.7" in text
+    assert "Sigma_2 is fixed at 0.5 s/m; the residuals contradict it: 0.7" in text
     assert not off.identifiable("mu_c")
 
 

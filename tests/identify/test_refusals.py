@@ -274,7 +274,7 @@ REFUSED = [
     ),
     (
         lambda: identify_lugre(LOG, POINT),
-        "patch must be wider than a point for an identification (a disc of 0.1 mm pulls like a",
+        "patch must be wider than a point for an identification (a disc of 0.1 mm has the friction",
     ),
     (
         lambda: identify_lugre(changed(wrench=0.0 * LOG.wrench, name="dead"), PATCH),

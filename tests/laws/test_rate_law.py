@@ -286,7 +286,7 @@ def test_a_law_that_was_used_goes_to_another_process():
 
 
 def test_what_needs_the_bristles_of_lugre_refuses_it_in_one_line():
-    rule = "^law must have the bristles of LuGre for ReducedModelPublished, not a rate of its own, got BoucWen$"
+    rule = "^law must have the bristles of LuGre for ReducedModelPublished, not a separate rate, got BoucWen$"
     with refused(rule):
         pf.ReducedModelPublished(DISC, BoucWen())
     with refused("for patches with an asymmetry"):
@@ -301,7 +301,7 @@ def test_what_needs_the_bristles_of_lugre_refuses_it_in_one_line():
 @pytest.mark.torch
 def test_tensors_refuse_it():
     torch = pytest.importorskip("planarfriction.torch")
-    with refused(r"for .*not a rate of its own"):
+    with refused(r"for .*not a separate rate"):
         torch.DistributedModel(DISC, BoucWen())
 
 

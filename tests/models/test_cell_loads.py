@@ -276,16 +276,16 @@ def test_loads_that_make_no_sense_are_refused():
         ({"loads": loads[1:]}, r"loads.*have shape \[..., 384\]"),
         ({"loads": -loads}, "loads.*>= 0"),
         ({"loads": loads, "cover": 2.0 * np.ones(384)}, r"cover.*\[0, 1\]"),
-        ({"loads": loads, "cover": 0.0 * loads}, "cover.*> 0 where a cell bears load"),
+        ({"loads": loads, "cover": 0.0 * loads}, "cover.*> 0 if a cell is loaded"),
         ({"loads": loads, "cover": (2.0 + loads, loads)}, r"cover.*\[0, 1\]"),
         ({"loads": [loads, [1.0]]}, "loads.*rows of equal length"),
         ({"cover": loads}, "loads.*be given"),
     ):
         with refused(words):
             model.step(*inputs, None, 1e-3, **given)
-    with refused("normal_force.*None beside loads"):
+    with refused("normal_force.*None if loads"):
         model.step(*inputs, 1.0, 1e-3, loads=loads)
-    with refused("moments.*None beside loads"):
+    with refused("moments.*None if loads"):
         model.step(*inputs, None, 1e-3, moments=[0.0, 0.0], loads=loads)
     one = pf.ReducedModelPublished(GRADED, DAMPED)
     with refused("loads.*without cells"):
@@ -323,7 +323,7 @@ def test_bodies_and_coupled_patches_step_as_the_model_at_their_new_twist(name):
     np.testing.assert_allclose(
         patches.states(found.state)[0], new, atol=1e-6 * abs(new).max()
     )
-    with refused("normal_force.*None beside loads"):
+    with refused("normal_force.*None if loads"):
         body.step(flat, twist, 1.0, 1e-3, **given)
     with refused("loads.*list of 2"):
         patches.step(patches.rest(3), host._replace(loads=loads), 1e-3)
@@ -426,7 +426,7 @@ def test_rows_of_loads_that_make_no_sense_are_refused():
     ):
         with refused(words):
             rollout(model, None, twist, None, 1e-3, **given)
-    with refused("normal_force.*None beside loads"):
+    with refused("normal_force.*None if loads"):
         rollout(model, None, twist, 1.0, 1e-3, loads=loads)
     change = RolloutTangent(normal_force=np.ones((3, 7)))
     with refused("tangent.normal_force.*shape"):

@@ -219,7 +219,7 @@ def test_a_plan_draws_itself():
     figure = turning().plot()
     assert [axes.get_ylabel() for axes in figure.axes] == [
         "grip [N]",
-        "turn [°]",
+        "rotation [°]",
         "slide [mm]",
     ]
     assert len(figure.axes[1].lines) == 4  # three frictions and the goal

@@ -248,6 +248,7 @@ def test_a_plan_leads_to_its_pose(kind):
     again = push(slider(kind), Pusher(0.4), plan.path)
     np.testing.assert_allclose(again.end, plan.push.end, rtol=0.0, atol=1e-12)
     assert plan.report.sticks and plan.report.used <= 0.8 + 1e-9
+    assert plan.report.reached and "Misses" not in str(plan)
     assert plan.report.length < 1.3 * np.hypot(*goal[:2])
     assert "reached" in str(plan.report)
     axes = plan.plot().axes[0]
@@ -258,6 +259,17 @@ def test_a_plan_leads_to_its_pose(kind):
     # a pusher that is rougher than thought sticks too, and nothing changes
     rough = push(slider(kind), Pusher(0.5), plan.path)
     np.testing.assert_allclose(rough.end, plan.push.end, rtol=0.0, atol=1e-5)
+
+
+def test_a_plan_that_misses_its_goal_says_by_how_much():
+    # behind the only edge that may be pushed: two metres of an unstable push
+    goal = np.array([-0.3, 0.1, -1.0])
+    with pytest.warns(RuntimeWarning, match="misses its goal by [0-9.]+ mm and"):
+        plan = plan_push(slider(), Pusher(0.4), goal, edges=[3])
+    away = np.abs(plan.push.end - goal)
+    np.testing.assert_allclose(plan.report.error, [np.hypot(*away[:2]), away[2]])
+    assert not plan.report.reached
+    assert f"Misses its goal by {1e3 * plan.report.error[0]:.3g} mm" in str(plan)
 
 
 def test_a_push_is_drawn():
@@ -292,7 +304,17 @@ def test_a_report_of_a_push_is_in_millimetres_and_degrees():
     said = " ".join(
         str(
             PushReport(
-                pose, pose, (0.0, 0.003, -0.1), 2, (0.0, 0.0), 0.1234, 0.75, True, 1.0
+                pose,
+                pose,
+                (0.0, 0.0),
+                True,
+                (0.0, 0.003, -0.1),
+                2,
+                (0.0, 0.0),
+                0.1234,
+                0.75,
+                True,
+                1.0,
             )
         ).split()
     )

@@ -7,6 +7,7 @@ import subprocess
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -31,13 +32,6 @@ LAW = pf.LuGre(
 
 SMALL = {"dpi": 25.0, "slow": 0.1}
 """Pictures of few and small frames."""
-
-
-@pytest.fixture(autouse=True)
-def coarse(monkeypatch):
-    """Draw limit surfaces with few facets: nothing here depends on their number."""
-    for name in ("POLAR", "AZIMUTH"):
-        monkeypatch.setattr(f"planarfriction.plots.panels.{name}", 12)
 
 
 def film_of(run, frames=5, follow=True):
@@ -340,7 +334,8 @@ def test_a_frame_draws_and_says_where_body_and_contacts_are():
         start = 1e3 * (origin + turned(patch.centre_of_pressure(), theta + 0.5))
         assert arrow._posA_posB[0] == pytest.approx(start, abs=1e-9)
     assert (
-        film.words.get_text() == "moved by x 4.50 mm, y -11.25 mm, turned by -38.67 deg"
+        film.words.get_text()
+        == "moved by x 4.50 mm, y -11.25 mm, rotated by -38.67 deg"
     )
     assert film.clock.get_text() == "t = 1.50 s"
     longest = max(np.hypot(*each.forces.T).max() for each in film.track.contacts)
@@ -351,27 +346,23 @@ def test_a_frame_draws_and_says_where_body_and_contacts_are():
     )
 
 
-def test_the_wrench_is_drawn_with_its_shadow_and_its_tail():
+def test_the_wrench_is_drawn_from_the_side_with_its_tail():
     run = synthetic.solution()
     film = film_of(run, frames=41)
     (panel,) = panels(film, SurfacePanel)
     panel.show(30)
-    fx, fy, _ = head = panel.points[30]
-    names = [float(run.data[name][150, 0]) for name in ("fx", "fy", "tau")]
+    head = panel.points[30]
+    fx, fy, tau = (run.data[name].values[:, 0] for name in ("fx", "fy", "tau"))
+    most = np.hypot(fx, fy)[::5].argmax() * 5
+    along = np.array([fx[most], fy[most]]) / np.hypot(fx[most], fy[most])
     radius = run.scene.contacts[0].model.patch.contact_radius()
+    seen = np.array([along @ [fx[150], fy[150]], tau[150] / radius])
     # Exact radius, of cells here.
-    assert head == pytest.approx(np.array(names) / 2.0 / [1.0, 1.0, radius], rel=2e-3)
-    assert np.ravel(panel.head.get_data_3d()) == pytest.approx(head)
-    assert pytest.approx(panel.points[5:31]) == np.asarray(panel.tail.get_data_3d()).T
-    assert (
-        pytest.approx(np.array([[0.0, 0.0, 0.0], head]))
-        == np.asarray(panel.arm.get_data_3d()).T
-    )
-    floor = panel.axes.get_zlim()[0]
-    assert (
-        pytest.approx(np.array([[fx, fy, floor]] * 2))
-        == np.asarray(panel.shadow.get_data_3d()).T
-    )
+    assert head == pytest.approx(seen / 2.0, rel=2e-3)
+    assert np.ravel(panel.head.get_data()) == pytest.approx(head)
+    assert pytest.approx(panel.points[5:31]) == np.asarray(panel.tail.get_data()).T
+    arm = np.asarray(panel.arm.get_data()).T
+    assert pytest.approx(np.array([[0.0, 0.0], head])) == arm
 
 
 def test_cells_are_pale_unbent_blue_bent_and_orange_where_they_slip():
@@ -430,9 +421,15 @@ def test_a_patch_in_steady_sliding_has_its_wrench_on_the_limit_surface():
     fx, fy, tau = 2.0 * wrenches.T[:, :, None]  # mu_c = 1 and 2 N
     film = film_of(changed(run, fx=fx, fy=fy, tau=tau))
     (panel,) = panels(film, SurfacePanel)
-    assert panel.points == pytest.approx(points[::50], abs=1e-9)
+    seen = np.stack([points[:, :2] @ panel.along, points[:, 2]], -1)
+    assert panel.points == pytest.approx(seen[::50], abs=1e-9)
     panel.show(2)
-    assert np.ravel(panel.head.get_data_3d()) == pytest.approx(points[100], abs=1e-9)
+    assert np.ravel(panel.head.get_data()) == pytest.approx(seen[100], abs=1e-9)
+    # What is seen of the surface holds all its wrenches, and is no larger than they are.
+    (side,) = (shapely.Polygon(each.get_xy()) for each in panel.drawn.values())
+    assert shapely.distance(side, shapely.points(seen)).max() < 2e-3
+    ahead = surface.wrench((*panel.along, 0.0))[:2] @ panel.along
+    assert abs(side.bounds[2]) == pytest.approx(abs(ahead), rel=2e-3)
 
 
 def soft_finger():

@@ -133,7 +133,7 @@ def test_models_scenes_and_solutions_have_their_numbers(shown):
         "51, to 0.5 s",
         "1234 steps, 250 ms",
     )
-    assert rows["end"] == f"(2.00, -1.25) mm, turned by {np.degrees(-0.075):.2f} deg"
+    assert rows["end"] == f"(2.00, -1.25) mm, rotated by {np.degrees(-0.075):.2f} deg"
     assert (
         rows["status"] == "success: reached the end" and len(figure.axes[0].lines) == 3
     )

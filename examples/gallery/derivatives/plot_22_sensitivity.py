@@ -1,6 +1,6 @@
 """
-What a slide depends on
-=======================
+Sensitivities of a slide
+========================
 
 The derivatives of a motion by friction, size and mass come with its simulation. A
 thrown puck stops earlier with more friction, in proportion.

@@ -1,6 +1,6 @@
 """
-How hard to grip off the centre
-===============================
+Grip force for an off-centre grasp
+==================================
 
 The further from its centre of mass a plate is held, the harder two fingers must grip,
 since they hold a torque too. The ellipsoid asks for less grip than is needed in

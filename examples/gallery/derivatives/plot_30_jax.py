@@ -1,6 +1,6 @@
 """
-Which parameter shows when, with JAX
-====================================
+Information about parameters over time, with JAX
+================================================
 
 In JAX the models are pytrees and rollouts are functions like any other. Forward
 derivatives of a whole rollout say when each parameter of the law shows in the torque of

@@ -1,6 +1,6 @@
 """
-A box on four feet, in a loop of your own
-=========================================
+A box on four feet in a custom time-stepping loop
+=================================================
 
 A host that steps bodies finds the wrenches of all its patches in one implicit call,
 stable at any time step. A box on four feet is pushed and turned, at time steps from 1

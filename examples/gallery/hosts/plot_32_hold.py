@@ -1,6 +1,6 @@
 """
-Find friction while holding
-===========================
+Online friction estimation during a grasp
+=========================================
 
 A gripper holds a part whose friction is known within a factor of 3. It lowers its grip
 until the part slips by some tenths of a millimetre; from force, torque and slip

@@ -1,6 +1,6 @@
 """
-Let a part slide by 20 mm, and catch it
-=======================================
+Controlled in-hand slip by 20 mm
+================================
 
 A gripper lets three parts of different friction slide down by 20 mm in two seconds. It
 does not know their friction: it opens until they slip, then follows the speed that it

@@ -1,5 +1,5 @@
 """
-Before sliding: a loop of force and displacement
+Presliding: hysteresis of force and displacement
 ================================================
 
 A contact that is pushed to and fro by less than it takes to slide acts as a spring.

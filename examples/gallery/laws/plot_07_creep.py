@@ -1,6 +1,6 @@
 """
-What holds must not creep
-=========================
+Sticking without creep under cyclic load
+========================================
 
 A disc on a table is pushed by less than friction holds, with a force that oscillates.
 Plain LuGre bristles let it creep; elasto-plastic bristles do not.

@@ -1,6 +1,6 @@
 """
-A limit surface beside its ellipsoid
-====================================
+A limit surface and its ellipsoid
+=================================
 
 All wrenches with which two pads can slide, in force and torque over contact radius, and
 the ellipsoid that is often put in its place. The surface of two separate pads is far

@@ -1,6 +1,6 @@
 """
-Force against torque
-====================
+Section of a limit surface: force and torque
+============================================
 
 The more a patch spins while it slides, the less force is left, and the more torque.
 Each shape trades them along its own curve; the ellipse is a circle here.

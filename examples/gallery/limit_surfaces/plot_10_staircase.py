@@ -1,6 +1,6 @@
 """
-The staircase of a sum over cells
-=================================
+Discretization error: steps of a sum over cells
+===============================================
 
 Sum the friction over points, and each point that the centre of rotation crosses turns
 its force round: the wrench moves in steps. Integrated exactly, it is smooth; over cells

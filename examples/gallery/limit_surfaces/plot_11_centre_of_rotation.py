@@ -1,6 +1,6 @@
 """
-Where a pushed object turns
-===========================
+Centre of rotation of a pushed object
+=====================================
 
 Push a square through a point of its edge and it turns about a centre that depends on
 where you push. The way back through the limit surface, from a wrench to its twist, says

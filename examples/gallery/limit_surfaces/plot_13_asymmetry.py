@@ -1,6 +1,6 @@
 """
-Easier one way than the other
-=============================
+Asymmetric friction
+===================
 
 A brushed surface is easier to slide on one way than back. The friction of each heading
 is drawn around the origin.

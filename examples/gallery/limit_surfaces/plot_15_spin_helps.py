@@ -1,6 +1,6 @@
 """
-A spinning foot slides more easily
-==================================
+Rotation reduces the friction force
+===================================
 
 Spin takes away the friction against sliding: that is why one turns a chair to move it.
 At a fixed spin the force falls to nothing as the sliding becomes slow.

@@ -1,6 +1,6 @@
 """
-A limit surface to turn with the mouse
-======================================
+An interactive limit surface
+============================
 
 The surface of a strip in 3-D: force in x and y, torque over contact radius, with the
 ellipsoid that is often put in its place. Below, the same as a plotly figure: drag it,

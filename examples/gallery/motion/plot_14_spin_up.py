@@ -1,6 +1,6 @@
 """
-Breakaway in a spin
-===================
+Breakaway in pure rotation
+==========================
 
 Two pads at rest are turned together at a constant rate; of each the outer cells slip
 first. One threshold for all is the approximation of three states; each of a few discs

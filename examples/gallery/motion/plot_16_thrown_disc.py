@@ -1,6 +1,6 @@
 """
-A thrown disc stops sliding and spinning at once
-================================================
+A puck stops translating and rotating at once
+=============================================
 
 Slide and spin of a disc with even pressure end in the same instant, whatever they began
 with: as one slows down, it leaves more friction to the other.

@@ -1,6 +1,6 @@
 """
-A fingertip that grows with the load
-====================================
+A soft fingertip: contact area over normal force
+================================================
 
 A soft fingertip pressed harder spreads: its radius grows with a power of the load, and
 with it the torque that the contact can hold, faster than the load itself.

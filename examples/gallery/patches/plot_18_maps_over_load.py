@@ -1,6 +1,6 @@
 """
-Maps measured at several loads
-==============================
+Pressure maps at several normal forces
+======================================
 
 A contact whose pressure was measured at two loads has a limit surface of its own at
 every load between.

@@ -52,7 +52,7 @@ _PLAIN = frozenset({float, int, np.float64, np.float32, np.int64, np.int32})
 _OF_KIND = {
     "b": " and no truth value",
     "c": " and not complex",
-    "m": " and no time with a unit of its own (give seconds)",
+    "m": " and no time with a separate unit (give seconds)",
     "M": " and no date (give seconds)",
 }
 

@@ -200,12 +200,12 @@ def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any)
 @option(
     "--out",
     type=FILE,
-    help="Picture to write (.png, .pdf, .svg, or .html to rotate it with the mouse).",
+    help="Picture to write: three sections (.png, .pdf, .svg), or .html to rotate it with the mouse.",
 )
 @option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
 @option("--csv", type=FILE, help="Table of samples to write (.csv).")
 def limit_surface(**options: Any) -> None:
-    """Show the limit surface of a contact patch: numbers, a picture (next to its ellipsoid), a table as CSV.
+    """Show the limit surface of a contact patch: numbers, a picture (with its ellipsoid), a table as CSV.
 
     The CSV has the columns vx vy omega fx fy tau: twists in all directions and their friction wrenches for mu f_N = 1,
     about the origin of the contact frame, in m/s, rad/s, 1 and m.

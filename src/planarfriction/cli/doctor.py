@@ -72,7 +72,7 @@ def checks() -> list[Check]:
         ),
         # [2 a b d + a^3 asinh(b/a) + b^3 asinh(a/b)]/(6 a b), d^2 = a^2 + b^2: mean distance from the corner
         Check(
-            "rectangle turned about its corner [m]",
+            "rectangle rotated about its corner [m]",
             lambda: exact(rectangle).dissipation(corner),
             0.026947771,
             1e-9,
@@ -91,11 +91,9 @@ def checks() -> list[Check]:
         ("reduced-published", -0.0197103377, -0.1260840893),
     ):
         found += [
+            Check(f"in-hand plate, {name}, y [m]", partial(_end, name, "y"), y, 2e-6),
             Check(
-                f"plate in the hand, {name}, y [m]", partial(_end, name, "y"), y, 2e-6
-            ),
-            Check(
-                f"plate in the hand, {name}, angle [rad]",
+                f"in-hand plate, {name}, angle [rad]",
                 partial(_end, name, "theta"),
                 angle,
                 2e-5,

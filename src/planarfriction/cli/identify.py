@@ -81,7 +81,7 @@ def complete_log(
 @option(
     "--parameters",
     metavar="NAMES",
-    help="What to estimate, separated by commas. Default: law and radius.",
+    help="Parameters to estimate, separated by commas. Default: law and radius.",
 )
 @option(
     "--start",
@@ -105,7 +105,9 @@ def complete_log(
     help="Noise of the measured wrench in N and N m. Default: estimated.",
 )
 @option(
-    "--plain", is_flag=True, help="Use plain LuGre bristles. Default: what fits better."
+    "--plain",
+    is_flag=True,
+    help="Use plain LuGre bristles. Default: the one that fits better.",
 )
 @option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
 @option(
@@ -116,7 +118,7 @@ def complete_log(
 @option(
     "--nuisance",
     metavar="NAMES",
-    help="Rig disturbances: delay,bias,load,twist or none. Default: all.",
+    help="Sensor errors: delay,bias,load,twist or none. Default: all.",
 )
 @option(
     "--starts",
@@ -296,7 +298,7 @@ def parse_noise(text: str | None) -> list[float] | None:
 @option(
     "--parameters",
     metavar="NAMES",
-    help="What to estimate, separated by commas. Default: law and radius.",
+    help="Parameters to estimate, separated by commas. Default: law and radius.",
 )
 @option(
     "--wanted",
@@ -307,7 +309,7 @@ def parse_noise(text: str | None) -> list[float] | None:
     "--start",
     metavar="NAME=VALUE",
     multiple=True,
-    help="Guess of a parameter, or fixed value.",
+    help="Initial guess of a parameter, or fixed value.",
 )
 @option(
     "--normal-force",

@@ -17,7 +17,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.families import SURFACES
 
 HTML = ".html"
-"""A picture to be turned with the mouse."""
+"""A picture to be rotated with the mouse."""
 
 FINER = 3
 """Refinement whose errors stand beside those of a patch."""
@@ -101,7 +101,7 @@ def show(
             figure = plots.interactive_limit_surface(shown, beside=beside)
             write_text(out, figure.to_html(include_plotlyjs=True))
         else:
-            write_picture(plots.plot_limit_surface(shown, beside=beside), out)
+            write_picture(plots.plot_sections(shown, beside=beside), out)
         note(f"wrote {out}")
 
 

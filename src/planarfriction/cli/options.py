@@ -114,7 +114,8 @@ def find_patch(
                     f"{size[name]} for the patch {text}",
                 )
         return make()
-    if _LENGTH.fullmatch(text.strip()) and not os.path.exists(text):
+    of_file = Path(text).suffix[1:].isalpha() or os.path.exists(text)
+    if text[:1].isdigit() and not of_file:
         raise InvalidValueError(
             "patch", "have two sides such as 12x20mm, or be a name with --width", text
         )
@@ -264,7 +265,7 @@ _MAP_OPTIONS = (
     _map_option(
         "--threshold",
         type=float,
-        help="Share of the peak up to which cells of a map count as empty.",
+        help="Fraction of the peak up to which cells of a map count as empty.",
     ),
     _map_option(
         "--invert/--no-invert",

@@ -49,7 +49,7 @@ KINDS = {"m": "length", "m/s": "speed", "rad": "angle", "N": "force", "N m": "to
 @option(
     "--measure",
     metavar="FILE.py:NAME",
-    help="Function of a solution that returns what to keep. Default: all.",
+    help="Function of a solution that returns the values to keep. Default: all.",
 )
 @option(
     "--out",

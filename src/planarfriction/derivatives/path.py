@@ -29,7 +29,7 @@ RTOL = 1e-9
 
 SHARE = 0.1
 """Factor of the accuracy of each step of the derivatives, `SHARE rtol^POWER`, relative
-and in natural scales."""
+and in nominal values."""
 
 POWER = 2.0 / 3.0
 """Power of `rtol` in the accuracy of each step of the derivatives."""

@@ -28,7 +28,7 @@ SCENE_PARAMETERS = {
 
 - `mu`: mu_c and mu_s of every contact;
 - `r`: the size of every patch, about the origin of its contact frame (positions, contact radius, second moment);
-- `mass`, `inertia`: of the body, forces held (gravity pulls in proportion to the mass);
+- `mass`, `inertia`: of the body, forces held (gravity acts in proportion to the mass);
 - `load`: every normal force; not where a patch changes its shape with it.
 """
 

@@ -49,7 +49,7 @@ def grip_of(controller: Any, name: str) -> dict[str, Any]:
     writer = Writer()
     own = observer._filter
     if own.kind == CELLS:
-        rule = "know an ellipsoid or a table as its surface"
+        rule = "have an ellipsoid or a table as its surface"
         raise InvalidValueError("controller", rule, type(observer.surface).__name__)
     arrays = {
         each: value
@@ -138,7 +138,7 @@ PARAMETERS = {
     "mu_s": ("static coefficient, at least mu_c", "p->mu_s >= p->mu_c"),
     "v_s": ("Stribeck speed [m/s]", "p->v_s > 0"),
     "breakaway_ratio": (
-        "share of the largest deflection below which bristles are elastic, below 1",
+        "fraction of the largest deflection below which bristles are elastic, below 1",
         "p->breakaway_ratio >= 0 && p->breakaway_ratio < 1",
     ),
 }

@@ -494,7 +494,7 @@ def size_at(load: float, patch: ContactPatch) -> float:
     """
     size = patch.contact_radius(load)
     if not size > 0.0:
-        rule = "be wider than a point for an identification (a disc of 0.1 mm pulls like a point)"
+        rule = "be wider than a point for an identification (a disc of 0.1 mm has the friction of a point)"
         raise InvalidValueError(
             "patch", rule, f"{patch.cells} cell with a contact radius of {size:g} m"
         )

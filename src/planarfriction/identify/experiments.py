@@ -4,7 +4,7 @@ With the derivatives J of the wrenches over their noise, information adds up ove
 
     C_0 = (P + sum over logs J' J)^-1,    C_m = (C_0^-1 + J_m' J_m)^-1,    gain = log2(det C_0 / det C_m) / 2   [bit],
 
-with P the information a priori. Disturbances of the rig are estimated too: zeros and drift for each log, delay and
+with P the information a priori. Sensor errors are estimated too: zeros and drift for each log, delay and
 scale of the load cell once for all. The gain is of first order in the parameters, so it holds near the given law.
 
 Sources: Lindley 1956 (gain of information); Chaloner and Verdinelli 1995 (its form for normal errors, section 4).
@@ -165,7 +165,7 @@ def design_experiment(
         Standard deviation of the measured fx, fy [N] and tau [N m]; None takes that of `logs`, or 1 % of the largest
         friction.
     nuisance
-        Disturbances that the rig may add, as in `identify_lugre`; twists of future motions count as free of noise.
+        Sensor errors that the fit may include, as in `identify_lugre`; twists of future motions count as free of noise.
 
     Raises
     ------
@@ -349,7 +349,7 @@ def candidate_motions(
     """Make motions to choose from for an experiment: six for each load, from rest, as logs whose wrenches are zero.
 
     They are: growing sines of slide and spin, a slide that becomes faster, slow and quick reversals over three times
-    the distance at which bristles break away, spin alone, and spin during a slide.
+    the distance at which bristles break away, spin alone, and rotation during a slide.
 
     Parameters
     ----------
@@ -422,6 +422,6 @@ def _twists(
         "slow reversals": (reversals(SLOW), zero, zero),
         "quick reversals": (reversals(rate / PER_PERIOD), zero, zero),
         "spin": (zero, zero, spin * swept[2]),
-        "spin during a slide": (speed * grown, zero, spin * grown * sines[2]),
+        "rotation during a slide": (speed * grown, zero, spin * grown * sines[2]),
     }
     return {name: np.stack(column, -1) for name, column in columns.items()}

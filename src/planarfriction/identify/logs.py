@@ -352,7 +352,7 @@ class Log(ByValue):
         """Make a log from poses instead of twists: `motion` is x, y, theta `[T, 3]` of the contact frame [m, m, rad].
 
         The pose is that of the contact frame in the world, the wrench is in the axes of the contact frame; the twist is
-        obtained with `differentiated` and rotated into these axes. Jumps of theta by a whole turn, as from a tracker
+        obtained with `differentiated` and rotated into these axes. Jumps of theta by a full rotation, as from a tracker
         that limits it to one turn, are removed first and counted in `turns`; other jumps are refused.
 
         Raises InvalidValueError for such jumps, wrong shapes and times that do not grow.
@@ -379,7 +379,7 @@ class Log(ByValue):
     ) -> Log:
         """Make a log of one coordinate: a slide with a force gauge, or with `axis="theta"` a joint with a torque.
 
-        `force` `[T]` is the friction on the moving body [N, or N m], against the motion: minus the pull of a gauge.
+        `force` `[T]` is the friction on the moving body [N, or N m], against the motion: minus the force of a gauge.
         `velocity` `[T]` [m/s or rad/s] is used as it is; `position` `[T]` [m or rad] is differentiated over `window`
         samples. The other coordinates stay at 0 and take no part in a fit.
 
@@ -518,7 +518,7 @@ def differentiated(
 ) -> np.ndarray:
     """Compute the twist `[T, 3]` of a frame, in its axes, from poses x, y, theta `[T, 3]` [m, m, rad] over time [s].
 
-    The twist is the slope of a parabola through `window` samples. Jumps of theta by whole turns are removed first.
+    The twist is the slope of a parabola through `window` samples. Jumps of theta by full rotations are removed first.
 
     Raises InvalidValueError for times that do not increase and for other jumps of theta.
     """
@@ -600,11 +600,11 @@ def columns_of(log: Log) -> Mapping[str, np.ndarray]:
 def unwrapped(
     time: np.ndarray, angle: np.ndarray, name: str = "theta"
 ) -> tuple[np.ndarray, int]:
-    """Remove the jumps by whole turns from an angle `[T]` [rad]; returns the angle and the number of jumps.
+    """Remove the jumps by full rotations from an angle `[T]` [rad]; returns the angle and the number of jumps.
 
     An angle whose range exceeds a turn was not wrapped and stays as it is.
 
-    Raises InvalidValueError for a jump that no whole turn explains, and where a wrapped angle turns by more than a
+    Raises InvalidValueError for a jump that no full rotation explains, and where a wrapped angle rotates by more than a
     quarter of a turn between two samples, so that its direction is unknown.
     """
     if len(angle) < 2:

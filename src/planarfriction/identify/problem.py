@@ -78,7 +78,7 @@ class FitOptions(Checked):
     """
 
     nuisance: Sequence[str] = checked(check_groups, default=GROUPS)
-    """Disturbances that the rig may add: "delay" between motion and wrench, "bias" (zeros of the wrench and their
+    """Sensor errors that the fit may include: "delay" between motion and wrench, "bias" (zeros of the wrench and their
     drift), "load" (scale and drift of the load cell), "twist" (noise of the twist). All by default."""
     noise: Sequence[float] | None = checked(_noise, default=None)
     """Standard deviation of the measured fx, fy [N] and tau [N m]; None estimates each from its jitter."""

@@ -62,7 +62,7 @@ class Identification(ByValue):
     starts: tuple[int, int]
     """Number of starting points that ended in this minimum, and number of all."""
     rig: tuple[Nuisance, ...] = ()
-    """Estimated disturbances of the rig: delay, zeros, drift of the load cell, noise of the twist."""
+    """Estimated sensor errors: delay, zeros, drift of the load cell, noise of the twist."""
     scores: tuple[ModelScore, ...] = ()
     """The models and kinds of bristles that were fitted; the chosen one first."""
     chosen: str = ""
@@ -167,7 +167,7 @@ class Identification(ByValue):
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 
     def table(self) -> str:
-        """Return text in 80 columns: estimates, goodness of fit, correlations, then the verdicts and the rig."""
+        """Return text in 80 columns: estimates, goodness of fit, correlations, verdicts, sensor errors."""
         heading = f"{'parameter':<15}{'value':>12}{'std. error':>12}  {'95 % interval':<25}unit"
         lines = [heading]
         remarks = []
@@ -199,9 +199,7 @@ class Identification(ByValue):
             for each in self.rig
         ]
         if rig:
-            rig.insert(
-                0, f"{'disturbance of the rig':<27}{'value':>11}  95 % interval, unit"
-            )
+            rig.insert(0, f"{'sensor error':<27}{'value':>11}  95 % interval, unit")
         blocks = [lines, self._pairs(), [self.summary()], remarks, rig]
         return "\n\n".join("\n".join(block) for block in blocks if block)
 

@@ -91,7 +91,7 @@ SMOOTHNESS = 10.0 ** np.arange(0.0, 10.0, 0.25)
 
 
 class Nuisance(NamedTuple):
-    """Quantity of the rig that was estimated along with the contact."""
+    """Sensor error that was estimated along with the contact."""
 
     name: str
     unit: str

@@ -57,13 +57,13 @@ class Slide(ByValue):
     """Measured slide of a body on a level table, T samples.
 
     Raises InvalidValueError for fewer than five samples, wrong shapes, numbers that are not finite, times that do not
-    increase, and an angle that jumps by anything but whole turns.
+    increase, and an angle that jumps by anything but full rotations.
     """
 
     time: np.ndarray
     """Sample times [s], `[T]`."""
     pose: np.ndarray
-    """x, y of the centre of mass and the angle, world axes [m, m, rad], `[T, 3]`; jumps by whole turns are removed."""
+    """x, y of the centre of mass and the angle, world axes [m, m, rad], `[T, 3]`; full rotations are removed."""
     twist: np.ndarray | None = None
     """Measured initial velocity, world axes [m/s, m/s, rad/s], `[3]`; None estimates it from the first poses."""
     name: str = "slide"

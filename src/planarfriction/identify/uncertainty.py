@@ -22,7 +22,7 @@ CHANCE = 4.0
 """Standard deviations of the reduced chi-square, for independent residuals, that are put down to chance."""
 
 STRAIN = 3.0
-"""Standard deviations a priori of a disturbance of the rig above which a fit is
+"""Standard deviations a priori of a sensor error above which a fit is
 rejected."""
 
 HELD_OUT = 2.0
@@ -114,7 +114,7 @@ class Uncertainty(NamedTuple):
 
     @property
     def strain(self) -> float:
-        """Largest disturbance of the rig over its standard deviation a priori [-]."""
+        """Largest sensor error over its standard deviation a priori [-]."""
         return self.strains[0][0] if self.strains else 0.0
 
     @property
@@ -308,7 +308,7 @@ class Pull(NamedTuple):
 
     def __str__(self) -> str:
         unit = ALL[self.name].unit.replace("-", "")
-        text = f"{self.name} is held at {self.value:.3g} {unit}".rstrip()
+        text = f"{self.name} is fixed at {self.value:.3g} {unit}".rstrip()
         if not self.error < abs(self.value):
             return f"{text}; the data do not show it"
         to = self.value + self.step

@@ -105,7 +105,7 @@ def verdicts_on_samples(logs: Sequence[Log]) -> list[Verdict]:
 
 
 def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
-    """Return a verdict that counts the jumps by whole turns which were removed from the angles of logs or slides."""
+    """Return a verdict that counts the jumps by full rotations which were removed from the angles of logs or slides."""
     turned = {each.name: each.turns for each in measured if each.turns}
     if not turned:
         return []
@@ -280,7 +280,7 @@ def judge(
             error = evidence.errors[i]
             low, high = interval(name, evidence.values[i], error)
             reasons = [
-                f"it changes by {each.moves[i]:+.2g} if {each.name} is not held"
+                f"it changes by {each.moves[i]:+.2g} if {each.name} is not fixed"
                 for each in held
                 if not each.agrees and abs(each.moves[i]) > MOVED * error
             ]
@@ -317,7 +317,7 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
         )
     if u.strain > STRAIN:
         text.append(
-            f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of such a rig"
+            f"it needs {u.strains[0][1]}, {u.strain:.1f} times the usual error of such sensors"
         )
     if u.neighbours > CORRELATED:
         text.append(f"neighbouring residuals are correlated ({u.neighbours:.2f})")
@@ -333,9 +333,7 @@ def _on_data(evidence: Evidence, u: Uncertainty) -> list[str]:
         for size, words in u.strains
         if size > LEANING
     ]:
-        found.append(
-            f"the fit needs large disturbances of the rig: {', '.join(leaning)}"
-        )
+        found.append(f"the fit needs large sensor errors: {', '.join(leaning)}")
     if not evidence.measured.all():
         both = zip(CHANNELS, evidence.measured, strict=True)
         missing = [name for (name, _), seen in both if not seen]

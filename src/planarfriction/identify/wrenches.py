@@ -107,7 +107,7 @@ def identify_lugre(
     """Estimate parameters of a LuGre contact from logs of twist and wrench, and find which model explains them.
 
     Bounded nonlinear least squares for the wrenches of a fixed-step rollout; residuals are divided by the noise, and
-    parameters that must be > 0 are fitted as logarithms. Disturbances of the rig (delay, zeros, drift) are fitted too.
+    parameters that must be > 0 are fitted as logarithms. Sensor errors (delay, zeros, drift) are fitted too.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def identify_lugre(
         Initial guess, and the values of parameters that are not estimated: a law, or values by name. Missing values are
         guessed.
     options
-        Noise, disturbances of the rig, starting points and the like.
+        Noise, sensor errors, starting points and the like.
     progress
         Called with a text from time to time.
 

@@ -44,7 +44,7 @@ LONG = 0.1
 WORDS = {
     "load": (
         "the level grows with the torque through the gears",
-        "not load-dependent as far as these logs tell",
+        "not load-dependent within the accuracy of these logs",
     ),
     "stribeck": (
         "friction falls with speed from rest on",
@@ -69,7 +69,7 @@ def judge(kept: Trial, pairs: Mapping[str, tuple[Trial, Trial]]) -> Iterator[Ver
         ratio, low, high, *both = np.exp(
             [-gain, -gain - scatter, -gain + scatter, *np.negative(halves)]
         )
-        numbers = f"errors of left-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
+        numbers = f"errors of held-out logs are {ratio:.2f} ({low:.2f} to {high:.2f}) of those without it"
         numbers += f", {both[0]:.2f} and {both[1]:.2f} if half of the logs are fitted"
         good = term in kept.terms
         if term == "load":

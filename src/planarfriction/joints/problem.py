@@ -493,7 +493,7 @@ class JointFit:
             f"{'parameter':17} {'value':>11} {'std. error':>10}  95 % interval, unit"
         ]
         lines += [self._row(name) for name in self.values]
-        heading = "left-out log" if self.unit == "rad" else "log"
+        heading = "held-out log" if self.unit == "rad" else "log"
         lines += [
             "",
             f"{heading:34} {'error':>9} {'Coulomb + viscous':>18}  {self.unit}",

@@ -523,7 +523,7 @@ def judge(
         yield Verdict(
             "fit",
             False,
-            f"{text}: backlash, heat, place or another load; intervals need not hold the truth",
+            f"{text}: backlash, heat, place or another load; intervals need not contain the true values",
         )
     # gravity and inertia as they show in the torque, beside those that are known
     known: dict[str, float] = {}
@@ -582,7 +582,7 @@ def judge(
         value = found.values["torque_offset"]
         text = f"an offset of {value:.3g} N m: of the sensor, or friction of different level in both"
         yield Verdict(
-            "torque_offset", False, f"{text} directions, which no log tells apart"
+            "torque_offset", False, f"{text} directions, which no log distinguishes"
         )
     used = [each.name for each in found.series]
     if still := [log.name for log in found.logs if log.name not in used]:

@@ -45,7 +45,7 @@ class FrictionLaw(Checked):
 
     @property
     def largest_deflection(self) -> float:
-        """Steady-state deflection at high speed, `mu_c / sigma_0` [m], which is the natural scale of a bristle."""
+        """Steady-state deflection at high speed, `mu_c / sigma_0` [m], which is the nominal value of a bristle."""
         return self.numbers.mu_c / self.numbers.sigma_0
 
     def steady_friction(self, speed: ArrayLike) -> np.ndarray:
@@ -149,7 +149,7 @@ def is_rate_law(law: Any) -> bool:
 def refuse_rate_law(law: Any, by: str) -> None:
     """Raise for a law whose bristles follow a function of their own, where only the formulas of bristles will do."""
     if is_rate_law(law):
-        rule = f"have the bristles of LuGre for {by}, not a rate of its own"
+        rule = f"have the bristles of LuGre for {by}, not a separate rate"
         raise InvalidValueError("law", rule, type(law).__name__)
 
 

@@ -98,7 +98,7 @@ class RateLaw(FrictionLaw):
 
     @functools.cached_property
     def holds_at_rest(self) -> bool:
-        """True if a bristle that is not driven keeps its deflection, and pulls by its stiffness alone."""
+        """True if a bristle that is not driven keeps its deflection and acts by its stiffness alone."""
         z = np.array([[0.5 * self.largest_deflection, 0.0]])
         rate, pull = self._evaluated(z, np.zeros((1, 2)))
         return not rate.any() and np.allclose(
@@ -108,7 +108,7 @@ class RateLaw(FrictionLaw):
     def steady_friction(self, speed: ArrayLike) -> np.ndarray:
         """Return the friction force over normal force [-] in steady sliding at `speed` >= 0 `[...]` [m/s].
 
-        It is what a single bristle pulls with after 100 largest deflections; at rest, `sigma_0` times that deflection.
+        It is the friction of a single bristle after 100 largest deflections; at rest, `sigma_0` times that deflection.
 
         Raises InvalidValueError for a speed that is not finite.
         """

@@ -25,7 +25,7 @@ from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.moment_pressure import centre_of, moments_of
 
-BESIDE = "be None beside loads of cells"
+BESIDE = "be None if loads of cells are given"
 """Rule for what takes the place of these."""
 
 
@@ -276,7 +276,7 @@ class FrictionModel(ByValue):
 
         A model of one's own needs this to be simulated in a scene; the solver calls its functions by address. A patch
         that depends on the load is packed during the run, in several calls: `between` gives the lowest and the highest
-        load of the whole run, which determine the bristles and the natural scales. As many of the first of `loads` are
+        load of the whole run, which determine the bristles and the nominal values. As many of the first of `loads` are
         packed as `MAX_PACK_BYTES` and `MAX_PACK_SECONDS` allow, so there may be fewer records than loads, but at least
         one. Without `between`, these are all loads of the run, and each has its record.
 
@@ -381,7 +381,9 @@ def refuse_pad(model: FrictionModel, by: str) -> None:
     """Raise InvalidValueError for a model with a pad, which `by` does not know."""
     if model.reduction.pad is not None:
         pad = type(model.reduction.pad).__name__
-        raise InvalidValueError("pad", f"be None for {by}, which knows no pads", pad)
+        raise InvalidValueError(
+            "pad", f"be None for {by}, which does not support pads", pad
+        )
 
 
 def softening(model: FrictionModel, loads: np.ndarray) -> np.ndarray:
@@ -399,7 +401,7 @@ def refuse_common(model: FrictionModel, by: str) -> None:
     """Raise InvalidValueError for a pad with a common compliance, which `by` does not know."""
     pad = model.reduction.pad
     if pad is not None and model.compiled.compliance is not None:
-        rule = f"have no common compliance for {by}, which knows none"
+        rule = f"have no common compliance for {by}, which has none"
         raise InvalidValueError("pad", rule, type(pad).__name__)
 
 

@@ -100,7 +100,7 @@ class Cells(NamedTuple):
             for each in (now, covered, covered_before)
         ]
         if ((given[1] == 0.0) & (given[0] > 0.0)).any():
-            raise InvalidValueError("cover", "be > 0 where a cell bears load", 0.0)
+            raise InvalidValueError("cover", "be > 0 if a cell is loaded", 0.0)
         weights, pads, moved = self._gathered(*given)
         moved[:, :2] += self.middle[:, None]
         load = given[0].sum(-1)

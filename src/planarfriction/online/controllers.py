@@ -202,7 +202,7 @@ class SlideBy(Slip):
 
 
 class TurnBy(Slip):
-    """Let a part turn by `goal` [rad] under its weight within `duration` [s], and hold it (see `Slip`).
+    """Let a part rotate by `goal` [rad] under its weight within `duration` [s], and hold it (see `Slip`).
 
     `acceleration` [rad/s^2] is that of the part without friction, 100 by default.
     """

@@ -63,7 +63,7 @@ FLAGS = {
     4: "sensor is saturated",
     8: "bias of the wrench is unknown: no sample of an empty hand agrees with it",
     16: "friction drives the slip: the wrench or the slip velocity has the wrong sign",
-    32: "friction or radius are far from what was assumed: check the units of wrench and load",
+    32: "friction or radius are far from the assumed values: check the units of wrench and load",
     64: "wrench and slip velocity contradict the friction that was found",
 }
 """Meaning of the bits of `Estimate.flags`; those from 8 on last as long as their cause, and nothing is determined."""

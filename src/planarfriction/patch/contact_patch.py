@@ -243,9 +243,9 @@ class ContactPatch(ByValue):
     ) -> ContactPatch:
         """Return a line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide, of discs.
 
-        Points in a row pull worst where the line turns about one of its cells: as discs, 21 cells have two thirds of
-        the largest error of force in motion (one third if they are squares). `dataclasses.replace(line, radii=None)`
-        has points.
+        Points in a row have the largest error if the line rotates about one of its cells: as discs, 21 cells have two
+        thirds of the largest error of force in motion (one third if they are squares).
+        `dataclasses.replace(line, radii=None)` has points.
 
         `profile` holds the relative pressures `[cells]` from the top down (y) or from the left to the right (x), or is
         a function of the coordinate along the line [m]; None is uniform. The grid is square with the line in its middle
@@ -350,7 +350,7 @@ class ContactPatch(ByValue):
         return finer(self, parts)
 
     def discs(self, n: int | None = None) -> ContactPatch:
-        """Return the patch as `n` small discs that stand for its cells; None: each cell is a disc of its own.
+        """Return the patch as `n` small discs that stand for its cells; None: each cell is one disc.
 
         The disc of a cell has its second moment, `a^2/2 = (s_x^2 + s_y^2)/12` (length only on lines; points stay
         points), and so has the disc of many cells: load, centre of pressure and second moment of the patch are kept.
@@ -392,7 +392,7 @@ class ContactPatch(ByValue):
     def weights(
         self, normal_force: ArrayLike | None = None, moments: ArrayLike | None = None
     ) -> np.ndarray:
-        """Return the share of the normal force on each cell, `w_i = p_i a_i q_i / sum(p a q)`, shape `[..., N]` [-].
+        """Return the fraction of the normal force on each cell, `w_i = p_i a_i q_i / sum(p a q)`, shape `[..., N]` [-].
 
         With `moments` `[..., 2]` [N m] of the normal forces `N_i` on the moving body about the origin, `(m_x, m_y) =
         (sum(y N), -sum(x N))`, the pressure follows them: `w_i max(0, c + a x_i + b y_i)`, whose centre is `(-m_y, m_x)
@@ -419,7 +419,7 @@ class ContactPatch(ByValue):
         return np.where(loaded[..., None], weights, 0.0)
 
     def tile_weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
-        """Return the share of the normal force on the area of each cell, `p_i a_i / sum(p a)`, shape `[..., N]` [-].
+        """Return the fraction of the normal force on the area of each cell, `p_i a_i / sum(p a)`, shape `[..., N]` [-].
 
         For sums that spread the load of a cell over its `cell_extents`. Raises InvalidValueError as `weights` does.
         """

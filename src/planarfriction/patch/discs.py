@@ -77,13 +77,13 @@ def discs(patch: ContactPatch, n: Any) -> ContactPatch:
 
 
 def members_of(patch: ContactPatch, n: int) -> Membership | None:
-    """Return the cells of each of the discs that stand for a patch; None if each is one of its own."""
+    """Return the cells of each of the discs that stand for a patch; None if each is one disc."""
     n = OF_ALL_LOADS * n if patch.depends_on_load else n
     return None if patch.cells <= n else _few_discs(patch, n)[1]
 
 
 def own_discs(patch: ContactPatch) -> ContactPatch:
-    """Return the patch with each cell as the disc of its own second moment; points remain points."""
+    """Return the patch with each cell as the disc of its second moment; points remain points."""
     radii = np.sqrt((patch.cell_extents() ** 2).sum(axis=1) / 6.0)
     if patch.has_discs or not radii.any():
         return patch

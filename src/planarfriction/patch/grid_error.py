@@ -82,7 +82,7 @@ class GridError:
     torque: float
     """Largest error of the torque about the centre of pressure of the same, `|tau_cells - tau|/(mu f_N r)` [-]."""
     breakaway: float
-    """Largest relative error of the load at which the patch lets go, over all directions of the load [-]."""
+    """Largest relative error of the load at slip onset, over all directions of the load [-]."""
     cells: int
     """Number of cells."""
     as_discs: GridError | None = None

@@ -104,7 +104,7 @@ class MapReading(Checked):
             sides = tuple(validation.count("frame_shape", side) for side in sides)
             self._set(frame_shape=sides)
         if self.threshold is not None and self.threshold >= 1.0:
-            rule = "be < 1, a share of the peak"
+            rule = "be < 1, a fraction of the peak"
             raise InvalidValueError("threshold", rule, self.threshold)
 
     def frame_of(self, what: str, values: np.ndarray | list[np.ndarray]) -> np.ndarray:

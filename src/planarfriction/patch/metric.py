@@ -1,6 +1,6 @@
 """Friction that depends on the direction: a metric for each cell (grooves) and an asymmetry (a brushed surface).
 
-A cell with the metric `M`, whose symmetric root is `L`, sees `u = L v` and pulls with `L` times the traction that a
+A cell with the metric `M`, whose symmetric root is `L`, sees `u = L v` and has `L` times the traction that a
 cell without a metric would have: in steady sliding `-g L (u/|u| + a)`. It then dissipates the power `g (|u| + a . u)`.
 """
 

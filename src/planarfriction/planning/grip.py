@@ -54,7 +54,7 @@ class Aim(NamedTuple):
     """
 
     angle: float | None
-    """Angle to turn by [rad], without slide; None where the goal is a slide."""
+    """Angle to rotate by [rad], without slide; None where the goal is a slide."""
     slide: np.ndarray
     """Slide to make `[2]` [m], without turning; zeros where the goal is an angle."""
     radius: float
@@ -359,7 +359,7 @@ def plan_grip(
         A free body, its contacts and the duration. With `start="equilibrium"` the grip begins with the scene's own
         normal force, which must hold the body; with relaxed bristles it may begin with any value.
     goal
-        `{"angle": radians}`: turn by that angle and slide as little as possible; or `{"slide": (dx, dy)}`: slide by
+        `{"angle": radians}`: rotate by that angle and slide as little as possible; or `{"slide": (dx, dy)}`: slide by
         that distance [m], world axes, and turn as little as possible. Slide is the displacement of the point under the
         grip.
     contact

@@ -67,7 +67,7 @@ def holding_load(
     `margin`; it is 0 without a load.
 
     Use mu_s for a body that is held as the grip falls slowly, and mu_c for one that must also be stopped. Raises
-    `InvalidValueError` if the patch cannot hold the load however hard it is pressed (a torque on a single point).
+    `InvalidValueError` if the patch cannot hold the load at any normal force (a torque on a single point).
 
     Source: Goyal, Ruina, Papadopoulos 1991.
     """
@@ -230,7 +230,7 @@ def _least_share(slips: Any) -> float:
             )
         if share < 1.0 / WIDEST:
             raise InvalidValueError(
-                "model", f"let go below 1/{WIDEST:g} of the holding_load", "no slip"
+                "model", f"slip below 1/{WIDEST:g} of the holding_load", "no slip"
             )
     low, high = sorted((share, share * factor))
     while high - low > CLOSE:

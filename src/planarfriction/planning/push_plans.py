@@ -38,14 +38,21 @@ PLACES = ((0.5,), (0.35, 0.65))
 """Places at which an edge may be pushed, as shares of its length: the others are tried if its middle leads nowhere."""
 
 CHORDS = 40
-"""Lines that the arc of the pusher in one part is made of."""
+"""Smallest number of lines that the arc of the pusher in one part is made of."""
+
+BEND = 0.02
+"""Largest rotation of the slider along one line [rad]: a longer line leaves the motion
+cone, and the pusher slips."""
 
 NODES = 65
 """Forces whose twists are joined by a spline for the search."""
 
 ROUNDS = 2
-"""Times that a plan aims beside the goal by what the spline and its lines have
-missed."""
+"""Times that a plan aims off the goal by the error of the spline and the lines."""
+
+CLOSE = 1e-3
+"""Error at which a plan counts as one that ends at its goal, as a share of the slider's
+size and as an angle [rad]."""
 
 _TURNS = 0.7 * np.array([[-1, 0, 1], [1, 0, -1], [1, 0, 1], [-1, 0, -1]])
 """Forces that a search begins with, as shares of the angle that they may have."""
@@ -63,6 +70,10 @@ class PushReport:
     """Goal [m, m, rad]."""
     end: tuple[float, float, float]
     """Final pose of a push that follows the path [m, m, rad]."""
+    error: tuple[float, float]
+    """Distance [m] and angle [rad] from `end` to the goal."""
+    reached: bool
+    """True if both errors are below 0.1 % of the slider's size and 1 mrad."""
     ellipsoid_end: tuple[float, float, float]
     """Final pose if the limit surface of the patch were its ellipsoid [m, m, rad]."""
     edge: int
@@ -92,6 +103,8 @@ class PushReport:
         lines.append(
             f"{1e3 * self.length:.4g} mm long, on edge {self.edge}, using {self.used:.0%} of the friction cone."
         )
+        if not self.reached:
+            lines.append(f"Misses its goal by {_miss(*self.error)}.")
         return "\n".join(lines)
 
 
@@ -128,8 +141,10 @@ def plan_push(
     A sticking pusher stays at one point of the slider, and a constant force in the slider's axes then gives a constant
     twist, on every limit surface. A plan has three parts of constant force, each within the friction cone reduced by a
     `margin` of its half angle; their motions are arcs. Angles and lengths are found by shooting (SciPy), starting from
-    turns to either side, at the middle of each edge (or beside it), and the shortest plan is returned. As with a car
-    that only drives forward, a goal beside or behind the slider needs a long path.
+    rotations to either side, at the middle of each edge (or off its middle). Each path is simulated, and the shortest
+    one that ends at the goal is returned. As with a car that only drives forward, a goal beside or behind the slider
+    needs a long path. Pushing is unstable: errors of a long path grow, until the pusher slips. If every path misses the
+    goal, the nearest is returned with a warning; `report.error` and the printed plan say by how much.
 
     `start` is the first pose, `edges` the edges that may be pushed (all by default).
 
@@ -173,19 +188,19 @@ def plan_push(
         raise SolverError(
             "no plan reaches the goal: try other edges, a smaller margin or a pose further ahead"
         )
-    length, x, edge, place = min(found, key=lambda each: each[0])
-    path = _path(slider, place, x, start)
-    done = push(slider, pusher, path, start=start)
-    for _ in range(ROUNDS):
-        reached = rotate(done.end - start, -start[2])
-        aim = aim + rotate(goal - start, -start[2]) - reached
-        length, x = _shortest(slider, place, largest, aim, x)
-        if length == math.inf:
+    tries = []
+    for _, x, edge, place in sorted(found, key=lambda each: each[0]):
+        x, path, done = _aimed(slider, pusher, place, x, largest, start, goal)
+        distance, angle = _error(done.end, goal)
+        off = max(distance / slider.size, angle)
+        tries.append((off, edge, place, x, path, done))
+        if off <= CLOSE:
             break
-        tried = _path(slider, place, x, start)
-        both = (path, done), (tried, push(slider, pusher, tried, start=start))
-        scale = [1.0, 1.0, slider.size]
-        path, done = min(both, key=lambda e: np.abs((e[1].end - goal) * scale).max())
+    off, edge, place, x, path, done = min(tries, key=lambda each: each[0])
+    error = _error(done.end, goal)
+    if off > CLOSE:
+        message = f"the push misses its goal by {_miss(*error)}"
+        warnings.warn(message, RuntimeWarning, stacklevel=2)
     surface = slider.surface
     rest = push(
         Slider(
@@ -202,15 +217,56 @@ def plan_push(
     report = PushReport(
         goal,
         end,
+        error,
+        off <= CLOSE,
         ellipsoid_end,
         edge,
         at,
-        length,
+        slider.size * float(x[PARTS:].sum()),
         float(np.abs(x[:PARTS]).max() / cone),
         bool((done.mode[1:] == STICK).all()),
         time.perf_counter() - begin,
     )
     return PushPlan(path, done, report)
+
+
+def _error(end: np.ndarray, goal: np.ndarray) -> tuple[float, float]:
+    """Return distance [m] and angle [rad] between two poses."""
+    x, y, angle = (end - goal).tolist()
+    return math.hypot(x, y), abs(angle)
+
+
+def _miss(distance: float, angle: float) -> str:
+    """Return an error in words."""
+    return f"{1e3 * distance:.3g} mm and {math.degrees(angle):.3g} deg"
+
+
+def _aimed(
+    slider: Slider,
+    pusher: Pusher,
+    place: TouchPoint,
+    x: np.ndarray,
+    largest: float,
+    start: np.ndarray,
+    goal: np.ndarray,
+) -> tuple[np.ndarray, Signal, Push]:
+    """Return angles and lengths, path and push of a plan that aims off the goal by the error of its push."""
+    scale = [1.0, 1.0, slider.size]
+    aim = wanted = rotate(goal - start, -start[2])
+    path = _path(slider, place, x, start)
+    done = push(slider, pusher, path, start=start)
+    for _ in range(ROUNDS):
+        aim = aim + wanted - rotate(done.end - start, -start[2])
+        length, other = _shortest(slider, place, largest, aim, x)
+        if length == math.inf:
+            break
+        tried = _path(slider, place, other, start)
+        pair = (
+            (x, path, done),
+            (other, tried, push(slider, pusher, tried, start=start)),
+        )
+        x, path, done = min(pair, key=lambda e: np.abs((e[2].end - goal) * scale).max())
+    return x, path, done
 
 
 def _moved(pose: np.ndarray, twist: np.ndarray, distance: float) -> np.ndarray:
@@ -293,7 +349,8 @@ def _path(
         if distance < 1e-9:
             continue
         twist = _twist(slider, place, angle)
-        for way in np.linspace(0.0, distance, CHORDS + 1)[1 if times else 0 :]:
+        count = max(CHORDS, math.ceil(abs(twist[2]) * distance / BEND))
+        for way in np.linspace(0.0, distance, count + 1)[1 if times else 0 :]:
             here = _moved(pose, twist, way)
             at.append(here[:2] + rotate(place.at, here[2]))
             times.append(now + way)

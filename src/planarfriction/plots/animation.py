@@ -54,9 +54,10 @@ def animate_solution(
 
     On the left, the body in the world: outline, contact patches, the path of its centre, the friction force on it at
     each contact (world axes, all identical contacts) and its centre of rotation. On the right, for each contact (the
-    three that are pressed hardest): its cells, from pale to blue as their bristles bend and orange where they slip, and
-    its wrench inside its limit surface, for mu_c f_N = 1. Which cells slip is computed by a distributed model with the
-    contact's law on the recorded path, whatever the model of the contact, less accurately from samples far apart.
+    three of the largest normal force): its cells, from pale to blue as their bristles bend and orange where they
+    slip, and its wrench inside its limit surface, for mu_c f_N = 1. Which cells slip is computed by a distributed
+    model with the contact's law on the recorded path, whatever the model of the contact, less accurately from
+    samples far apart.
 
     `.mp4` needs ffmpeg or the extra `[ffmpeg]`. `slow` is how many times slower than real time it runs [-], below 1
     faster; None takes real time if that makes 75 to 300 frames, else the next of 1, 2, 5, 10, ... that does. `fps` are
@@ -141,7 +142,7 @@ HEIGHT = 5.4
 """Height of a frame [inch]."""
 
 MOST_PANELS = 3
-"""Contacts that have panels of their own beside the motion: those that are pressed hardest."""
+"""Contacts that have panels of their own beside the motion: those of the largest normal force."""
 
 VIEW = 2.3
 """Side of a view that follows the body, in its largest radius [-]."""
@@ -181,7 +182,7 @@ class Film:
             shown = self.figure.add_axes(bar) if bar and each.slip is not None else None
             self.panels.append(CellPanel(self.figure.add_axes(cells), each, bar=shown))
             if panels.has_surface(each):
-                axes = self.figure.add_axes(surface, projection="3d")
+                axes = self.figure.add_axes(surface)
                 self.panels.append(SurfacePanel(axes, each, beside=len(chosen) - 1))
         self._draw_body(solution)
         box = self.axes.bbox
@@ -308,7 +309,7 @@ class Film:
         for words, kind, column in (
             ("moved by x", "length", 0),
             ("y", "length", 1),
-            ("turned by", "angle", 2),
+            ("rotated by", "angle", 2),
         ):
             unit = unit_for(kind, moved[:, column])
             # No -0.00.
@@ -322,14 +323,14 @@ def _places(contacts: int) -> tuple[tuple, list[tuple]]:
     if contacts == 1:
         cells = (0.665, 0.6, 0.2, 0.355)
         bar = (0.88, 0.6, 0.014, 0.355)
-        return (0.072, 0.145, 0.5, 0.745), [(cells, bar, (0.605, 0.03, 0.35, 0.48))]
+        return (0.072, 0.145, 0.5, 0.745), [(cells, bar, (0.665, 0.1, 0.2, 0.355))]
     height = 1.0 / contacts
     places: list[tuple] = []
     for number in range(contacts):
         low = 1.0 - (number + 1) * height
         side = height - 0.17
         cells = (0.57, low + 0.105, side * HEIGHT / WIDTH, side)
-        places.append((cells, None, (0.775, low + 0.02, 0.21, height - 0.04)))
+        places.append((cells, None, (0.81, low + 0.105, *cells[2:])))
     return (0.072, 0.145, 0.43, 0.745), places
 
 

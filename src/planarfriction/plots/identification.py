@@ -307,7 +307,8 @@ def _plot_levels(fit: Any, axes: Any) -> None:
         shares, style.SHADES[::-1], style.LINE_STYLES, strict=False
     ):
         load = friction.load(share * pushed, -share * pushed)
-        label = f"held load {share * pushed:.2g} N m"
+        label = f"load {share * pushed:.2g} N m"
         axes.semilogx(speed, level + load, color=colour, ls=line, label=label)
     axes.set_ylim(0.0, None)
-    axes.legend(frameon=False)
+    if len(shares) > 1:
+        axes.legend(frameon=False)

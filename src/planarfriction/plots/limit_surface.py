@@ -193,24 +193,15 @@ def _of_facets(values: np.ndarray) -> np.ndarray:
 
 
 def draw_surface(
-    axes: Any,
-    mesh: np.ndarray,
-    directions: np.ndarray,
-    limit: float,
-    *,
-    paler: float = 0.0,
+    axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float
 ) -> Any:
-    """Draw a limit surface, points `mesh` `[P, A, 3]` with their `directions`, into 3-D axes up to `limit`.
-
-    `paler` is the share of white in its colours: facets that let light through would show every seam.
-    """
+    """Draw a limit surface, points `mesh` `[P, A, 3]` with their `directions`, into 3-D axes up to `limit`."""
     # The outward normal of a limit surface is the twist itself: shading needs no differences of the mesh.
     light = _LIGHT / np.linalg.norm(_LIGHT)
     lightness = 0.62 + 0.38 * np.clip(-_of_facets(directions) @ light, -0.6, 1.0)
     height = _of_facets(mesh[..., 2])
     colours = colormaps["cividis"](0.6 + 0.4 * height / limit)
     colours[..., :3] *= lightness[..., None]
-    colours[..., :3] += paler * (1.0 - colours[..., :3])
     drawn = axes.plot_surface(
         *np.moveaxis(mesh, -1, 0),
         facecolors=colours,

@@ -108,7 +108,7 @@ def solution_html(solution: pf.Solution) -> str:
     rows = {
         "status": f"{solution.status}: {solution.message}",
         "samples": f"{len(time)}, to {float(time[-1]):g} s",
-        "end": f"{_point((x, y))}, turned by {np.degrees(theta):.2f} deg",
+        "end": f"{_point((x, y))}, rotated by {np.degrees(theta):.2f} deg",
         "cost": f"{cost.steps} steps, {1e3 * cost.wall_time:.3g} ms",
     }
     figure = None

@@ -11,13 +11,14 @@ from matplotlib.artist import Artist
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
+from matplotlib.patches import Polygon
 
 import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.errors import FrictionError
 from planarfriction.laws import FrictionLaw
 from planarfriction.plots import style
-from planarfriction.plots.limit_surface import draw_surface, scaled_samples
+from planarfriction.plots.limit_surface import even_mesh, scaled_samples
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import ContactTrack
 
@@ -32,12 +33,6 @@ PLAIN = "#9AA5B1"
 
 LOAD_STEP = 1.15
 """A patch that follows the load has its limit surface drawn at loads that differ by this factor."""
-
-POLAR = 36
-"""Mesh of the limit surface from pole to pole."""
-
-AZIMUTH = 72
-"""Mesh of the limit surface, around."""
 
 FARTHEST = 1.6
 """Largest force of the limit surface's axes, of mu_c f_N [-]; what is beyond is drawn outside."""
@@ -151,7 +146,10 @@ class CellPanel:
 
 
 class SurfacePanel:
-    """The limit surface of a contact at its load, and the friction wrench in it, both for mu_c f_N = 1."""
+    """The limit surface of a contact at its load, and the friction wrench in it, both for mu_c f_N = 1.
+
+    Both are seen from the side: force along the largest friction of the motion, and torque over the contact radius.
+    """
 
     def __init__(self, axes: Any, track: ContactTrack, *, beside: int = 0):
         self.axes = axes
@@ -161,37 +159,33 @@ class SurfacePanel:
             level: surface_at(track.contact.model.patch, load)
             for level, load in self.levels.items()
         }
-        polar = np.linspace(0.0, np.pi, POLAR + 1)[:, None]
-        azimuth = np.linspace(0.0, 2.0 * np.pi, AZIMUTH + 1)[None, :]
-        meshes = {
-            level: scaled_samples(each, polar, azimuth)
-            for level, each in self.surfaces.items()
-        }
-        self.points = self._points()
-        reach = max(float(np.abs(mesh).max()) for _, mesh in meshes.values())
-        limit = 1.05 * max(reach, min(FARTHEST, float(np.abs(self.points).max())))
+        points = self._points()
+        force = points[np.hypot(*points[:, :2].T).argmax(), :2]
+        length = math.hypot(*force)
+        self.along = force / length if length > 0.0 else np.array([1.0, 0.0])
+        self.points = self._seen(points)
+        sides = {level: self._side(each) for level, each in self.surfaces.items()}
+        reach = max(float(np.abs(side).max()) for side in sides.values())
+        limit = 1.1 * max(reach, min(FARTHEST, float(np.abs(self.points).max())))
+        look = {"fc": style.HOLDS, "ec": style.REFERENCE, "lw": 1.2, "zorder": 1}
         self.drawn = {
-            level: draw_surface(axes, mesh, directions, limit, paler=0.45)
-            for level, (directions, mesh) in meshes.items()
+            level: axes.add_patch(Polygon(side, **look))
+            for level, side in sides.items()
         }
-        axes.tick_params(labelsize="x-small", pad=-2)
-        # Those at the corner would meet.
-        axes.set(xticks=[-0.5, 0.0, 0.5], yticks=[-0.5, 0.0, 0.5])
-        if beside:
-            axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.85 if beside == 1 else 0.72)
-            for axis in (axes.xaxis, axes.yaxis, axes.zaxis):  # no room for numbers
-                axis.set_ticklabels([])
-                axis.labelpad = -13.0
-                axis.label.set_fontsize("x-small")
-        axes.set_title("limit surface, $\\mu_c f_N = 1$", fontsize="small", y=0.98)
-        self.floor = -limit
+        axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
+        axes.set(xticks=[-1, 0, 1], yticks=[-1, 0, 1])
+        axes.tick_params(labelsize="small")
+        axes.set_xlabel(r"force $/\,\mu_c f_N$", fontsize="small", labelpad=1)
+        axes.set_ylabel(r"torque $/\,\mu_c f_N r$", fontsize="small", labelpad=1)
+        if not beside:
+            axes.set_title("inside the limit surface", fontsize="small")
+        style.tidy(axes)
         colour = style.REDUCED
-        self.shadow, self.tail, self.arm, self.head = (
-            axes.plot([], [], [], **look)[0]
+        self.tail, self.arm, self.head = (
+            axes.plot([], [], **look)[0]
             for look in (
-                {"color": "0.45", "lw": 1.2, "marker": "o", "ms": 3},
                 {"color": colour, "lw": 1.0, "alpha": 0.6},
-                {"color": "black", "lw": 1.6},
+                {"color": colour, "lw": 1.6},
                 {"color": colour, "marker": "o", "ms": 6, "mec": "white"},
             )
         )
@@ -203,7 +197,7 @@ class SurfacePanel:
 
     def artists(self) -> list[Artist]:
         """Return the artists that change from frame to frame, on top of the surface."""
-        return [self.shadow, self.tail, self.arm, self.head]
+        return [self.tail, self.arm, self.head]
 
     def choose(self, level: Any) -> None:
         """Show the surface at a level alone."""
@@ -212,12 +206,22 @@ class SurfacePanel:
 
     def show(self, frame: int) -> None:
         """Show a frame."""
-        fx, fy, tau = self.points[frame]
-        tail = self.points[max(0, frame - TAIL) : frame + 1]
-        self.shadow.set_data_3d([fx, fx], [fy, fy], [self.floor, self.floor])
-        self.tail.set_data_3d(*tail.T)
-        self.arm.set_data_3d([0.0, fx], [0.0, fy], [0.0, tau])
-        self.head.set_data_3d([fx], [fy], [tau])
+        at = self.points[frame]
+        self.tail.set_data(*self.points[max(0, frame - TAIL) : frame + 1].T)
+        self.arm.set_data(*np.stack([np.zeros(2), at], -1))
+        self.head.set_data(*at[:, None])
+
+    def _seen(self, points: np.ndarray) -> np.ndarray:
+        """Return points `[..., 3]` of the wrench as they are seen from the side `[..., 2]`."""
+        return np.stack([points[..., :2] @ self.along, points[..., 2]], -1)
+
+    def _side(self, surface: Any) -> np.ndarray:
+        """Return the outline of a surface as it is seen from the side `[P, 2]`, convex as the surface is."""
+        from scipy.spatial import ConvexHull
+
+        points = self._seen(scaled_samples(surface, *even_mesh(surface))[1])
+        points = points.reshape(-1, 2)
+        return points[ConvexHull(points).vertices]
 
     def _points(self) -> np.ndarray:
         """Return the wrenches `(fx, fy, tau/r)` about the centre of pressure over `mu_c f_N` `[F, 3]` [-], or zeros."""

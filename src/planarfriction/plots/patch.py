@@ -146,7 +146,7 @@ def _draw_points(
         radii = 1e3 * patch.radii[:, None]
         axes.update_datalim(np.concatenate([places - radii, places + radii]))
         axes.margins(0.08)
-    name = "share of the normal force" if normal_force is None else "normal force"
+    name = "fraction of the normal force" if normal_force is None else "normal force"
     return points, f"{name} [{unit.label}]"
 
 

@@ -85,7 +85,7 @@ def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
         turn.axhline(angle.factor * wanted["angle"], **dotted)
     else:
         slide.axhline(length.factor * np.hypot(*wanted["slide"]), **dotted)
-    turn.set_ylabel(style.with_unit("turn", angle))
+    turn.set_ylabel(style.with_unit("rotation", angle))
     slide.set_ylabel(f"slide [{length.label}]")
     slide.set_xlabel("time [s]")
     turn.legend(frameon=False, fontsize="small")
@@ -127,7 +127,8 @@ def draw_push(axes: Any, push: pf.planning.Push) -> None:
     every = np.concatenate(corners)
     side = float(np.ptp(every, axis=0).max())
     turns = push.pose[chosen, 2] - push.pose[0, 2]
-    label_poses(axes, time[chosen], turns, corners, side, scale)
+    view = (1.0 + 2.0 * ROOM) * side  # of both panels of a page
+    label_poses(axes, time[chosen], turns, corners, view, scale)
     axes.update_datalim(every + np.array([ROOM * side, 0.0]))
     style.show_lengths(axes, float(np.abs(push.pose[:, :2]).max()))
     axes.set_aspect("equal", adjustable="datalim")

@@ -124,7 +124,7 @@ class Spring(ByValue):
 
 
 def pull_on(scene: Any, body: Any, time: float) -> np.ndarray:
-    """Return the load `[3]` [N, N, N m] on a body of a scene at rest: applied force, weight, and pull of springs."""
+    """Return the load `[3]` [N, N, N m] on a body of a scene at rest: applied force, weight, and springs."""
     pull = np.array([*body.gravity, 0.0]) * body.mass
     if scene.force is not None:
         pull = pull + scene.force(time)

@@ -69,7 +69,7 @@ def model_from_dict(contact: Section) -> Any:
         given = contact.section("pad")
         pad["pad"] = _made(given, PADS[given.choice("kind", PADS)], ())
         if "pad" not in inspect.signature(make).parameters:
-            rule = "be left out of a contact whose model knows none"
+            rule = "be left out of a contact whose model has none"
             raise InvalidValueError("pad", rule, given.get("kind"))
     return _made(table, functools.partial(make, **pad), (patch, law))
 

@@ -273,7 +273,7 @@ class SegmentBatches:
                 self._length * arm,
             ]
         )
-        """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
+        """Nominal value of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
         of a creep, `records.PackedModel.velocity_scale`), angles over r.
 
         The least of all contacts. Velocities are not measured against v_s itself: below it friction hardly changes with

@@ -265,7 +265,7 @@ def pushed(
 
 
 GRIP = ([0.0, 0.2, 0.24, 0.36, 0.4], [4.0, 4.0, 1.0, 1.0, 6.0])
-"""Corners [s], [N] of the grip of one finger: holds, lets go, catches."""
+"""Corners [s], [N] of the grip of one finger: holds, loosens, catches."""
 
 SWAY = ([0.7, 1.0], [0.1, 0.9])
 """Corners [s], [-] of the share of the weight on the forefoot."""

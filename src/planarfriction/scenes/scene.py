@@ -36,7 +36,7 @@ hand runs of all models end within 2e-6 m and 2e-5 rad of the same model's run a
 relative tolerance of 1e-9."""
 
 ATOL = 2e-4
-"""Default tolerance in natural scales."""
+"""Default tolerance in nominal values."""
 
 
 def _listed(name: str, value: Any, kind: type) -> tuple[Any, ...]:
@@ -95,7 +95,7 @@ class Scene(ByValue):
     rtol: float = checked(validation.positive, default=RTOL)
     """Relative tolerance of the solver [-]."""
     atol: float = checked(validation.positive, default=ATOL)
-    """Tolerance as a share of the natural scales (see `simulate`) [-]."""
+    """Tolerance as a share of the nominal values (see `simulate`) [-]."""
     name: str = "scene"
     """Name of the scene."""
     start: Literal["rest", "equilibrium", "sliding"] = "rest"
@@ -125,7 +125,7 @@ class Scene(ByValue):
                     raise InvalidValueError(name, rule, given)
         for contact in self.contacts:
             if contact.pressure == "follows" and len(self.contacts) > 1:
-                rule = "be 'fixed' beside other contacts, which share the load in a way that statics leaves open"
+                rule = "be 'fixed' if the body has several contacts, whose loads statics leaves open"
                 raise InvalidValueError(
                     f"pressure of contact {contact.name!r}", rule, contact.pressure
                 )
@@ -263,7 +263,7 @@ class Plan(NamedTuple):
     rtol: float
     """Relative tolerance [-]."""
     atol: float
-    """Absolute tolerance, as a share of the natural scales [-]."""
+    """Absolute tolerance, as a share of the nominal values [-]."""
     max_steps: int
     """Largest number of steps."""
 
@@ -280,7 +280,7 @@ class SolverOptions(Checked):
     rtol: float | None = checked(validation.positive, default=None)
     """Relative tolerance [-], > 0."""
     atol: float | None = checked(validation.positive, default=None)
-    """Tolerance as a share of the natural scales [-], > 0 (see `simulate`); it follows `rtol` by default."""
+    """Tolerance as a share of the nominal values [-], > 0 (see `simulate`); it follows `rtol` by default."""
     save_every: float | None = checked(validation.positive, default=None)
     """Recording interval [s]; the end is always recorded."""
     max_steps: int = checked(validation.count, default=MAX_STEPS)

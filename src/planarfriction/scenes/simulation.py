@@ -29,7 +29,7 @@ _QUANTITIES = {
     "time": ("s", "time"),
     "vx": ("m/s", "velocity of the centre of mass, world x"),
     "vy": ("m/s", "velocity of the centre of mass, world y"),
-    "omega": ("rad/s", "spin, counter-clockwise"),
+    "omega": ("rad/s", "angular velocity, counter-clockwise"),
     "x": ("m", "position of the centre of mass, world x"),
     "y": ("m", "position of the centre of mass, world y"),
     "theta": ("rad", "orientation, counter-clockwise"),
@@ -71,7 +71,7 @@ def simulate(
     """Simulate a scene from its start at t = 0 and record it every `save_every` [s]; returns a `Solution`.
 
     Each step keeps its error below `rtol |y| + atol y_0`, for every component of the body's motion and for the mean
-    over each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and a tenth of
+    over each contact's bristles. The nominal values `y_0` are mu_c/sigma_0 for bristles and positions and a tenth of
     v_s for velocities (a hundredth with the published reduced model); for angles both are divided by the contact
     radius. So `atol` is a share of a full bristle deflection. A step during which the twist of a contact turns is also
     checked between its ends. The solver stops exactly at every break of a signal. The first run after an installation

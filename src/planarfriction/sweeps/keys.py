@@ -42,7 +42,7 @@ def library_version() -> str:
 def name_of(measure: Any, kept: bool) -> str:
     """Return module, name and source of a measurement, by which its runs are found again if they are `kept`.
 
-    Raises InvalidValueError for a measurement of kept runs that has no name of its own: a lambda, or a function that
+    Raises InvalidValueError for a measurement of kept runs without a name: a lambda, or a function that
     depends on values from around it.
     """
     named = (

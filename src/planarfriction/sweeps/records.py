@@ -448,5 +448,5 @@ def difference(found: Mapping[str, History], first: Mapping[str, History]) -> st
         if (mine.dtype.kind == "U") != (other.dtype.kind == "U"):
             return f"{name} is {mine.dtype} where the first run has {other.dtype}"
         if each.dims == (name,) and not np.array_equal(mine, other):
-            return f"the axis {name} differs from that of the first run: measure what has the same axes in all runs"
+            return f"the axis {name} differs from that of the first run: measure values with the same axes in all runs"
     return ""

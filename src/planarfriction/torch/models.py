@@ -68,7 +68,7 @@ class DistributedModel(FrictionModule, CellsModel):
         numbers = law.numbers._asdict()
         chosen = tuple(trainable)
         if "weights" in chosen and not self.of_law:
-            rule = "not contain weights for a pad with a stiffness of its own"
+            rule = "not contain weights for a pad with a separate stiffness"
             raise InvalidValueError("trainable", rule, chosen)
         lever = float(patch.contact_radius(normal_force))
         physical = [name for name in chosen if name != "weights"]

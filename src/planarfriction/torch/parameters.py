@@ -29,7 +29,7 @@ from planarfriction.tensors.steps import LAW
 from planarfriction.torch.namespace import xp
 
 _GROWING = {*POSITIVE, "second_moment"} - {"mu_s"}
-"""Parameters that are `p_0 exp(w)`; a mu_c below a fixed mu_s has a rule of its own."""
+"""Parameters that are `p_0 exp(w)`; a mu_c below a fixed mu_s has a separate rule."""
 
 _AT_MU_S = "mu_c has been trained up to mu_s, which is fixed and which it cannot exceed: name mu_s in trainable too"
 _LARGEST_EXPONENT = 30.0

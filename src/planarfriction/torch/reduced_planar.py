@@ -263,7 +263,7 @@ def smoke_test() -> None:
     bound = (model.mu_s * model.radius).item() * f_n
     if not torque <= bound:
         raise FrictionError(
-            f"the torque of a steady spin is {torque} N m, above mu_s f_n r = {bound} N m"
+            f"the torque of a steady rotation is {torque} N m, above mu_s f_n r = {bound} N m"
         )
     print(
         f"ReducedPlanarLuGre: {len(t)} steps, gradients to {len(gradients)} numbers; steady torque {torque:.4f} N m,"

@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo describes few of its names to type checkers.)
-"""Patches drawn into a MuJoCo scene: their outlines, their friction, and what they turn about."""
+"""Patches drawn into a MuJoCo scene: outlines, friction (blue as in `plots`), centres of rotation (black)."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import ContactPatch
 
-OUTLINE = (0.1, 0.4, 1.0, 1.0)
+OUTLINE = (0.3, 0.3, 0.3, 1.0)
 """Colour of an outline: red, green, blue, opacity."""
 
-FRICTION = (0.9, 0.1, 0.1, 1.0)
+FRICTION = (0.0, 0.45, 0.7, 1.0)
 """Colour of a friction force."""
 
-CENTRE = (0.1, 0.7, 0.2, 1.0)
+CENTRE = (0.0, 0.0, 0.0, 1.0)
 """Colour of a centre of rotation."""
 
 STANDS = 1e-6
