@@ -15,7 +15,7 @@ from planarfriction._engine.bristles import asymmetric_cells, discs, elastic, po
 from planarfriction._engine.bristles.asymmetric_cells import Leaning
 from planarfriction._engine.bristles.elastic import Elastic
 from planarfriction._engine.cells import cells
-from planarfriction._engine.cells.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT, Z
+from planarfriction._engine.cells.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT
 from planarfriction._engine.cells.cells import CellsContact, Lever
 from planarfriction._engine.cells.cells_rollout import by_of
 from planarfriction._engine.cells.loop_generation import Passes, passes
@@ -139,13 +139,13 @@ KINDS = {
 
 
 class CellRows(NamedTuple):
-    """Cells of a contact from one on, row by row of n numbers."""
+    """Cells of a contact from one on, row by row of n numbers; of a block, `LANES` numbers."""
 
     cells: Doubles
     z: Doubles
     weights: Doubles
     out: Doubles
-    """Rates or new bristles [d, n], or a block of derivatives by state and velocity [2, d, d, LANES]."""
+    """Rates, new bristles or cotangents [d, n], or a block of derivatives by state and velocity [2, d, d, LANES]."""
     n: int
 
 
@@ -176,11 +176,6 @@ class _Symbols:
         return tuple(Number(self.trace, f"{letter}{m}") for m in range(count))
 
 
-def _fields(letter: str, first: int, count: int) -> dict[str, str]:
-    """Return the sources of a vector of symbols that lies in fields of a block."""
-    return {f"{letter}{m}": f"block[{first + m * LANES} + i]" for m in range(count)}
-
-
 def _rows(letter: str, field: str, count: int) -> dict[str, str]:
     """Return the sources of a vector of symbols that lies in `CellRows`."""
     return {f"{letter}{m}": f"block.{field}[{m} * block.n + i]" for m in range(count)}
@@ -195,12 +190,6 @@ def _shared(kind: CellKind) -> dict[str, str]:
 
 _PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"keeps": "shared[2]"}
 """Sources of the cotangent of a wrench, and of 1, or 0 without load."""
-
-
-def _in_block(kind: CellKind) -> dict[str, str]:
-    """Return the sources of the symbols of cells in a block."""
-    vectors = _fields("c", 0, kind.rows) | _fields("z", Z, kind.element.size)
-    return {**_shared(kind), **vectors, "weight": f"block[{WEIGHT} + i]"}
 
 
 def _in_rows(kind: CellKind) -> dict[str, str]:
@@ -220,18 +209,6 @@ def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
         )
 
     return step
-
-
-def forward_passes(kind: CellKind) -> Passes:
-    """Write the step of the cells of a block, in place."""
-    stores = list(_fields("z", Z, kind.element.size).values())
-    return passes(
-        kind.element.name,
-        traced(_step_of(kind)),
-        _in_block(kind),
-        stores,
-        kind.element.forward,
-    )
 
 
 def step_passes(kind: CellKind) -> Passes:
@@ -283,7 +260,8 @@ def backward_passes(kind: CellKind) -> Passes:
     """Write the adjoint of a step of the cells of a block: the cotangent of the state in place, and sums over cells.
 
     These are the cotangents of the twist [3], of the load, and of the law in the order of `cells_rollout.PARAMETERS`.
-    The cotangent of the load of each cell goes into the field `OUT`, and its part by the law of a pad into the next.
+    The slope of the weight by the load lies behind the weight. The cotangent of the load of each cell goes behind that
+    of the state, to `OUT`, and its part by the law of a pad behind it.
     """
     element = kind.element
     lever = kind.lever
@@ -313,13 +291,14 @@ def backward_passes(kind: CellKind) -> Passes:
             tuple(law_bar),
         )
 
-    bar = _fields("b", BAR, element.size)
-    sources = _in_block(kind) | _PULL | bar | {"by_load": f"block[{BY_LOAD} + i]"}
+    bar = _rows("b", "out", element.size)
+    by_load = {"by_load": f"block.weights[{BY_LOAD - WEIGHT} + i]"}
+    behind = [OUT - BAR + m * LANES for m in range(1 + kind.pad)]
     return passes(
         f"{element.name}_back",
         traced(adjoint),
-        sources,
-        [*bar.values(), *_fields("out", OUT, 1 + kind.pad).values()],
+        _in_rows(kind) | _PULL | bar | by_load,
+        [*bar.values(), *(f"block.out[{place} + i]" for place in behind)],
         element.backward,
     )
 
