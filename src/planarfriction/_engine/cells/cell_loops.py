@@ -16,7 +16,7 @@ from planarfriction._engine.bristles.asymmetric_cells import Leaning
 from planarfriction._engine.bristles.elastic import Elastic
 from planarfriction._engine.cells import cells
 from planarfriction._engine.cells.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT
-from planarfriction._engine.cells.cells import CellsContact, Lever
+from planarfriction._engine.cells.cells import Lever
 from planarfriction._engine.cells.cells_rollout import by_of
 from planarfriction._engine.cells.loop_generation import Passes, passes
 from planarfriction._engine.codegen.derivatives import derive
@@ -105,13 +105,23 @@ class CellKind(NamedTuple):
 
 
 @kernel
-def _leaning(contact: CellsContact, i: int, load: float) -> Leaning:
-    return Leaning(contact.law, (contact.lean[i], contact.lean[contact.count + i]))
+def _plain(law: Any, cells: Doubles, i: int, n: int, load: float) -> Any:
+    return law
 
 
-def _of_pad(name: str, element: Element, lever: Lever, numbers: int) -> CellKind:
-    lever = lever._replace(law=cells.elastic)
-    return CellKind(name, element, lever, numbers, linear=False, pad=True)
+def law_of(kind: CellKind) -> Any:
+    """Return a function `(law, cells, i, n, load)` of rows of n numbers: the law of cell i under its load."""
+    first = kind.numbers
+
+    @kernel
+    def leaning(law: Any, cells: Doubles, i: int, n: int, load: float) -> Leaning:
+        return Leaning(law, (cells[first * n + i], cells[(first + 1) * n + i]))
+
+    @kernel
+    def elastic(law: Any, cells: Doubles, i: int, n: int, load: float) -> Elastic:
+        return Elastic(law, cells[first * n + i], load)
+
+    return leaning if kind.leans else elastic if kind.pad else _plain
 
 
 PLAIN = "plain"
@@ -119,21 +129,25 @@ LEANS = "leans"
 PAD = "pad"
 """Sorts of bristles: of the law alone, with an asymmetry, of a pad."""
 
+_OF_PAD = {"linear": False, "pad": True}
+
 KINDS = {
     (2, False, PLAIN): CellKind("isotropic", POINT, cells.POSITIONS, 2),
     (2, True, PLAIN): CellKind("turned", POINT, cells.LEVERS, 5),
     (3, False, PLAIN): CellKind("discs", DISC, cells.DISC_POSITIONS, 3),
     (3, True, PLAIN): CellKind("turned_discs", DISC, cells.DISC_LEVERS, 6),
-    (2, True, LEANS): CellKind(
-        "leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning), 5, True
-    ),
+    (2, True, LEANS): CellKind("leaning", LEANING_POINT, cells.LEVERS, 5, leans=True),
     (3, True, LEANS): CellKind(
-        "leaning_discs", LEANING_DISC, cells.DISC_LEVERS._replace(law=_leaning), 6, True
+        "leaning_discs", LEANING_DISC, cells.DISC_LEVERS, 6, leans=True
     ),
-    (2, False, PAD): _of_pad("pad", PAD_POINT, cells.POSITIONS, 2),
-    (2, True, PAD): _of_pad("turned_pad", PAD_POINT, cells.LEVERS, 5),
-    (3, False, PAD): _of_pad("pad_discs", PAD_DISC, cells.DISC_POSITIONS, 3),
-    (3, True, PAD): _of_pad("turned_pad_discs", PAD_DISC, cells.DISC_LEVERS, 6),
+    (2, False, PAD): CellKind("pad", PAD_POINT, cells.POSITIONS, 2, **_OF_PAD),
+    (2, True, PAD): CellKind("turned_pad", PAD_POINT, cells.LEVERS, 5, **_OF_PAD),
+    (3, False, PAD): CellKind(
+        "pad_discs", PAD_DISC, cells.DISC_POSITIONS, 3, **_OF_PAD
+    ),
+    (3, True, PAD): CellKind(
+        "turned_pad_discs", PAD_DISC, cells.DISC_LEVERS, 6, **_OF_PAD
+    ),
 }
 """Kinds of cells by the components of a bristle, whether there is a metric, and the sort of bristles."""
 
@@ -165,11 +179,7 @@ class _Symbols:
         self.load = Number(trace, "load")
         self.weight = Number(trace, "weight")
         self.u = twin(kind.lever.seen)(self.cell, self.v)
-        self.law = law
-        if kind.leans:
-            self.law = Leaning(law, numbers[-2:])
-        elif kind.pad:
-            self.law = Elastic(law, numbers[-1], self.weight * self.load)
+        self.law = twin(law_of(kind))(law, numbers, 0, 1, self.weight * self.load)
 
     def several(self, letter: str, count: int) -> tuple:
         """Return a vector of symbols."""

@@ -18,6 +18,7 @@ from planarfriction._engine.cells.cell_loops import (
     KINDS,
     CellKind,
     CellRows,
+    law_of,
     rate_passes,
     slope_passes,
     step_passes,
@@ -235,5 +236,6 @@ def steps_of(kind: CellKind, read: Any) -> StepFunctions:
             entry,
             **model,
             linearise=linearise,
+            law=law_of(kind),
         ),
     )

@@ -376,7 +376,7 @@ def _put_cell(
 
 def jacobian(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
-    linearise: Any, read: Any, pad: bool,
+    linearise: Any, law: Any, read: Any, pad: bool,
 ) -> None:  # fmt: skip
     """Step with all derivatives."""
     record = read(contact)
@@ -388,7 +388,7 @@ def jacobian(
     for i in range(n):
         cell = lever.read(record.cells, i, n)
         linear = linearise(
-            lever.law(record, i, load),
+            law(record.law, record.cells, i, n, record.weights[i] * load),
             bristle.vector(z, i, n),
             lever.seen(cell, twist),
             dt,
