@@ -6,6 +6,7 @@ a trace, `cell_steps` and `cells_rollout` for what runs them.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -163,6 +164,19 @@ class CellRows(NamedTuple):
     n: int
 
 
+class StepRows(NamedTuple):
+    """Cells of a contact, row by row, and the derivatives of a step."""
+
+    cells: Doubles
+    z: Doubles
+    weights: Doubles
+    out: Doubles
+    """New bristles [d, n]."""
+    n: int
+    slopes: Doubles
+    """d new/dV [d, n, 3], dW/dz [3, d, n] and d new/dz [d, d, n]."""
+
+
 class _Symbols:
     """Arguments of the functions of a cell in a trace."""
 
@@ -264,6 +278,46 @@ def step_slope_passes(kind: CellKind) -> Passes:
         list(stores.values()),
         element.step_slopes,
     )
+
+
+def jacobian_passes(kind: CellKind) -> Passes:
+    """Write the step of cells in `StepRows` with its derivatives, their wrench, and its slopes by the twist.
+
+    One pass, for any number of cells.
+    """
+    size = kind.element.size
+    written = derive(kind.element.step, ("z", "u"), kind.lengths)
+    units = np.eye(2 * size).tolist()
+
+    def slopes(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        (new, traction), tape = twin(written.forth)(s.law, s.z, s.u, s.dt)
+        rows = [twin(written.back)(tape, (each[:size], each[size:])) for each in units]
+        wrench = functools.partial(twin(kind.lever.wrench), s.cell)
+        by_z, by_u = zip(*rows, strict=True)
+        borne = tuple(s.weight * each for each in traction)
+        by_twist = tuple(s.weight * each for row in by_u[size:] for each in row)
+        pulls = zip(*by_z[size:], strict=True)
+        of_pull = [wrench(tuple(s.weight * each for each in pull)) for pull in pulls]
+        return (
+            new,
+            tuple(map(wrench, by_u[:size])),
+            tuple(zip(*of_pull, strict=True)),
+            by_z[:size],
+            wrench(borne),
+            twin(kind.lever.around)(s.cell, by_twist),
+        )
+
+    stores = [*_rows("new", "out", size).values()]
+    stores += [
+        f"block.slopes[3 * ({m} * block.n + i) + {j}]"
+        for m in range(size)
+        for j in range(3)
+    ]
+    behind = range(3 * size, 6 * size + size * size)
+    stores += [f"block.slopes[{m} * block.n + i]" for m in behind]
+    name = f"derivatives of steps of {kind.element.name}"
+    return passes(name, traced(slopes), _in_rows(kind), stores, (1, 0))
 
 
 def backward_passes(kind: CellKind) -> Passes:
