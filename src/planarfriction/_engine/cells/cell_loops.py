@@ -174,7 +174,7 @@ class StepRows(NamedTuple):
     """New bristles [d, n]."""
     n: int
     slopes: Doubles
-    """d new/dV [d, n, 3], dW/dz [3, d, n] and d new/dz [d, d, n]."""
+    """d new/dV [d, n, 3], dW/dz [3, d, n], d new/dz [d, d, n] and, of a pad, d new/dN [d, n]."""
 
 
 class _Symbols:
@@ -281,12 +281,13 @@ def step_slope_passes(kind: CellKind) -> Passes:
 
 
 def jacobian_passes(kind: CellKind) -> Passes:
-    """Write the step of cells in `StepRows` with its derivatives, their wrench, and its slopes by the twist.
+    """Write the step of cells in `StepRows` with its derivatives; sum up their wrench and its slopes by the twist.
 
-    One pass, for any number of cells.
+    Those by the load, of a pad, come behind. One pass, for any number of cells.
     """
     size = kind.element.size
-    written = derive(kind.element.step, ("z", "u"), kind.lengths)
+    by = "z", "u", *["pad.load"] * kind.pad
+    written = derive(kind.element.step, by, kind.lengths)
     units = np.eye(2 * size).tolist()
 
     def slopes(trace: Trace) -> Any:
@@ -294,18 +295,21 @@ def jacobian_passes(kind: CellKind) -> Passes:
         (new, traction), tape = twin(written.forth)(s.law, s.z, s.u, s.dt)
         rows = [twin(written.back)(tape, (each[:size], each[size:])) for each in units]
         wrench = functools.partial(twin(kind.lever.wrench), s.cell)
-        by_z, by_u = zip(*rows, strict=True)
+        by_z, by_u, *by_load = zip(*rows, strict=True)
         borne = tuple(s.weight * each for each in traction)
         by_twist = tuple(s.weight * each for row in by_u[size:] for each in row)
         pulls = zip(*by_z[size:], strict=True)
         of_pull = [wrench(tuple(s.weight * each for each in pull)) for pull in pulls]
+        heavier = [tuple(s.weight * each for each in row) for row in by_load]
         return (
             new,
             tuple(map(wrench, by_u[:size])),
             tuple(zip(*of_pull, strict=True)),
             by_z[:size],
+            tuple(row[:size] for row in heavier),
             wrench(borne),
             twin(kind.lever.around)(s.cell, by_twist),
+            tuple(wrench(tuple(s.weight * x for x in row[size:])) for row in heavier),
         )
 
     stores = [*_rows("new", "out", size).values()]
@@ -314,7 +318,7 @@ def jacobian_passes(kind: CellKind) -> Passes:
         for m in range(size)
         for j in range(3)
     ]
-    behind = range(3 * size, 6 * size + size * size)
+    behind = range(3 * size, (6 + size + kind.pad) * size)
     stores += [f"block.slopes[{m} * block.n + i]" for m in behind]
     name = f"derivatives of steps of {kind.element.name}"
     return passes(name, traced(slopes), _in_rows(kind), stores, (1, 0))

@@ -184,7 +184,7 @@ def step(
 
 def jacobian(
     contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, advance: Any, pad: bool,
-    read: Any,
+    read: Any, size: int,
 ) -> None:  # fmt: skip
     """Step with all derivatives."""
     record = read(contact)
@@ -192,7 +192,10 @@ def jacobian(
     slopes = at(out, SLOPES)
     rows = StepRows(record.cells, z, record.weights, new, n, slopes)
     shared = dt, v[3] if pad else 0.0
-    put_all(out, advance(record.law, three(v), shared, rows, n))
+    found = advance(record.law, three(v), shared, rows, n)
+    put_all(out, found[:SLOPES])
+    if pad:
+        put(at(slopes, (7 + size) * size * n), found[SLOPES:])
 
 
 @functools.cache
@@ -248,5 +251,6 @@ def steps_of(kind: CellKind, read: Any) -> StepFunctions:
             entry,
             **model,
             advance=jacobian_passes(kind).run,
+            size=kind.element.size,
         ),
     )
