@@ -7,7 +7,6 @@ a trace, `cell_steps` and `cells_rollout` for what runs them.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -222,31 +221,24 @@ def _in_rows(kind: CellKind) -> dict[str, str]:
     return {**_shared(kind), **vectors, "weight": "block.weights[0 + i]"}
 
 
-def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
-    """Return the step of a cell in a trace: its bristle, and its wrench."""
-
-    def step(trace: Trace) -> Any:
-        s = _Symbols(trace, kind)
-        new, traction = twin(kind.element.step)(s.law, s.z, s.u, s.dt)
-        return new, twin(kind.lever.wrench)(
-            s.cell, tuple(s.weight * each for each in traction)
-        )
-
-    return step
-
-
 def step_passes(kind: CellKind) -> Passes:
     """Write the step of cells in `CellRows`.
 
     The new bristles may go where the old ones are, so they are written last.
     """
     element = kind.element
-    stores = _rows("new", "out", kind.element.size)
-    sources = _in_rows(kind) | stores
+
+    def step(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        new, traction = twin(element.step)(s.law, s.z, s.u, s.dt)
+        borne = tuple(s.weight * each for each in traction)
+        return new, twin(kind.lever.wrench)(s.cell, borne)
+
+    stores = _rows("new", "out", element.size)
     return passes(
         f"steps of {element.name}",
-        traced(_step_of(kind)),
-        sources,
+        traced(step),
+        _in_rows(kind) | stores,
         list(stores.values()),
         element.forward,
     )
