@@ -273,7 +273,7 @@ def test_passes_step_as_the_function_they_come_from(count):
 
 def test_passes_hand_little_on():
     """A pass that handed on everything would leave the nearest cache: 64 lanes of 12 rows are 6 kB."""
-    written = cell_loops.forward_passes(cell_loops.KINDS[3, False, cell_loops.PLAIN])
+    written = cell_loops.step_passes(cell_loops.KINDS[3, False, cell_loops.PLAIN])
     assert written.rows <= 30
     assert written.source.count("def pass_") == cell_loops.DISC.forward[0]
     assert LANES * written.rows * 8 <= 16384

@@ -134,7 +134,7 @@ class StepFunctions(NamedTuple):
     slopes: Any
     """dW/dV [3, 3] as well."""
     jacobian: Any
-    """dW/dV, d new/dV [S, 3], dW/dz [3, S] and d new/dz as well."""
+    """dW/dV, d new/dV [S, 3], dW/dz [3, S] and d new/dz as well; of a pad, d new/dN [S] and dW/dN [3] by the load."""
 
 
 def step_functions(name: str, templates: tuple, **model: Any) -> StepFunctions:

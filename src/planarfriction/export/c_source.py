@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from importlib import resources
 from itertools import compress
 from typing import Any, NamedTuple
 
@@ -37,14 +38,24 @@ def comment(text: str) -> str:
 
 
 def rendered(package: str, template: str, /, **values: Any) -> str:
-    """Return the text of a template of a package."""
+    """Return the text of a template of a package; a library in it that is called `friction` gets its `name`."""
     import jinja2
 
-    rules: dict[str, Any] = {
-        "undefined": jinja2.StrictUndefined,
-        "keep_trailing_newline": True,
-    }
-    environment = jinja2.Environment(loader=jinja2.PackageLoader(package, "."), **rules)
+    name = values.get("name", "friction")
+    folder = resources.files(package)
+
+    def source(each: str) -> str:
+        text = folder.joinpath(each).read_text(encoding="utf-8")
+        text = re.sub(r"\bFRICTION_", f"{name.upper()}_", text)
+        return re.sub(
+            r"\b(jac_)?friction(?=_|\.(?:h|c|cmake)\b)", rf"\g<1>{name}", text
+        )
+
+    environment = jinja2.Environment(
+        loader=jinja2.FunctionLoader(source),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+    )
     return environment.get_template(f"{template}.j2").render(values)
 
 

@@ -299,8 +299,6 @@ def _texts(
             "pattern": _pattern(pieces),
             "suffix": writer.suffix,
             "largest": writer.constant(PRECISIONS[precision]),
-            "zero": writer.constant(0.0),
-            "one": writer.constant(1.0),
             "slip": slip and slip.words,
             "passes": passes,
             "turns": turns,

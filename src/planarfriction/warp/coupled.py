@@ -27,8 +27,8 @@ WRONG = {1: "parameters", 2: "state and host"}
 class CoupledPatches:
     """Patches of `worlds` worlds, each coupled through the bodies of a host: a Warp kernel with one thread a world.
 
-    The step is that of `planarfriction.coupling.CoupledPatches`, solved for the twists, which keep their digits in
-    single precision where wrenches lose them.
+    The step is that of `planarfriction.coupling.CoupledPatches`. The search is in double precision; bristles are
+    stepped in the precision of the arrays.
 
     Parameters
     ----------

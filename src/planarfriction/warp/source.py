@@ -7,25 +7,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.codegen import small_matrices
-from planarfriction._engine.codegen.symbolic_functions import twin
-from planarfriction._engine.codegen.trace import Block, Number, Trace, traced
-from planarfriction._engine.coupled import coupling
+from planarfriction._engine.codegen.trace import Block
+from planarfriction._engine.coupled.coupling import restrain
+from planarfriction._engine.coupled.coupling_steps import (
+    step_all,
+    step_all_with_slopes,
+    write_load_slopes,
+)
+from planarfriction.export.body import Search
 from planarfriction.export.c_source import Writer, rendered
-from planarfriction.export.c_values import Array, Fixed
+from planarfriction.export.c_values import Array
 from planarfriction.export.library import PARAMETERS, PRECISIONS, tilt_of
-from planarfriction.export.loops import Loops
 from planarfriction.export.pieces import Pieces
-
-ROUNDING = {"double": (coupling.ROUNDING,) * 2, "float": (3e-7, 1e-5)}
-"""Errors of a twist, in the largest speed that goes into it, by precision: below the first no step gets, and below the
-second some do not get."""
-
-SHORTER = 4.0
-"""Ratio of the shorter steps that lead from damping alone to a step that is hard to solve."""
-
-STAGES = 8
-"""Number of those steps."""
 
 
 class Source(NamedTuple):
@@ -61,8 +54,23 @@ def coupled_source_of(
         "points": [each.count for each in pieces],
     }
     starts = {name: np.cumsum([0, *each]).tolist() for name, each in counts.items()}
-    writer = Writer(precision)
-    names = "SHORTENINGS", "JOINT", "ROUND"
+    writer = Writer()
+    count = len(which)
+    search = Search(
+        count, "step_patch", radius=Array("p->lever_arm", (count,), fixed=True)
+    )
+    # A step has its slopes, which are not computed again.
+    step = search.add(step_all_with_slopes, search.patches, search.p)
+    search.loops.replaced |= {
+        step_all: lambda _: step,
+        step_all_with_slopes: lambda _: "(void)",
+        write_load_slopes: lambda _: "load_slopes",
+    }
+    names = {
+        "find": search.find(search.patches, precision),
+        "restrain": search.add(restrain, search.patches, search.p),
+    }
+    texts = search.texts()
     text = rendered(
         "planarfriction.warp",
         "coupled.cpp",
@@ -72,36 +80,13 @@ def coupled_source_of(
         starts=starts,
         radii=[writer.constant(each) for each in radii],
         follows=follows,
-        loaded="loaded" if any(each.pad for each in pieces) else "unit",
-        rounding=list(map(writer.constant, ROUNDING[precision])),
-        shortening="\n".join(
-            writer.lines(traced(_shortening), ["too_far", "share"], indent=" " * 16)
-        ),
-        systems=_systems(writer, 4 * len(which)),
-        stages=writer.constant(STAGES),
-        shorter=writer.constant(SHORTER),
-        **{name.lower(): writer.constant(getattr(coupling, name)) for name in names},
+        search=names
+        | {
+            "fields": texts["fields"],
+            "functions": texts["functions"].replace("static ", "static CUDA_CALLABLE "),
+        },
     )
     return Source(text, numbers)
-
-
-def _shortening(trace: Trace) -> Any:
-    slopes = Number(trace, "first"), Number(trace, "here")
-    return twin(coupling.too_far)(*slopes), twin(coupling.shortening_of)(*slopes)
-
-
-def _systems(writer: Writer, unknowns: int) -> str:
-    """Return the functions of the linear systems, and of slopes that fall."""
-    loops = Loops(writer)
-    names = ("slopes", "scale", "turned", "axes")
-    loops.add(
-        small_matrices.leave_out_rising, tuple(Array(name, (9,)) for name in names)
-    )
-    loops.add(
-        small_matrices.solved,
-        (Array("matrix", (unknowns**2,)), Array("x", (unknowns,)), Fixed(unknowns)),
-    )
-    return "\n\n".join(loops.functions).replace("static ", "static CUDA_CALLABLE ")
 
 
 def _described(

@@ -68,7 +68,7 @@ class BlockFunctions(NamedTuple):
     pushed: Any
     """`(law, z, u, dt, dz, du, changes of the law, change of the cell's load)`: step a cell and its change."""
     law: Any
-    """`(law, block, i, load)`: return the law of cell i, with its asymmetry or its piece of a pad if there is one."""
+    """See `cell_loops.law_of`."""
     vector: Any
     """`(row, first, stride)`: return the components of a bristle."""
 

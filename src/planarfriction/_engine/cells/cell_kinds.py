@@ -5,41 +5,27 @@ from __future__ import annotations
 import functools
 from typing import Any
 
-from planarfriction._engine.bristles.asymmetric_cells import Leaning
-from planarfriction._engine.bristles.elastic import Elastic
 from planarfriction._engine.cells import cells_rollout, cells_sensitivities
-from planarfriction._engine.cells.cell_blocks import LANES, WEIGHT, BlockFunctions
+from planarfriction._engine.cells.cell_blocks import (
+    BAR,
+    LANES,
+    WEIGHT,
+    BlockFunctions,
+    Z,
+)
 from planarfriction._engine.cells.cell_loops import (
     KINDS,
     CellKind,
+    CellRows,
     backward_passes,
-    forward_passes,
+    law_of,
+    step_passes,
 )
 from planarfriction._engine.codegen.derivatives import forward
 from planarfriction._engine.codegen.vectors import Vector, reader_of
 from planarfriction._engine.compiler import kernel
-from planarfriction._engine.compiler.memory import Doubles
+from planarfriction._engine.compiler.memory import Doubles, at
 from planarfriction.formulas import LawNumbers
-
-
-@kernel
-def _shared(law: LawNumbers, block: Doubles, i: int, load: float) -> LawNumbers:
-    return law
-
-
-def _law_of(kind: CellKind) -> Any:
-    """Return `cell_blocks.BlockFunctions.law`, which reads what stands behind the numbers of the lever."""
-    first = LANES * kind.numbers
-
-    @kernel
-    def leaning(law: LawNumbers, block: Doubles, i: int, load: float) -> Leaning:
-        return Leaning(law, (block[first + i], block[first + LANES + i]))
-
-    @kernel
-    def elastic(law: LawNumbers, block: Doubles, i: int, load: float) -> Elastic:
-        return Elastic(law, block[first + i], block[WEIGHT + i] * load)
-
-    return leaning if kind.leans else elastic if kind.pad else _shared
 
 
 def _pushed(kind: CellKind) -> Any:
@@ -62,13 +48,28 @@ def _pushed(kind: CellKind) -> Any:
     return of_pad if kind.pad else plain
 
 
+def _of_block(run: Any, field: int) -> Any:
+    """Return passes over the cells of a block, with results in a field."""
+
+    @kernel
+    def of_block(
+        law: LawNumbers, twist: Vector, shared: Vector, block: Doubles, lanes: int
+    ) -> Vector:
+        bristles = at(block, Z)
+        rows = CellRows(block, bristles, at(block, WEIGHT), at(block, field), LANES)
+        return run(law, twist, shared, rows, lanes)
+
+    return of_block
+
+
 @functools.cache
 def rollouts_of_cells(size: int, turned: bool, sort: str) -> tuple:
     """Return rollout, gradient, sensitivities and tangent of a kind of cells (see `KINDS`)."""
     kind = KINDS[size, turned, sort]
-    loops = forward_passes(kind).run, backward_passes(kind).run
+    steps = _of_block(step_passes(kind).run, Z)
+    loops = steps, _of_block(backward_passes(kind).run, BAR)
     functions = BlockFunctions(
-        kind.lever, size, *loops, _pushed(kind), _law_of(kind), reader_of(size)
+        kind.lever, size, *loops, _pushed(kind), law_of(kind), reader_of(size)
     )
     sensitivities = cells_sensitivities.bound(functions, kind)
     rollout, gradient, tangent = (

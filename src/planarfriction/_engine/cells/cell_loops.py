@@ -6,7 +6,7 @@ a trace, `cell_steps` and `cells_rollout` for what runs them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,8 +15,8 @@ from planarfriction._engine.bristles import asymmetric_cells, discs, elastic, po
 from planarfriction._engine.bristles.asymmetric_cells import Leaning
 from planarfriction._engine.bristles.elastic import Elastic
 from planarfriction._engine.cells import cells
-from planarfriction._engine.cells.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT, Z
-from planarfriction._engine.cells.cells import CellsContact, Lever
+from planarfriction._engine.cells.cell_blocks import BAR, BY_LOAD, LANES, OUT, WEIGHT
+from planarfriction._engine.cells.cells import Lever
 from planarfriction._engine.cells.cells_rollout import by_of
 from planarfriction._engine.cells.loop_generation import Passes, passes
 from planarfriction._engine.codegen.derivatives import derive
@@ -105,13 +105,23 @@ class CellKind(NamedTuple):
 
 
 @kernel
-def _leaning(contact: CellsContact, i: int, load: float) -> Leaning:
-    return Leaning(contact.law, (contact.lean[i], contact.lean[contact.count + i]))
+def _plain(law: Any, cells: Doubles, i: int, n: int, load: float) -> Any:
+    return law
 
 
-def _of_pad(name: str, element: Element, lever: Lever, numbers: int) -> CellKind:
-    lever = lever._replace(law=cells.elastic)
-    return CellKind(name, element, lever, numbers, linear=False, pad=True)
+def law_of(kind: CellKind) -> Any:
+    """Return a function `(law, cells, i, n, load)` of rows of n numbers: the law of cell i under its load."""
+    first = kind.numbers
+
+    @kernel
+    def leaning(law: Any, cells: Doubles, i: int, n: int, load: float) -> Leaning:
+        return Leaning(law, (cells[first * n + i], cells[(first + 1) * n + i]))
+
+    @kernel
+    def elastic(law: Any, cells: Doubles, i: int, n: int, load: float) -> Elastic:
+        return Elastic(law, cells[first * n + i], load)
+
+    return leaning if kind.leans else elastic if kind.pad else _plain
 
 
 PLAIN = "plain"
@@ -119,34 +129,51 @@ LEANS = "leans"
 PAD = "pad"
 """Sorts of bristles: of the law alone, with an asymmetry, of a pad."""
 
+_OF_PAD = {"linear": False, "pad": True}
+
 KINDS = {
     (2, False, PLAIN): CellKind("isotropic", POINT, cells.POSITIONS, 2),
     (2, True, PLAIN): CellKind("turned", POINT, cells.LEVERS, 5),
     (3, False, PLAIN): CellKind("discs", DISC, cells.DISC_POSITIONS, 3),
     (3, True, PLAIN): CellKind("turned_discs", DISC, cells.DISC_LEVERS, 6),
-    (2, True, LEANS): CellKind(
-        "leaning", LEANING_POINT, cells.LEVERS._replace(law=_leaning), 5, True
-    ),
+    (2, True, LEANS): CellKind("leaning", LEANING_POINT, cells.LEVERS, 5, leans=True),
     (3, True, LEANS): CellKind(
-        "leaning_discs", LEANING_DISC, cells.DISC_LEVERS._replace(law=_leaning), 6, True
+        "leaning_discs", LEANING_DISC, cells.DISC_LEVERS, 6, leans=True
     ),
-    (2, False, PAD): _of_pad("pad", PAD_POINT, cells.POSITIONS, 2),
-    (2, True, PAD): _of_pad("turned_pad", PAD_POINT, cells.LEVERS, 5),
-    (3, False, PAD): _of_pad("pad_discs", PAD_DISC, cells.DISC_POSITIONS, 3),
-    (3, True, PAD): _of_pad("turned_pad_discs", PAD_DISC, cells.DISC_LEVERS, 6),
+    (2, False, PAD): CellKind("pad", PAD_POINT, cells.POSITIONS, 2, **_OF_PAD),
+    (2, True, PAD): CellKind("turned_pad", PAD_POINT, cells.LEVERS, 5, **_OF_PAD),
+    (3, False, PAD): CellKind(
+        "pad_discs", PAD_DISC, cells.DISC_POSITIONS, 3, **_OF_PAD
+    ),
+    (3, True, PAD): CellKind(
+        "turned_pad_discs", PAD_DISC, cells.DISC_LEVERS, 6, **_OF_PAD
+    ),
 }
 """Kinds of cells by the components of a bristle, whether there is a metric, and the sort of bristles."""
 
 
 class CellRows(NamedTuple):
-    """Cells of a contact from one on, row by row of n numbers."""
+    """Cells of a contact from one on, row by row of n numbers; of a block, `LANES` numbers."""
 
     cells: Doubles
     z: Doubles
     weights: Doubles
     out: Doubles
-    """Rates or new bristles [d, n], or a block of derivatives by state and velocity [2, d, d, LANES]."""
+    """Rates, new bristles or cotangents [d, n], or a block of derivatives by state and velocity [2, d, d, LANES]."""
     n: int
+
+
+class StepRows(NamedTuple):
+    """Cells of a contact, row by row, and the derivatives of a step."""
+
+    cells: Doubles
+    z: Doubles
+    weights: Doubles
+    out: Doubles
+    """New bristles [d, n]."""
+    n: int
+    slopes: Doubles
+    """d new/dV [d, n, 3], dW/dz [3, d, n], d new/dz [d, d, n] and, of a pad, d new/dN [d, n]."""
 
 
 class _Symbols:
@@ -165,20 +192,11 @@ class _Symbols:
         self.load = Number(trace, "load")
         self.weight = Number(trace, "weight")
         self.u = twin(kind.lever.seen)(self.cell, self.v)
-        self.law = law
-        if kind.leans:
-            self.law = Leaning(law, numbers[-2:])
-        elif kind.pad:
-            self.law = Elastic(law, numbers[-1], self.weight * self.load)
+        self.law = twin(law_of(kind))(law, numbers, 0, 1, self.weight * self.load)
 
     def several(self, letter: str, count: int) -> tuple:
         """Return a vector of symbols."""
         return tuple(Number(self.trace, f"{letter}{m}") for m in range(count))
-
-
-def _fields(letter: str, first: int, count: int) -> dict[str, str]:
-    """Return the sources of a vector of symbols that lies in fields of a block."""
-    return {f"{letter}{m}": f"block[{first + m * LANES} + i]" for m in range(count)}
 
 
 def _rows(letter: str, field: str, count: int) -> dict[str, str]:
@@ -197,41 +215,10 @@ _PULL = {f"p{m}": f"shared[{m + 3}]" for m in range(3)} | {"keeps": "shared[2]"}
 """Sources of the cotangent of a wrench, and of 1, or 0 without load."""
 
 
-def _in_block(kind: CellKind) -> dict[str, str]:
-    """Return the sources of the symbols of cells in a block."""
-    vectors = _fields("c", 0, kind.rows) | _fields("z", Z, kind.element.size)
-    return {**_shared(kind), **vectors, "weight": f"block[{WEIGHT} + i]"}
-
-
 def _in_rows(kind: CellKind) -> dict[str, str]:
     """Return the sources of the symbols of cells in `CellRows`."""
     vectors = _rows("c", "cells", kind.rows) | _rows("z", "z", kind.element.size)
     return {**_shared(kind), **vectors, "weight": "block.weights[0 + i]"}
-
-
-def _step_of(kind: CellKind) -> Callable[[Trace], Any]:
-    """Return the step of a cell in a trace: its bristle, and its wrench."""
-
-    def step(trace: Trace) -> Any:
-        s = _Symbols(trace, kind)
-        new, traction = twin(kind.element.step)(s.law, s.z, s.u, s.dt)
-        return new, twin(kind.lever.wrench)(
-            s.cell, tuple(s.weight * each for each in traction)
-        )
-
-    return step
-
-
-def forward_passes(kind: CellKind) -> Passes:
-    """Write the step of the cells of a block, in place."""
-    stores = list(_fields("z", Z, kind.element.size).values())
-    return passes(
-        kind.element.name,
-        traced(_step_of(kind)),
-        _in_block(kind),
-        stores,
-        kind.element.forward,
-    )
 
 
 def step_passes(kind: CellKind) -> Passes:
@@ -240,12 +227,18 @@ def step_passes(kind: CellKind) -> Passes:
     The new bristles may go where the old ones are, so they are written last.
     """
     element = kind.element
-    stores = _rows("new", "out", kind.element.size)
-    sources = _in_rows(kind) | stores
+
+    def step(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        new, traction = twin(element.step)(s.law, s.z, s.u, s.dt)
+        borne = tuple(s.weight * each for each in traction)
+        return new, twin(kind.lever.wrench)(s.cell, borne)
+
+    stores = _rows("new", "out", element.size)
     return passes(
         f"steps of {element.name}",
-        traced(_step_of(kind)),
-        sources,
+        traced(step),
+        _in_rows(kind) | stores,
         list(stores.values()),
         element.forward,
     )
@@ -279,11 +272,56 @@ def step_slope_passes(kind: CellKind) -> Passes:
     )
 
 
+def jacobian_passes(kind: CellKind) -> Passes:
+    """Write the step of cells in `StepRows` with its derivatives; sum up their wrench and its slopes by the twist.
+
+    Those by the load, of a pad, come behind. One pass, for any number of cells.
+    """
+    size = kind.element.size
+    by = "z", "u", *["pad.load"] * kind.pad
+    written = derive(kind.element.step, by, kind.lengths)
+    units = np.eye(2 * size).tolist()
+
+    def slopes(trace: Trace) -> Any:
+        s = _Symbols(trace, kind)
+        (new, traction), tape = twin(written.forth)(s.law, s.z, s.u, s.dt)
+        rows = [twin(written.back)(tape, (each[:size], each[size:])) for each in units]
+        wrench = functools.partial(twin(kind.lever.wrench), s.cell)
+        by_z, by_u, *by_load = zip(*rows, strict=True)
+        borne = tuple(s.weight * each for each in traction)
+        by_twist = tuple(s.weight * each for row in by_u[size:] for each in row)
+        pulls = zip(*by_z[size:], strict=True)
+        of_pull = [wrench(tuple(s.weight * each for each in pull)) for pull in pulls]
+        heavier = [tuple(s.weight * each for each in row) for row in by_load]
+        return (
+            new,
+            tuple(map(wrench, by_u[:size])),
+            tuple(zip(*of_pull, strict=True)),
+            by_z[:size],
+            tuple(row[:size] for row in heavier),
+            wrench(borne),
+            twin(kind.lever.around)(s.cell, by_twist),
+            tuple(wrench(tuple(s.weight * x for x in row[size:])) for row in heavier),
+        )
+
+    stores = [*_rows("new", "out", size).values()]
+    stores += [
+        f"block.slopes[3 * ({m} * block.n + i) + {j}]"
+        for m in range(size)
+        for j in range(3)
+    ]
+    behind = range(3 * size, (6 + size + kind.pad) * size)
+    stores += [f"block.slopes[{m} * block.n + i]" for m in behind]
+    name = f"derivatives of steps of {kind.element.name}"
+    return passes(name, traced(slopes), _in_rows(kind), stores, (1, 0))
+
+
 def backward_passes(kind: CellKind) -> Passes:
     """Write the adjoint of a step of the cells of a block: the cotangent of the state in place, and sums over cells.
 
     These are the cotangents of the twist [3], of the load, and of the law in the order of `cells_rollout.PARAMETERS`.
-    The cotangent of the load of each cell goes into the field `OUT`, and its part by the law of a pad into the next.
+    The slope of the weight by the load lies behind the weight. The cotangent of the load of each cell goes behind that
+    of the state, to `OUT`, and its part by the law of a pad behind it.
     """
     element = kind.element
     lever = kind.lever
@@ -313,13 +351,14 @@ def backward_passes(kind: CellKind) -> Passes:
             tuple(law_bar),
         )
 
-    bar = _fields("b", BAR, element.size)
-    sources = _in_block(kind) | _PULL | bar | {"by_load": f"block[{BY_LOAD} + i]"}
+    bar = _rows("b", "out", element.size)
+    by_load = {"by_load": f"block.weights[{BY_LOAD - WEIGHT} + i]"}
+    behind = [OUT - BAR + m * LANES for m in range(1 + kind.pad)]
     return passes(
         f"{element.name}_back",
         traced(adjoint),
-        sources,
-        [*bar.values(), *_fields("out", OUT, 1 + kind.pad).values()],
+        _in_rows(kind) | _PULL | bar | by_load,
+        [*bar.values(), *(f"block.out[{place} + i]" for place in behind)],
         element.backward,
     )
 

@@ -18,6 +18,8 @@ from planarfriction._engine.cells.cell_loops import (
     KINDS,
     CellKind,
     CellRows,
+    StepRows,
+    jacobian_passes,
     rate_passes,
     slope_passes,
     step_passes,
@@ -180,6 +182,22 @@ def step(
     put_all(out, found)
 
 
+def jacobian(
+    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, advance: Any, pad: bool,
+    read: Any, size: int,
+) -> None:  # fmt: skip
+    """Step with all derivatives."""
+    record = read(contact)
+    n = record.count
+    slopes = at(out, SLOPES)
+    rows = StepRows(record.cells, z, record.weights, new, n, slopes)
+    shared = dt, v[3] if pad else 0.0
+    found = advance(record.law, three(v), shared, rows, n)
+    put_all(out, found[:SLOPES])
+    if pad:
+        put(at(slopes, (7 + size) * size * n), found[SLOPES:])
+
+
 @functools.cache
 def functions_of_cells(
     size: int, turned: bool, sort: str
@@ -222,18 +240,17 @@ def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
 def steps_of(kind: CellKind, read: Any) -> StepFunctions:
     """Return the steps of contacts of a kind of cells whose records `read` reads."""
     model = _model_of(kind, read)
-    element = kind.element
     wrench = {"advance": step_passes(kind).run, "none": (0.0,) * 3}
     slopes = {"advance": step_slope_passes(kind).run, "none": (0.0,) * SLOPES}
-    linearise = general_cells.slopes_of(element.step, element.size, kind.lengths)
     return StepFunctions(
         bind(step, f"{kind.name}_step", entry, **model, **wrench),
         bind(step, f"{kind.name}_slopes", entry, **model, **slopes),
         bind(
-            general_cells.jacobian,
+            jacobian,
             f"{kind.name}_jacobian",
             entry,
             **model,
-            linearise=linearise,
+            advance=jacobian_passes(kind).run,
+            size=kind.element.size,
         ),
     )

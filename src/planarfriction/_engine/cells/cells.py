@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from planarfriction._engine.bristles.elastic import Elastic, factors
 from planarfriction._engine.codegen.vectors import Vector, norm, reader_of
 from planarfriction._engine.compiler import kernel
-from planarfriction._engine.compiler.memory import Doubles, reader
+from planarfriction._engine.compiler.memory import Doubles, at, reader
 from planarfriction.formulas import LawNumbers
 
 
@@ -23,13 +23,11 @@ class CellsContact(NamedTuple):
     law: LawNumbers
     count: int
     """n"""
+    rows: int
+    """Number of rows of `cells`."""
     cells: Doubles
     """Numbers of the cells: x, y [2, n], or L_xx, L_xy, L_yy, (L J rho)_x, (L J rho)_y [5, n], of discs kappa a too;
-    behind these the asymmetry a_x, a_y, or `stiff`."""
-    lean: Doubles
-    """Rows a_x, a_y of these, [2, n]; none where friction is the same forwards and backwards."""
-    stiff: Doubles
-    """`elastic.Elastic.stiff` [N] of the pieces of a pad, [n]; none without one."""
+    behind these the asymmetry a_x, a_y, or `elastic.Elastic.stiff` [N] of the pieces of a pad."""
     weights: Doubles
     """[n]"""
 
@@ -38,19 +36,15 @@ read = reader(CellsContact)
 
 
 @kernel
-def elastic(contact: CellsContact, i: int, load: float) -> Elastic:
-    """Return the law of a piece of a pad under the load of the contact."""
-    return Elastic(contact.law, contact.stiff[i], contact.weights[i] * load)
-
-
-@kernel
 def settle(contact: CellsContact, size: int, load: float, z: Doubles) -> None:
     """Bring bristles of so many components of a pad back onto their limits at a load."""
     n = contact.count
+    stiff = at(contact.cells, (contact.rows - 1) * n)
     for i in range(n):
         longest = contact.law.mu_s / contact.law.sigma_0
         bent = norm((z[i], z[n + i], z[2 * n + i] if size == 3 else 0.0))
-        stiffer, _ = factors(elastic(contact, i, load))
+        pad = Elastic(contact.law, stiff[i], contact.weights[i] * load)
+        stiffer, _ = factors(pad)
         over = bent * stiffer / longest
         if over > 1.0:
             for m in range(size):
@@ -68,8 +62,6 @@ class Lever(NamedTuple):
     """`(cell, t)`: return `B' t`."""
     around: Any
     """`(cell, P)`: return `B' P B` of a matrix [d, d], nine numbers."""
-    law: Any
-    """`(contact, i, load)`: return the law of the cell under the load of the contact."""
 
 
 # ---------------------------------------------------------------------- the levers
@@ -99,11 +91,6 @@ def _wrench_by_map(cell: Vector, t: Vector) -> Vector:
     return xx * t[0] + xy * t[1], xy * t[0] + yy * t[1], x * t[0] + y * t[1]
 
 
-@kernel
-def _law_of_all(contact: CellsContact, i: int, load: float) -> LawNumbers:
-    return contact.law
-
-
 def _of_points(count: int, seen: Any, wrench: Any) -> Lever:
     """Return the lever of points with so many numbers."""
 
@@ -119,7 +106,7 @@ def _of_points(count: int, seen: Any, wrench: Any) -> Lever:
             *wrench(cell, (a[2], b[2])),
         )
 
-    return Lever(reader_of(count), seen, wrench, around, _law_of_all)
+    return Lever(reader_of(count), seen, wrench, around)
 
 
 def _of_discs(count: int, points: Lever) -> Lever:

@@ -303,7 +303,7 @@ def _push_one(
     change = kind.vector(block, BAR + i, LANES)
     u = lever.seen(one, interval.twist)
     d_u = lever.seen(one, interval.d_twist)
-    law = kind.law(interval.law, block, i, load)
+    law = kind.law(interval.law, block, i, LANES, weight * load)
     heavier = (weight + load * block[BY_LOAD + i]) * interval.d_load + block[
         HEAVIER + i
     ]

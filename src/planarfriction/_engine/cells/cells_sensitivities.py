@@ -101,7 +101,8 @@ def _push_one(kind: BlockFunctions, interval: Interval, block: Doubles, i: int) 
     u = kind.lever.seen(kind.lever.read(block, i, LANES), interval.twist)
     a, b, c, d, e, f = _changes(kind, block, i)
     changes = interval.springs, a, 1.0, b, 1.0, c, 1.0, d, 1.0, e, 1.0, f, 1.0, 1.0
-    law = kind.law(interval.law, block, i, interval.load)
+    borne = block[WEIGHT + i] * interval.load
+    law = kind.law(interval.law, block, i, LANES, borne)
     results = kind.pushed(law, z, u, interval.dt, *changes)
     (new, traction) = results[0]
     d = results[1:]

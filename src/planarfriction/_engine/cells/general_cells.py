@@ -13,10 +13,8 @@ from typing import Any, NamedTuple
 from planarfriction._engine.bristles.law import traction
 from planarfriction._engine.cells.cell_blocks import LANES, scratch
 from planarfriction._engine.cells.cells import Lever
-from planarfriction._engine.codegen.derivatives import derive
 from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.small_matrices import inverse, inverse_2
-from planarfriction._engine.codegen.source import run_source, text_of
 from planarfriction._engine.codegen.vectors import (
     Vector,
     copy,
@@ -34,7 +32,7 @@ from planarfriction._engine.codegen.vectors import (
 )
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, Place, arrays_at, at
-from planarfriction._engine.protocol import ROWS, SLOPES
+from planarfriction._engine.protocol import ROWS
 
 MATRICES = 5
 """Matrices [d, d] of a cell in a linearisation: A, F, the inverse of D, C and E; number by number, [5 d d, n]."""
@@ -61,18 +59,6 @@ OF_DISCS = 9 * LANES
 """Numbers of the inverses of D of a block of discs."""
 
 
-class CellSlopes(NamedTuple):
-    """A step of a cell with its derivatives by the bristle and by the velocity of the cell, [d, d] row by row."""
-
-    new: tuple
-    traction: tuple
-    """Per unit load."""
-    new_z: tuple
-    new_u: tuple
-    traction_z: tuple
-    traction_u: tuple
-
-
 class Bristle(NamedTuple):
     """Compiled functions of bristles of d components."""
 
@@ -97,36 +83,6 @@ def bristle(size: int, linear: bool) -> Bristle:
     return Bristle(
         size, *readers, identity, inverse if size == 3 else inverse_2, linear
     )
-
-
-def slopes_of(function: Any, size: int, lengths: dict[str, int]) -> Any:
-    """Return a function that returns two vectors with their derivatives by z and u, as `CellSlopes`."""
-    written = derive(function, ("z", "u"), lengths)
-    forth = written.forth
-    rows_of = _rows_of(written.back, size)
-
-    @kernel
-    def slopes(*arguments: Any) -> CellSlopes:
-        results, tape = forth(*arguments)
-        return CellSlopes(results[0], results[1], *rows_of(tape))
-
-    return slopes
-
-
-def _rows_of(back: Any, size: int) -> Any:
-    """Return a kernel of a tape that returns the derivatives of two vectors by z and u, row by row."""
-    lines = []
-    for m in range(2 * size):
-        bars = [float(m == j) for j in range(2 * size)]
-        lines.append(
-            f"z{m}, u{m} = back(tape, ({tuple(bars[:size])}, {tuple(bars[size:])}))"
-        )
-    halves = range(size), range(size, 2 * size)
-    rows = [", ".join(f"*{by}{m}" for m in half) for half in halves for by in "zu"]
-    source = text_of(
-        "rows(tape)", [*lines, f"return {', '.join(f'({row})' for row in rows)}"]
-    )
-    return kernel(run_source("slopes", source, {"back": back})["rows"])
 
 
 @kernel
@@ -342,67 +298,6 @@ def pull_back(
         )
         total = plus(total, 1.0, lever.wrench(cell, by_u))
     put(rows.d_twist, total)
-
-
-@kernel
-def _put_cell(
-    lever: Lever,
-    bristle: Bristle,
-    cell: Vector,
-    weight: float,
-    linear: CellSlopes,
-    i: int,
-    n: int,
-    out: Doubles,
-) -> None:
-    """Write the derivatives of cell i to its places in d new/dV [d, n, 3], dW/dz [3, d, n] and d new/dz [d, d, n]."""
-    d = bristle.size
-    for j in range(3):
-        unit = (
-            (1.0 if j == 0 else 0.0),
-            (1.0 if j == 1 else 0.0),
-            (1.0 if j == 2 else 0.0),
-        )
-        u = lever.seen(cell, unit)
-        scatter(out, 3 * i + j, 3 * n, matrix_applied(linear.new_u, u))
-        scatter(
-            out,
-            (3 + j) * d * n + i,
-            n,
-            times(weight, matrix_applied_back(linear.traction_z, u)),
-        )
-    scatter(out, 6 * d * n + i, n, linear.new_z)
-
-
-def jacobian(
-    contact: Place, z: Doubles, v: Doubles, dt: float, new: Doubles, out: Doubles, *, lever: Lever, bristle: Bristle,
-    linearise: Any, read: Any, pad: bool,
-) -> None:  # fmt: skip
-    """Step with all derivatives."""
-    record = read(contact)
-    twist = three(v)
-    load = v[3] if pad else 0.0
-    total = (0.0, 0.0, 0.0)
-    n = record.count
-    by_twist = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    for i in range(n):
-        cell = lever.read(record.cells, i, n)
-        linear = linearise(
-            lever.law(record, i, load),
-            bristle.vector(z, i, n),
-            lever.seen(cell, twist),
-            dt,
-        )
-        scatter(new, i, n, linear.new)
-        total = plus(total, record.weights[i], lever.wrench(cell, linear.traction))
-        by_twist = plus(
-            by_twist, record.weights[i], lever.around(cell, linear.traction_u)
-        )
-        _put_cell(
-            lever, bristle, cell, record.weights[i], linear, i, n, at(out, SLOPES)
-        )
-    put(out, total)
-    put_all(at(out, 3), by_twist)
 
 
 FUNCTIONS = factor, eliminate, back_substitute, change, solve_transposed, pull_back

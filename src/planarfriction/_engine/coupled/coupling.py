@@ -342,8 +342,10 @@ def _copy(
 
 
 @kernel
-def _restrain(patches: Patches, p: ContactSolve) -> None:
+def restrain(patches: Patches, p: ContactSolve) -> bool:
     """Scale wrenches that did not converge, so that they do no more work than the bristles give.
+
+    Return True if the bristles forget.
 
     The models' wrenches W at their twists V take at least `-W.V dt` from the bristles; under `s W` the host moves at
     `V_0 + s A W`. If that is more work at s = 1, s is that of the least; if it is still more, the bristles are let go,
@@ -355,6 +357,7 @@ def _restrain(patches: Patches, p: ContactSolve) -> None:
     work = 0.0
     begin = 0.0
     bends = 0.0
+    forget = False
     for i in range(n):
         move[i] = _applied(p.response, i, n, w, 0.0)
         work = work + w[i] * p.twist[i]
@@ -366,11 +369,11 @@ def _restrain(patches: Patches, p: ContactSolve) -> None:
             if bends > 0.0
             else 0.0
         )
-        if s * (begin + s * bends) > work:
-            clear(p.new, patches.states)
+        forget = s * (begin + s * bends) > work
         for i in range(n):
             w[i] = s * w[i]
             p.twist[i] = p.twist_0[i] + s * move[i]
+    return forget
 
 
 @kernel
@@ -470,8 +473,8 @@ def solve(patches_at: Place, problem_at: Place) -> None:
         if p.load[k] == 0.0:  # without load there is no memory
             for i in range(patches.firsts[k], patches.firsts[k + 1]):
                 p.new[i] = 0.0
-    if best > accepted and again:
-        _restrain(patches, p)
+    if best > accepted and again and restrain(patches, p):
+        clear(p.new, patches.states)
     unhang(patches, p)
     p.residual[0] = best
     p.converged[0] = 1.0 if best <= accepted else 0.0

@@ -15,7 +15,7 @@ from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, Place, at, doubles, integers
 from planarfriction._engine.coupled.coupling_rows import ContactSolve, Patches
 
-CELLS = -4
+CELLS = -2
 """Word of the numbers of cells, from the end of a `cells.CellsContact`."""
 
 

@@ -17,16 +17,12 @@ import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 
-from planarfriction._engine.codegen.vectors import clear, copy, plus, put, three, times
+from planarfriction._engine.codegen.vectors import clear, copy, put, three, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel, sequential_jit
 from planarfriction._engine.compiler.calls import call, pointer
 from planarfriction._engine.compiler.memory import Doubles, Place, at, reader
 from planarfriction._engine.protocol import SLOPES
-
-NUDGE = 1e-5
-"""Share of the load over which steps of a pad are compared for their slopes."""
-
 
 SCRATCH = 7
 """Numbers of the scratch of `step_many`: a twist, its load, and a wrench."""
@@ -159,30 +155,6 @@ def step_many(
 
 
 @kernel
-def _write_load_slopes(
-    table: Stepped, b: int, z: Doubles, inputs: Doubles, by_load: Doubles, unit: Doubles, new: Doubles
-) -> None:  # fmt: skip
-    """Write slopes of the new state and of the wrench by the load of a pad: central differences.
-
-    `new` and all behind it are scratch.
-    """
-    s = table.states
-    load = inputs[3]
-    record = _record(table, b)
-    wrench = at(new, s)
-    clear(by_load, s)
-    put(unit, (0.0, 0.0, 0.0))
-    for side in (-1.0, 1.0):
-        inputs[3] = load * (1.0 + side * NUDGE)
-        per = side * 0.5 / (NUDGE * load) if load > 0.0 else 0.0
-        call(table.function, (record, z, inputs, inputs[4], new, wrench))
-        for i in range(s):
-            by_load[i] += per * new[i]
-        put(unit, plus(three(unit), per * inputs[3], three(wrench)))
-    inputs[3] = load
-
-
-@kernel
 def _jacobians(
     table: Stepped, b: int, z: Doubles, inputs: Doubles, out: Doubles, new: Doubles
 ) -> None:
@@ -197,13 +169,14 @@ def _jacobians(
     by_load = at(by_twist, 3 * s)
     of_wrench = at(by_twist, 4 * s)
     wrench_twist = at(by_twist, 7 * s)
+    call(table.function, (record, z, inputs, dt, new, unit))
+    clear(by_load, s)
+    copy(unit, at(wrench_twist, 9), 3)
     if table.pad > 0 and load > 0.0:
-        _write_load_slopes(table, b, z, inputs, by_load, at(wrench_twist, 9), new)
-        call(table.function, (record, z, inputs, dt, new, unit))
-    else:
-        call(table.function, (record, z, inputs, dt, new, unit))
-        clear(by_load, s)
-        copy(unit, at(wrench_twist, 9), 3)
+        heavier = at(unit, SLOPES + 6 * s + table.square)
+        copy(heavier, by_load, s)
+        for i in range(3):
+            wrench_twist[9 + i] += load * heavier[s + i]
     for m in range(9):
         wrench_twist[m] = load * unit[3 + m]
     for m in range(3 * s):

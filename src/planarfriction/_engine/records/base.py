@@ -138,7 +138,7 @@ class CompiledModel:
         ]
         """Places and shapes of `StepJacobians` in the numbers that `coupled.steps.jacobians` writes for a contact."""
         self._per_contact = ends[-1]
-        self._scratch = 7 * n + self._square + 12
+        self._scratch = 8 * n + self._square + 15
 
     @property
     def bristles(self) -> CompiledModel:

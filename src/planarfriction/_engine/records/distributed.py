@@ -86,13 +86,9 @@ class CompiledDistributed(CompiledModel):
     def record(self, numbers: np.ndarray, weights: np.ndarray) -> tuple[Any, int]:
         """Return the record of a contact, and how many numbers of a linearisation each cell has."""
         matrices = MATRICES if self.sort == PAD else LINEAR
-        behind = {PLAIN: 0, LEANS: 2, PAD: 1}[self.sort]
-        rows = numbers[len(numbers) - behind :]
-        lean = rows if self.sort == LEANS else rows[:0]
-        stiff = rows if self.sort == PAD else rows[:0]
-        return CellsContact(
-            self.law.numbers, numbers.shape[1], numbers, lean, stiff, weights
-        ), matrices * self.size**2
+        rows, count = numbers.shape
+        contact = CellsContact(self.law.numbers, count, rows, numbers, weights)
+        return contact, matrices * self.size**2
 
     # ------------------------------------------------------------------ at given loads
 
@@ -127,9 +123,6 @@ class CompiledDistributed(CompiledModel):
         """Return cells with `numbers` `[R, numbers, n]` and `weights` `[R, n]` of their own in each row."""
         (record, _) = self.record(numbers[0], weights)
         columns = {"weights": places_of(weights), "cells": places_of(numbers)}
-        if self.sort == PAD:
-            last = numbers.strides[1] * (numbers.shape[1] - 1)
-            columns["stiff"] = places_of(numbers) + last
         rows = rows_of(record, len(weights), **columns)
         return packed._replace(records=rows, keepalive=(weights, numbers))
 
