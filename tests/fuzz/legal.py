@@ -30,6 +30,7 @@ TACTILE = (
     "slipping_area",
     "markers",
     "displacement",
+    "read",
 )
 """Functions of `tactile`."""
 
@@ -92,6 +93,11 @@ class Target(NamedTuple):
     call: Callable[..., Any]
     arguments: dict[str, Any]
     """Legal ones, by name."""
+
+
+def _recorded() -> pf.Solution:
+    """Return a solution with the bristles of its only contact."""
+    return pf.simulate(pf.scenes.driven(DISCS, t_end=0.02), bristles="all")
 
 
 def _log_file(path: str) -> str:
@@ -225,6 +231,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
             "above": 0.9,
             "points": [[0.0, 0.001]],
             "markers": Fresh(lambda: pf.tactile.markers(DISCS, [[0.0, 0.001]])),
+            "solution": Fresh(_recorded),
+            "contact": None,
         }
         for name in TACTILE
     },

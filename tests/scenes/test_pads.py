@@ -186,10 +186,12 @@ def test_an_equilibrium_follows_the_load(pad, patch=DISCS, load=1.3):
     )
 
 
+@pytest.mark.parametrize("pad", [Pad.at_load(1.0), Pad.layer(0.2e6, 3e-3)])
 @pytest.mark.parametrize("start", ["equilibrium", "sliding"])
-def test_a_scene_may_start_under_load_or_sliding(start):
+def test_a_scene_may_start_under_load_or_sliding(start, pad):
+    """Also on discs that stand for more cells."""
     law = LuGre(elasto_plastic=0.9)
-    model = ReducedModel(_GRID, law, pad=Pad.at_load(1.0))
+    model = ReducedModel(_GRID, law, pad=pad, cells=8)
     contact = Contact(model, 2.5, mounted_on="body")
     given = (
         {"force": (1.5, 0.2, 0.0)}
