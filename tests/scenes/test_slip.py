@@ -174,6 +174,26 @@ def test_incipient_slip_of_few_discs_is_coarse_and_early():
     assert onset == pytest.approx(0.9 ** (1 / 3), abs=0.06)
 
 
+def test_incipient_slip_of_a_half_space_comes_late():
+    """The pieces slip outside c with `u = (1 - c^2)^(1/2)` at `d/d_1 = 2 u^2 - u^3`, `Q/(mu f_N) = 3 u^2 - 2 u^3`.
+
+    A tenth of the load slips at u^3 = 0.1, at 0.45 of the limit. A half-space slips there from 0.31 on (Cattaneo and
+    Mindlin, `c = (1 - Q/(mu f_N))^(1/3)`), and for nine tenths both are within a hundredth.
+    """
+    modulus, ratio, load = 0.2e6, 0.49, 3.0
+    full = 3.0 * (2.0 - ratio) * 0.8 * load / (16.0 * modulus * RADIUS)
+    pad = pf.Pad.half_space(modulus, ratio)
+    model = pf.DistributedModel(fingertip(31), SHARP, pad=pad)
+    shares = np.array(dragged(model, full))
+    u = np.array([0.1, 0.9]) ** (1.0 / 3.0)
+    assert shares == pytest.approx(2.0 * u**2 - u**3, abs=0.03)
+    forces = 1.0 - (1.0 - shares) ** 1.5
+    exact = 1.0 - (1.0 - u**2) ** 1.5
+    assert forces == pytest.approx(3.0 * u**2 - 2.0 * u**3, abs=0.03)
+    assert exact == pytest.approx([0.305, 0.982], abs=1e-3)
+    assert forces[1] == pytest.approx(exact[1], abs=0.02)
+
+
 @pytest.mark.parametrize("model", MODELS[:3], ids=lambda m: type(m).__name__)
 def test_without_a_pad_all_cells_of_a_shift_slip_together(model):
     """Bristles of the law reach their limit at one displacement, mu_c/sigma_0."""

@@ -71,7 +71,7 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
     twists = solution.contact_twist(contact.name)
     share, slipping = slip_shares(contact.model, recorded.values, twists, loads)
     above = share - SLIPS
-    if contact.model.pad is not None:
+    if getattr(contact.model, "pad", None) is not None:
         above = slipping - (1.0 - INCIPIENT)
     sliding = twist_at(twists, centres(contact.model.patch, loads))
     speed = np.hypot(sliding[:, 0], sliding[:, 1])
@@ -111,7 +111,15 @@ def slip_shares(
         return share, slipping
     args = twists[loaded], loads[loaded]
     motion = model.rate(np.zeros_like(states[loaded]), *args)
-    left = motion - model.rate(states[loaded], *args)
+    rate = model.rate(states[loaded], *args)
+    few = getattr(model, "reduction", None)
+    of_cells = isinstance(few, MODELS["distributed"])
+    if of_cells:
+        motion, _ = parted(few, motion)
+        rate, face = parted(few, rate)
+        # Cells see the face of a pad, which stays behind.
+        motion = motion - np.einsum("nda,...a->...dn", few.patch.levers(), face)
+    left = motion - rate
     weights = _weights(model, loads[loaded])
     size, slipped = (
         np.sqrt((weights * each**2).reshape(len(each), -1).sum(axis=1))
@@ -120,8 +128,8 @@ def slip_shares(
     share[loaded] = np.minimum(
         np.where(size > 0.0, slipped / np.where(size > 0.0, size, 1.0), 0.0), 1.0
     )
-    if isinstance(model.reduction, MODELS["distributed"]):
-        shares = model.reduction.patch.weights(loads[loaded])
+    if of_cells:
+        shares = few.patch.weights(loads[loaded])
         slips = np.linalg.norm(left, axis=1) > SLIPS * np.linalg.norm(motion, axis=1)
         slipping[loaded] = (shares * slips).sum(axis=-1)
     return share, slipping
@@ -144,7 +152,7 @@ def _weights(model: Any, loads: np.ndarray) -> np.ndarray:
         return np.stack(
             [np.ones_like(radius), np.ones_like(radius), radius**-2], axis=1
         )
-    return np.ones((1, *shape))
+    return np.ones(())
 
 
 def centres(patch: Any, loads: np.ndarray) -> np.ndarray:
@@ -176,8 +184,9 @@ def _stretches(time: np.ndarray, above: np.ndarray) -> list[tuple[float, float]]
 
 def bristles_of(model: Any) -> DistributedModel | None:
     """Return the distributed model of a contact's patch, law and pad; None where they have no bristles."""
+    pad = getattr(model, "pad", None)
     try:
-        return MODELS["distributed"](model.patch, model.law, pad=model.pad)
+        return MODELS["distributed"](model.patch, model.law, pad=pad)
     except InvalidValueError:
         return None
 
@@ -185,7 +194,7 @@ def bristles_of(model: Any) -> DistributedModel | None:
 def parted(
     bristles: DistributedModel, state: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the deflections of bristles `[..., d, N]` and the displacement of their face against its back `[..., 3]`."""
+    """Return the deflections of bristles `[..., d, N]` and the displacement of their face `[..., 3]`."""
     shape = bristles.patch.bristles, bristles.patch.cells
     batch = state.shape[: state.ndim - len(bristles.state_shape)]
     if bristles.state_shape == shape:
@@ -206,8 +215,8 @@ def slip_field(
 
     `displacements` `[T - 1, 3]` [m, m, rad] are those of the body on the contact from one of `times` `[T]` [s] to the
     next, in the frame of the contact; `loads` are `[T]` [N]; `first` `[3]` is the first twist [m/s, m/s, rad/s]. A
-    cell displaced by `u` while its bristle goes from z_0 to z_1 slips by `u - (z_1 - z_0)`, less the displacement of
-    the face of a pad with a common compliance.
+    cell displaced by `u` while its bristle goes from z_0 to z_1 slips by `u - (z_1 - z_0)`; the face of a pad with a
+    common compliance moves less than the body.
     """
     law = bristles.law.numbers
     count = len(bristles.patch.positions)
@@ -232,11 +241,9 @@ def slip_field(
             state, step / dt, max(0.5 * (loads[k] + loads[k + 1]), 0.0), dt
         )
         z, face = parted(bristles, state)
-        moved = (levers @ step).T
-        length = np.linalg.norm(moved, axis=0)
-        distance += length
-        slid = (levers @ (step - (face - behind))).T
-        slip += np.linalg.norm(slid - (z - before), axis=0)
+        moved = (levers @ (step - (face - behind))).T
+        distance += np.linalg.norm(moved, axis=0)
+        slip += np.linalg.norm(moved - (z - before), axis=0)
         if frame < len(frames) and k + 1 == frames[frame]:
             bent[frame] = _bent(factor[k + 1] * z, moved.T / dt, lean, law)
             slips[frame] = (slip > SLIPS * distance) & (distance > AT_REST * largest)
