@@ -49,6 +49,7 @@ SKIPPED = {
     "planning.plan_grip": "plans for a second; tests/planning/test_grip.py attacks it",
     "planning.plan_push": "plans for seconds; tests/planning/test_pushing.py attacks it",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
+    "identify.identify_pad": "fits for a second; tests/identify/test_pads.py attacks it",
     "identify.current_estimate": "takes what a fit returns",
     "joints.identify_joint": "fits for a second; tests/joints attacks it",
     "joints.apply_to_spec": "takes a model of MuJoCo; see tests/joints/test_joint_hosts.py",
@@ -62,7 +63,7 @@ RECORDS = """
     Identification Verdict MotionPlan GripPlan GripReport HoldPlan Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     GridError LimitSurface FrictionLaw RateLaw FrictionModel Pressure HostStep Measurement Estimate
-    JointFit Markers
+    JointFit Markers PadFit
 """
 """Classes that the library makes itself, bases of families, and `HostStep` and `Measurement`, which
 are checked where they are used."""
