@@ -237,6 +237,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         }
         for name in TACTILE
     },
+    "plots.plot_slip": {"contact": None, "times": [0.0, 0.01], "size": None},
     "Spring": {"stiffness": 10.0, "anchor": (0.0, 0.0, 0.0), "at": (0.0, 0.0)},
     "Slider": {"outline": SQUARE},
     "Slider.gaps": {"point": (0.0, 0.0)},
