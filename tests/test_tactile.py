@@ -234,3 +234,38 @@ def test_a_field_needs_cells():
         tactile.markers(model, [0.0, 0.0, 0.0])
     with refused("above .* between 0 and 1"):
         tactile.slipping_area(model, model.rest(), np.zeros(3), 1.0, above=1.0)
+
+
+def test_a_solution_is_read_at_all_samples(tmp_path):
+    """Forces add up to the recorded wrench, and everything is as the functions return it; also from a file."""
+    model = MODELS["layer"]
+    plate = pf.scenes.in_hand(model, normal_force=2.0, t_end=0.1)
+    run = pf.simulate(plate, bristles="all")
+    points = [[0.0, 0.0], [0.004, 0.006]]
+    read = tactile.read(run, points=points)
+    assert set(read.data) - set(run.data) == {
+        f"{name}_fingers" for name in ("slip_ratio", "forces", "displacement")
+    }
+    data = read.data
+    levers = model.patch.levers()
+    wrench = np.einsum("nia,tin->ta", levers, data["forces_fingers"].values)
+    columns = [run.data[name].values[:, 0] for name in ("fx", "fy", "tau")]
+    np.testing.assert_allclose(wrench, np.stack(columns, -1), rtol=0, atol=1e-12)
+    state, load = run.data["bristles_fingers"].values, 2.0
+    ratio = tactile.slip_ratio(model, state, run.contact_twist(), load)
+    np.testing.assert_array_equal(data["slip_ratio_fingers"], ratio)
+    moved = tactile.displacement(model, state, tactile.markers(model, points))
+    np.testing.assert_array_equal(data["displacement_fingers"], moved)
+    assert np.abs(moved).max() > 1e-6
+    again = pf.Solution.load(read.save(tmp_path / "read.nc"))
+    assert again.data.identical(data)
+
+
+def test_what_a_reading_needs_is_said_in_one_line():
+    run = pf.simulate(pf.scenes.driven(MODELS["cells"], t_end=0.02))
+    with refused("bristles must be recorded for fields"):
+        tactile.read(run)
+    with refused("contact must be one of patch, got 'hand'"):
+        tactile.read(run, "hand")
+    with refused("solution must be a Solution, got 3"):
+        tactile.read(3)

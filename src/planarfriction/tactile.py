@@ -7,6 +7,7 @@ differentiable in the latter two. A field has one value for each cell of a `Dist
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ from planarfriction.laws.base import refuse_rate_law
 from planarfriction.models import DistributedModel, FrictionModel
 from planarfriction.pads import HalfSpace
 from planarfriction.patch.discs import clusters_of
+from planarfriction.scenes.slip import parted
+from planarfriction.scenes.solution import History, Solution, scene_of
 from planarfriction.tensors import distributed
 from planarfriction.tensors.elements import joined, split
 from planarfriction.tensors.models import CellsModel
@@ -190,6 +193,54 @@ def displacement(model: Any, state: Any, markers: Markers) -> Any:
     )
 
 
+def read(
+    solution: Solution, contact: str | None = None, *, points: ArrayLike | None = None
+) -> Solution:
+    """Return a solution whose `data` hold the fields of a contact at all samples too.
+
+    Variables `slip_ratio_<contact>` `[T, N]` [-] and `forces_<contact>` `[T, d, N]` [N], and with `points` `[P, 2]` [m]
+    in the contact frame `displacement_<contact>` `[T, P, 2]` [m], as the functions of these names return them.
+    `contact` is a name; None takes the only one. Bristles have to be recorded: `simulate(scene, bristles="all")`.
+
+    Raises InvalidValueError if they are not, for a contact that does not exist, and as these functions do; FileError
+    for a solution without its scene.
+    """
+    validation.instance("solution", solution, Solution, "a Solution")
+    index = solution.contact_index(contact)
+    chosen = scene_of(solution, "a field").contacts[index]
+    recorded = solution.histories.get(f"bristles_{chosen.name}")
+    if recorded is None:
+        rule = "be recorded for fields: simulate(scene, bristles='all')"
+        raise InvalidValueError("bristles", rule, "none")
+    twist = solution.contact_twist(chosen.name)
+    load = np.maximum(solution.histories["normal_force"].values[:, index], 0.0)
+    at = recorded.values, twist, load
+    cell = f"cell_{chosen.name}"
+    new = {
+        "slip_ratio": History(
+            ("time", cell),
+            slip_ratio(chosen.model, *at),
+            {"units": "1", "long_name": "deflection over its limit"},
+        ),
+        "forces": History(
+            ("time", "component", cell),
+            forces(chosen.model, *at),
+            {"units": "N", "long_name": "friction on the body, cell by cell"},
+        ),
+    }
+    if points is not None:
+        moved = displacement(chosen.model, at[0], markers(chosen.model, points))
+        new["displacement"] = History(
+            ("time", f"marker_{chosen.name}", "xy"),
+            moved,
+            {"units": "m", "long_name": "displacement of markers on the face of a pad"},
+        )
+    named = {f"{name}_{chosen.name}": each for name, each in new.items()}
+    return dataclasses.replace(
+        solution, histories={**dict(solution.histories), **named}
+    )
+
+
 def _by_forces(
     model: FrictionModel, few: DistributedModel, pad: HalfSpace, points: np.ndarray
 ) -> np.ndarray:
@@ -264,10 +315,7 @@ def _bristles(model: Any, state: Any) -> tuple[Any, Any]:
         return model.xp, z
     few = _cells_of(model)
     z, *_ = few._inputs(state, np.zeros(3), 0.0)
-    shape = few.patch.bristles, few.patch.cells
-    if z.ndim and few.state_shape != shape:
-        z = z[..., :-3].reshape(*z.shape[:-1], *shape)
-    return NUMPY, z
+    return NUMPY, parted(few, z)[0]
 
 
 def _contact(model: Any, state: Any, twist: Any, normal_force: Any) -> _Contact:

@@ -113,6 +113,17 @@ def pushing(made, folder, monkeypatch):
     assert made.PAGE.read_text().count("\n| ") == 1 + len(made.BOARDS)
 
 
+def incipient(made, folder, monkeypatch):
+    monkeypatch.setattr(made, "PAGE", folder / "online-trials.md")
+    monkeypatch.setattr(made, "PARTS", 16)
+    monkeypatch.setattr(made, "RESERVES", (1.4,))
+    monkeypatch.setattr(made.incipient, "least_reserve", lambda *_: 1.5)
+    made.PAGE.write_text("<!-- incipient slip -->\n\n| old |\n\nNext.\n")
+    made.main()
+    text = made.PAGE.read_text()
+    assert text.count("| 1.50 |") == 3 and text.endswith("|\n\nNext.\n")
+
+
 def joint(made, folder, monkeypatch):
     monkeypatch.setattr(made, "T_END", 1.0)
     # The other picture is that of a fit, which test_joints makes.
@@ -121,7 +132,7 @@ def joint(made, folder, monkeypatch):
 
 MAKERS = {
     f"make_{make.__name__}": make
-    for make in (beside, coverage, images, joint, measured, moving, pushing)
+    for make in (beside, coverage, images, incipient, joint, measured, moving, pushing)
 }
 SLOW = {"make_explorer": explorer}
 

@@ -212,6 +212,20 @@ def test_a_grip_whose_load_swings_keeps_still_with_a_fixed_stiffness(
     )
 
 
+def test_a_disc_on_a_layer_slides_as_in_mujoco():
+    """All stiffness is that of the pad, none that of the law; 0.17 m and 1.9 rad."""
+    scene = disc(1.0, 10.0)
+    layer = pf.Pad.layer(2e5, 2e-3)
+    both = Both(scene, model=dataclasses.replace(scene.model, pad=layer))
+    ours, theirs = both.run(0.25)
+    assert np.ptp(theirs, axis=0).max() > 0.1
+    np.testing.assert_allclose(ours[:, 0], theirs, atol=2e-6)
+    wrench = both.theirs.wrenches(both.d).ravel()
+    assert np.abs(both.ours.wrenches().numpy()[0] - wrench).max() < 1e-5 * 4.0
+    with refused("parameters key must be one of"):
+        Both(scene, model=both.theirs.patches[0].model, parameters={"sigma_0": 1e5})
+
+
 @SLOW
 def test_a_gripper_of_four_bar_linkages_holds():
     """Within 1 um and 0.001 degrees for 10 s, 12 mm beside the centre of mass, once its fingers have yielded."""

@@ -30,6 +30,7 @@ TACTILE = (
     "slipping_area",
     "markers",
     "displacement",
+    "read",
 )
 """Functions of `tactile`."""
 
@@ -48,6 +49,7 @@ SKIPPED = {
     "planning.plan_grip": "plans for a second; tests/planning/test_grip.py attacks it",
     "planning.plan_push": "plans for seconds; tests/planning/test_pushing.py attacks it",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
+    "identify.identify_pad": "fits for a second; tests/identify/test_pads.py attacks it",
     "identify.current_estimate": "takes what a fit returns",
     "joints.identify_joint": "fits for a second; tests/joints attacks it",
     "joints.apply_to_spec": "takes a model of MuJoCo; see tests/joints/test_joint_hosts.py",
@@ -61,7 +63,7 @@ RECORDS = """
     Identification Verdict MotionPlan GripPlan GripReport HoldPlan Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     GridError LimitSurface FrictionLaw RateLaw FrictionModel Pressure HostStep Measurement Estimate
-    JointFit Markers
+    JointFit Markers PadFit
 """
 """Classes that the library makes itself, bases of families, and `HostStep` and `Measurement`, which
 are checked where they are used."""
@@ -92,6 +94,11 @@ class Target(NamedTuple):
     call: Callable[..., Any]
     arguments: dict[str, Any]
     """Legal ones, by name."""
+
+
+def _recorded() -> pf.Solution:
+    """Return a solution with the bristles of its only contact."""
+    return pf.simulate(pf.scenes.driven(DISCS, t_end=0.02), bristles="all")
 
 
 def _log_file(path: str) -> str:
@@ -225,9 +232,12 @@ SPECIAL: dict[str, dict[str, Any]] = {
             "above": 0.9,
             "points": [[0.0, 0.001]],
             "markers": Fresh(lambda: pf.tactile.markers(DISCS, [[0.0, 0.001]])),
+            "solution": Fresh(_recorded),
+            "contact": None,
         }
         for name in TACTILE
     },
+    "plots.plot_slip": {"contact": None, "times": [0.0, 0.01], "size": None},
     "Spring": {"stiffness": 10.0, "anchor": (0.0, 0.0, 0.0), "at": (0.0, 0.0)},
     "Slider": {"outline": SQUARE},
     "Slider.gaps": {"point": (0.0, 0.0)},

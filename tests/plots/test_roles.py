@@ -36,6 +36,8 @@ SHOWN = {
     "measured-pushes.png": (style.MEASURED, style.ELLIPSOID, style.DISTRIBUTED),
     "pre-sliding-cycles.png": (style.REDUCED, style.PUBLISHED),
     "pushing.png": (style.MEASURED, style.ELLIPSOID, style.SLIPS),
+    "slip.png": (style.STICKS, style.SLIPS, style.REDUCED),
+    "slip.gif": (style.SLIPS, style.REDUCED),
     "timing-work-precision.png": (style.REDUCED,),
 }
 """Picture of the pages -> roles that its figure shows."""

@@ -1,14 +1,18 @@
 """Scenes with pads, in the solver."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+from planarfriction.derivatives import scene_sensitivities
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel, ReducedModel
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
-from planarfriction.scenes import Body, Contact, Scene, Signal, simulate
+from planarfriction.scenes import Body, Contact, Scene, Signal, driven, simulate
 from planarfriction.scenes.start import first_slopes, first_states
+from planarfriction.sliding_body import SlidingBody
 from tests.support.refusals import refused
 
 ONE = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
@@ -186,10 +190,12 @@ def test_an_equilibrium_follows_the_load(pad, patch=DISCS, load=1.3):
     )
 
 
+@pytest.mark.parametrize("pad", [Pad.at_load(1.0), Pad.layer(0.2e6, 3e-3)])
 @pytest.mark.parametrize("start", ["equilibrium", "sliding"])
-def test_a_scene_may_start_under_load_or_sliding(start):
+def test_a_scene_may_start_under_load_or_sliding(start, pad):
+    """Also on discs that stand for more cells."""
     law = LuGre(elasto_plastic=0.9)
-    model = ReducedModel(_GRID, law, pad=Pad.at_load(1.0))
+    model = ReducedModel(_GRID, law, pad=pad, cells=8)
     contact = Contact(model, 2.5, mounted_on="body")
     given = (
         {"force": (1.5, 0.2, 0.0)}
@@ -243,8 +249,108 @@ def test_a_pressure_that_follows_the_load_refuses():
         simulate(Scene(_body(), contact, 0.01))
 
 
-def test_a_common_compliance_refuses():
-    law = LuGre(sigma_1=0.0, elasto_plastic=0.9)
-    contact = Contact(DistributedModel(_GRID, law, pad=Pad.measured(1e4, 0.5)), 1.0)
-    with refused("pad must have no common compliance"):
-        simulate(Scene(_body(), contact, 0.01))
+HERTZ = ContactPatch.disc(
+    0.01, 11, pressure=lambda x, y: np.maximum(1e-4 - x * x - y * y, 0.0) ** 0.5
+)
+SPRINGS = LuGre(mu_c=0.8, sigma_1=0.0, sigma_2=2.0, elasto_plastic=0.9)
+FACES = {
+    "half-space": ReducedModel(HERTZ, SPRINGS, pad=Pad.half_space(0.2e6, 0.45)),
+    "measured": DistributedModel(DISCS, SPRINGS, pad=Pad.measured(4e3, common=0.4)),
+}
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_a_face_behind_a_common_compliance_moves_as_in_steps(name):
+    """A shift with a turn under a load that falls to nothing and comes back; steps of first order, extrapolated."""
+    model = FACES[name]
+    twist = np.array([1e-3, -4e-4, 0.2])
+    times, loads = [0.0, 0.1, 0.2, 0.25, 0.3, 0.4], [3.0, 3.0, 1.0, 0.0, 0.0, 3.0]
+    scene = driven(
+        model, twist=twist, normal_force=Signal(times, loads, "linear"), t_end=0.4,
+        at="origin",
+    )  # fmt: skip
+    data = simulate(scene, save_every=0.05, rtol=1e-8, atol=1e-8, bristles="all").data
+    states = data[f"bristles_{scene.contacts[0].name}"].values
+    found = np.stack([data[each].values[:, 0] for each in ("fx", "fy", "tau")], -1)
+
+    def stepped(steps):
+        state = model.rest()
+        kept = []
+        for k in range(8 * steps):
+            now = np.interp((k + 1) * 0.05 / steps, times, loads)
+            state, wrench = model.step(state, twist, now, 0.05 / steps)
+            if k % steps == steps - 1:
+                kept.append((wrench, state[-3:]))
+        return [np.array(each) for each in zip(*kept, strict=True)]
+
+    fine = zip(stepped(1000), stepped(500), strict=True)
+    (wrench, face) = (2.0 * new - old for new, old in fine)
+    size = np.abs(face).max(axis=0) + 1e-9
+    off = np.abs(states[1:, -3:] - face) / size
+    # In a falling load, bristles lag behind their limit by r mu_s/(l sigma_0 v_r), 0.003 here, and faces by T.
+    falls = np.isin(np.arange(8), [2, 3, 4])
+    wrong = np.abs(found[1:] - wrench) / (0.8 * 3.0 * np.array([1.0, 1.0, 0.01]))
+    assert (wrong[~falls] < 1e-4).all() and (wrong[falls] < 5e-3).all()
+    assert (off[~falls] < 1e-4).all() and (off[falls] < 3e-2).all()
+    assert not found[6].any() and np.abs(found[4]).max() > 0.05
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_rates_behind_a_common_compliance_are_those_of_short_steps(name):
+    """Their first order in dt, and the wrench that the displacement of the face asks for, `-C^-1 (b + T b')`."""
+    model = FACES[name]
+    twist, load = np.array([0.01, 0.002, 0.3]), np.array([2.0, 0.7])
+    state = model.rest(2)
+    for _ in range(20):
+        state, _ = model.step(state, twist, load, 2e-4)
+    rate = model.rate(state, twist, load)
+    errors = []
+    for dt in (1e-6, 1e-7):
+        new, _ = model.step(state, twist, load, dt)
+        errors.append(np.abs((new - state) / dt - rate).max() / np.abs(rate).max())
+    assert errors[0] < 1e-3 and errors[1] == pytest.approx(0.1 * errors[0], rel=0.05)
+    few = model.reduction
+    compliance = few.pad.compliance(few.patch)
+    wrench = model.wrench(state, twist, load)
+    behind = state[:, -3:] + few.pad.lag * rate[:, -3:]
+    np.testing.assert_allclose(
+        -wrench @ compliance, behind, rtol=1e-9, atol=1e-9 * np.abs(behind).max()
+    )
+
+
+def test_a_body_between_two_half_spaces_moves_as_in_steps():
+    model = FACES["half-space"]
+    places = [(0.02, 0.0), (-0.02, 0.0)]
+    force = (1.5, 0.3, 0.02)
+    contacts = [
+        Contact(model, 2.0, mounted_on="body", position=place, name=f"{place[0]}")
+        for place in places
+    ]
+    body = _body(0.2)
+    data = simulate(Scene(body, contacts, 0.05, force=force), rtol=1e-7, atol=1e-8).data
+    found = [data[each].values[-1] for each in ("x", "y", "theta")]
+    two = SlidingBody(0.2, 1e-4, [model, model], positions=places)
+
+    def stepped(steps):
+        state, twist, pose = two.rest(), np.zeros(3), np.zeros(3)
+        dt = 0.05 / steps
+        for _ in range(steps):
+            state, twist, _ = two.step(
+                state, twist, [2.0, 2.0], dt, wrench=force, angle=pose[2]
+            )
+            pose = pose + dt * twist
+        return pose
+
+    limit = 2.0 * stepped(2000) - stepped(1000)
+    np.testing.assert_allclose(found, limit, rtol=5e-4)
+
+
+def test_what_knows_no_common_compliance_says_so():
+    model = FACES["measured"]
+    scene = Scene(_body(), Contact(model, 1.0), 0.01, force=(0.1, 0.0, 0.0))
+    with refused("pad must have no common compliance for derivatives of scenes"):
+        scene_sensitivities(scene, ["mu"])
+    with refused("pad must have no common compliance for a start under load"):
+        simulate(dataclasses.replace(scene, start="equilibrium"))
+    with refused("moments must be None for rates on a pad"):
+        model.rate(model.rest(), np.zeros(3), 1.0, moments=(1e-3, 0.0))

@@ -7,7 +7,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import FileError
-from planarfriction.scenes.slip import _stretches, centres, reach, slip_fraction
+from planarfriction.scenes.slip import _stretches, centres, reach, slip_shares
 from tests.support.refusals import refused
 
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
@@ -120,11 +120,88 @@ def test_the_share_that_slips_counts_loads():
     states[0, 0, 0] = full
     states[1, 0, 1] = full
     states[2, 0] = full
-    share = slip_fraction(model, states, twist, np.array([2.0, 2.0, 2.0, 0.0]))
+    loads = np.array([2.0, 2.0, 2.0, 0.0])
+    share, slipping = slip_shares(model, states, twist, loads)
     assert share == pytest.approx(np.sqrt([0.25, 0.75, 1.0, 1.0]), rel=1e-9)
-    assert slip_fraction(model, states, 0.0 * twist, np.ones(4)) == pytest.approx(
-        np.zeros(4)
+    assert slipping == pytest.approx([0.25, 0.75, 1.0, 1.0], rel=1e-12)
+    for each in slip_shares(model, states, 0.0 * twist, np.ones(4)):
+        assert each == pytest.approx(np.zeros(4))
+
+
+def fingertip(cells):
+    """A circle under the pressure of Hertz, p_0 (1 - r^2)^(1/2)."""
+
+    def pressure(x, y):
+        return np.maximum(1.0 - (x * x + y * y) / RADIUS**2, 0.0) ** 0.5
+
+    return pf.ContactPatch.disc(RADIUS, cells, pressure=pressure)
+
+
+RADIUS = 0.01
+SHARP = pf.LuGre(mu_c=0.8, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.99)
+LAYER = pf.Pad.layer(shear_modulus=0.2e6, thickness=3e-3)
+
+
+def dragged(model, full):
+    """The event of a contact under 3 N that is dragged by 1.3 `full` [m], its times as shares of that."""
+    speed = 1e-3
+    scene = pf.scenes.driven(
+        model, twist=(speed, 0.0, 0.0), normal_force=3.0, t_end=1.3 * full / speed
     )
+    run = pf.simulate(scene, bristles="all", save_every=full / speed / 200)
+    (event,) = run.slip_events()
+    return event.incipient * speed / full, event.onset * speed / full
+
+
+def test_a_pad_slips_partly_before_it_slips_as_a_whole():
+    """A layer under Hertz pressure slips outside the radius c at the displacement `d/d_1 = (1 - c^2)^(1/2)`.
+
+    That ring has the share `(1 - c^2)^(3/2)` of the load, so that a tenth and nine tenths slip at the cube roots of
+    these. Cells of the grid and bristles that yield from 0.99 of their limit on blur that.
+    """
+    full = 0.8 * 1.5 * 3.0 / (np.pi * RADIUS**2) / (0.2e6 / 3e-3)
+    model = pf.DistributedModel(fingertip(41), SHARP, pad=LAYER)
+    incipient, onset = dragged(model, full)
+    assert incipient == pytest.approx(0.1 ** (1 / 3), abs=0.02)
+    assert onset == pytest.approx(0.9 ** (1 / 3), abs=0.02)
+
+
+def test_incipient_slip_of_few_discs_is_coarse_and_early():
+    """Each disc of the rim has more than a twentieth of the load: all slips when it does."""
+    full = 0.8 * 1.5 * 3.0 / (np.pi * RADIUS**2) / (0.2e6 / 3e-3)
+    incipient, onset = dragged(pf.ReducedModel(fingertip(21), SHARP, pad=LAYER), full)
+    assert 0.25 < incipient < 0.1 ** (1 / 3) + 0.05
+    assert onset == pytest.approx(0.9 ** (1 / 3), abs=0.06)
+
+
+def test_incipient_slip_of_a_half_space_comes_late():
+    """The pieces slip outside c with `u = (1 - c^2)^(1/2)` at `d/d_1 = 2 u^2 - u^3`, `Q/(mu f_N) = 3 u^2 - 2 u^3`.
+
+    A tenth of the load slips at u^3 = 0.1, at 0.45 of the limit. A half-space slips there from 0.31 on (Cattaneo and
+    Mindlin, `c = (1 - Q/(mu f_N))^(1/3)`), and for nine tenths both are within a hundredth.
+    """
+    modulus, ratio, load = 0.2e6, 0.49, 3.0
+    full = 3.0 * (2.0 - ratio) * 0.8 * load / (16.0 * modulus * RADIUS)
+    pad = pf.Pad.half_space(modulus, ratio)
+    model = pf.DistributedModel(fingertip(31), SHARP, pad=pad)
+    shares = np.array(dragged(model, full))
+    u = np.array([0.1, 0.9]) ** (1.0 / 3.0)
+    assert shares == pytest.approx(2.0 * u**2 - u**3, abs=0.03)
+    forces = 1.0 - (1.0 - shares) ** 1.5
+    exact = 1.0 - (1.0 - u**2) ** 1.5
+    assert forces == pytest.approx(3.0 * u**2 - 2.0 * u**3, abs=0.03)
+    assert exact == pytest.approx([0.305, 0.982], abs=1e-3)
+    assert forces[1] == pytest.approx(exact[1], abs=0.02)
+
+
+@pytest.mark.parametrize("model", MODELS[:3], ids=lambda m: type(m).__name__)
+def test_without_a_pad_all_cells_of_a_shift_slip_together(model):
+    """Bristles of the law reach their limit at one displacement, mu_c/sigma_0."""
+    speed, full = 1e-4, 0.5 / 1e5
+    scene = pf.scenes.driven(model, twist=(speed, 0.0, 0.0), t_end=10 * full / speed)
+    run = pf.simulate(scene, bristles="all", save_every=full / speed / 20)
+    (event,) = run.slip_events()
+    assert event.incipient == pytest.approx(event.onset, abs=0.1 * full / speed)
 
 
 def test_centres_follow_the_load_and_stay_where_there_is_none():

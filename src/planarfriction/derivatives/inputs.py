@@ -105,7 +105,9 @@ def step_at(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Take step t of a rollout at loads `[..., T]` or a given pressure."""
     if given is None:
-        return model.step(state, twist, load[..., t], dt)
+        now = load[..., t]
+        # Plain numbers take the fast door of a step.
+        return model.step(state, twist, now if now.ndim else float(now), float(dt))
     return model.step(state, twist, None, dt, loads=given.at(t))
 
 

@@ -19,6 +19,7 @@ from planarfriction._support import validation
 from planarfriction._support.equality import ByValue
 from planarfriction.derivatives.scene_inputs import SceneInputs
 from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.models.base import refuse_common
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene, SolverOptions
 from planarfriction.solvers import RODAS4
@@ -90,6 +91,7 @@ class MotionPath:
         self.scene = scene
         self.inputs = inputs
         for contact in scene.contacts:
+            refuse_common(contact.model, "derivatives of scenes")
             if contact.edge:
                 raise InvalidValueError(
                     f"edge of contact {contact.name!r}",

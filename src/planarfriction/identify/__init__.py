@@ -1,7 +1,7 @@
 """Identification: parameters of the friction models from measurements, with their uncertainty.
 
-`identify_lugre` reads logs of motion and wrench, `identify_motion` slides without a force sensor; `design_experiment`
-suggests which motion to measure next.
+`identify_lugre` reads logs of motion and wrench, `identify_pad` those of an elastic pad, `identify_motion` slides
+without a force sensor; `design_experiment` suggests which motion to measure next.
 """
 
 from planarfriction.identify.experiments import (
@@ -12,6 +12,7 @@ from planarfriction.identify.experiments import (
 )
 from planarfriction.identify.logs import Log, differentiated
 from planarfriction.identify.motion import identify_motion
+from planarfriction.identify.pads import PadFit, identify_pad
 from planarfriction.identify.problem import FitOptions
 from planarfriction.identify.result import Identification
 from planarfriction.identify.slides import (
@@ -29,6 +30,7 @@ __all__ = [
     "Log",
     "MassProperties",
     "MotionPlan",
+    "PadFit",
     "Slide",
     "Verdict",
     "candidate_motions",
@@ -38,6 +40,7 @@ __all__ = [
     "fit_start",
     "identify_lugre",
     "identify_motion",
+    "identify_pad",
     "predict_slide",
 ]
 __dir__ = __all__.copy

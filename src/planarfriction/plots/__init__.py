@@ -14,6 +14,7 @@ from planarfriction.plots.limit_surface import (
 from planarfriction.plots.motion import plot_motion, plot_solution
 from planarfriction.plots.patch import plot_patch
 from planarfriction.plots.sections import plot_sections
+from planarfriction.plots.slip import plot_slip
 
 __all__ = [
     "animate_solution",
@@ -23,6 +24,7 @@ __all__ = [
     "plot_motion",
     "plot_patch",
     "plot_sections",
+    "plot_slip",
     "plot_solution",
 ]
 __dir__ = __all__.copy

@@ -14,7 +14,7 @@ from planarfriction._engine.protocol import calls_of
 from planarfriction._engine.records.packed import PackedModel
 from planarfriction._engine.records.partial_contact import STATES, following, under_edge
 from planarfriction.errors import InvalidValueError
-from planarfriction.models.base import refuse_common, refuse_pad
+from planarfriction.models.base import refuse_pad
 from planarfriction.scenes.contact import Contact
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between, displacement
 from planarfriction.scenes.start import first_slopes, first_states
@@ -42,7 +42,6 @@ def packed_contact(
 
     `outline` is that of the body, for contacts with an edge.
     """
-    refuse_common(contact.model, "scenes")
     packed = contact.model.packed(loads, between)
     if contact.edge:
         refuse_pad(contact.model, "an edge")
@@ -243,7 +242,9 @@ class SegmentBatches:
             state=_starts([model.states for model in self.models]),
             linear=_starts([model.workspace for model in self.models]),
             stiff=np.array([model.stiff for model in self.models]),
-            bristle=np.array([contact.model.state_shape[0] for contact in contacts]),
+            bristle=np.array(
+                [each.model.reduction.patch.bristles for each in contacts]
+            ),
         )
         laws = [contact.model.law for contact in contacts]
         peaks = [self._pieces.largest(c) for c in range(len(contacts))]

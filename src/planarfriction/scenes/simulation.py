@@ -175,14 +175,18 @@ def _histories(
             dims = ("time", "component")
             units = contact.model.state_units
             if cells is not None:
-                size = contact.model.state_shape[0]
+                few = contact.model.reduction
+                size = few.patch.bristles
                 # Without the place of the pressure.
-                bent = values[:, : size * cells.sum()]
+                bent, behind = np.split(values, [size * cells.sum()], axis=1)
                 values = np.zeros((len(bent), size, len(cells)))
                 values[:, :, cells] = bent.reshape(len(bent), size, -1)
                 axis = "axis" if size == 2 else "component"
                 dims = ("time", axis, f"cell_{contact.name}")
                 units = "m"
+                if few.state_shape != values.shape[1:]:  # with the face of a pad behind
+                    values = np.hstack([values.reshape(len(bent), -1), behind])
+                    dims = ("time", f"state_{contact.name}")
             name = f"bristles_{contact.name}"
             histories[name] = History(dims, values, {"units": units})
     histories["time"] = history("time", output.time)

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 SLIPS = 0.5
 """Share of the motion, left over by the bristles, above which a contact or a cell counts as slipping [-]."""
 
+INCIPIENT = 0.1
+"""Share of the load on cells that slip above which a contact slips partly [-]."""
+
 AT_REST = 1e-3
 """Share of the largest deflection: a cell that moves less than that between two frames counts as resting [-]."""
 
@@ -36,6 +39,8 @@ class SlipEvent(NamedTuple):
     """Distance by which its centre of pressure slides [m]."""
     angle: float
     """Angle by which it turns, counter-clockwise [rad]."""
+    incipient: float
+    """Time at which cells with a tenth of the load begin to slip, at most `onset` [s]."""
 
 
 class SlipField(NamedTuple):
@@ -64,7 +69,10 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
     index = solution.contact_index(contact.name)
     loads = solution.histories["normal_force"].values[:, index]
     twists = solution.contact_twist(contact.name)
-    share = slip_fraction(contact.model, recorded.values, twists, loads)
+    share, slipping = slip_shares(contact.model, recorded.values, twists, loads)
+    above = share - SLIPS
+    if getattr(contact.model, "pad", None) is not None:
+        above = slipping - (1.0 - INCIPIENT)
     sliding = twist_at(twists, centres(contact.model.patch, loads))
     speed = np.hypot(sliding[:, 0], sliding[:, 1])
     distance, turn = (
@@ -72,31 +80,46 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
     )
     radius = reach(contact.model.patch)
     least = contact.model.law.largest_deflection
+    partly = _stretches(time, slipping - INCIPIENT)
     events = []
-    for onset, end in _stretches(time, share - SLIPS):
+    for onset, end in _stretches(time, above):
         path, angle = (
             float(np.diff(np.interp([onset, end], time, each))[0])
             for each in (distance, turn)
         )
         if path + radius * abs(angle) > least:  # less than bristles give way by is none
-            events.append(SlipEvent(contact.name, onset, end, path, angle))
+            first = [begin for begin, last in partly if begin <= onset <= last]
+            events.append(
+                SlipEvent(contact.name, onset, end, path, angle, *(first or [onset]))
+            )
     return events
 
 
-def slip_fraction(
+def slip_shares(
     model: Any, states: np.ndarray, twists: np.ndarray, loads: np.ndarray
-) -> np.ndarray:
-    """Compute the share `|u - zdot|/|u|` of the motion u of a contact that its bristles do not take up `[T]`.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the shares of the motion of a contact that its bristles do not take up, and of the load that slips `[T]`.
 
-    The norms are root mean squares over the bristles. The share lies in [0, 1]: 0 without motion, 1 without load.
+    The first is `|u - zdot|/|u|` with root mean squares over the bristles; it lies in [0, 1]: 0 without motion, 1
+    without load. The second is the load on the cells of which this holds, cell by cell, for more than `SLIPS`; zeros
+    for a model without cells.
     """
     loaded = loads > 0.0
     share = np.where(loaded, 0.0, 1.0)
+    slipping = np.where(loaded, 0.0, 1.0)
     if not loaded.any():
-        return share
+        return share, slipping
     args = twists[loaded], loads[loaded]
     motion = model.rate(np.zeros_like(states[loaded]), *args)
-    left = motion - model.rate(states[loaded], *args)
+    rate = model.rate(states[loaded], *args)
+    few = getattr(model, "reduction", None)
+    of_cells = isinstance(few, MODELS["distributed"])
+    if of_cells:
+        motion, _ = parted(few, motion)
+        rate, face = parted(few, rate)
+        # Cells see the face of a pad, which stays behind.
+        motion = motion - np.einsum("nda,...a->...dn", few.patch.levers(), face)
+    left = motion - rate
     weights = _weights(model, loads[loaded])
     size, slipped = (
         np.sqrt((weights * each**2).reshape(len(each), -1).sum(axis=1))
@@ -105,7 +128,11 @@ def slip_fraction(
     share[loaded] = np.minimum(
         np.where(size > 0.0, slipped / np.where(size > 0.0, size, 1.0), 0.0), 1.0
     )
-    return share
+    if of_cells:
+        shares = few.patch.weights(loads[loaded])
+        slips = np.linalg.norm(left, axis=1) > SLIPS * np.linalg.norm(motion, axis=1)
+        slipping[loaded] = (shares * slips).sum(axis=-1)
+    return share, slipping
 
 
 def _weights(model: Any, loads: np.ndarray) -> np.ndarray:
@@ -125,7 +152,7 @@ def _weights(model: Any, loads: np.ndarray) -> np.ndarray:
         return np.stack(
             [np.ones_like(radius), np.ones_like(radius), radius**-2], axis=1
         )
-    return np.ones((1, *shape))
+    return np.ones(())
 
 
 def centres(patch: Any, loads: np.ndarray) -> np.ndarray:
@@ -156,11 +183,23 @@ def _stretches(time: np.ndarray, above: np.ndarray) -> list[tuple[float, float]]
 
 
 def bristles_of(model: Any) -> DistributedModel | None:
-    """Return the distributed model of a contact's patch and law; None where they have no bristles."""
+    """Return the distributed model of a contact's patch, law and pad; None where they have no bristles."""
+    pad = getattr(model, "pad", None)
     try:
-        return MODELS["distributed"](model.patch, model.law)
+        return MODELS["distributed"](model.patch, model.law, pad=pad)
     except InvalidValueError:
         return None
+
+
+def parted(
+    bristles: DistributedModel, state: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the deflections of bristles `[..., d, N]` and the displacement of their face `[..., 3]`."""
+    shape = bristles.patch.bristles, bristles.patch.cells
+    batch = state.shape[: state.ndim - len(bristles.state_shape)]
+    if bristles.state_shape == shape:
+        return state, np.zeros((*batch, 3))
+    return state[..., :-3].reshape(*batch, *shape), state[..., -3:]
 
 
 def slip_field(
@@ -172,17 +211,19 @@ def slip_field(
     frames: np.ndarray,
     first: np.ndarray,
 ) -> SlipField:
-    """Compute the slip field of a contact at `frames` (indices into `times`) from the bristles `state` `[d, N]` [m].
+    """Compute the slip field of a contact at `frames` (indices into `times`) from the first state of its bristles.
 
     `displacements` `[T - 1, 3]` [m, m, rad] are those of the body on the contact from one of `times` `[T]` [s] to the
     next, in the frame of the contact; `loads` are `[T]` [N]; `first` `[3]` is the first twist [m/s, m/s, rad/s]. A
-    cell displaced by `u` while its bristle goes from z_0 to z_1 slips by `u - (z_1 - z_0)`.
+    cell displaced by `u` while its bristle goes from z_0 to z_1 slips by `u - (z_1 - z_0)`; the face of a pad with a
+    common compliance moves less than the body.
     """
     law = bristles.law.numbers
     count = len(bristles.patch.positions)
     largest = bristles.law.largest_deflection
     levers = bristles.patch.levers()
-    lean = np.zeros(state.shape)
+    z, face = parted(bristles, state)
+    lean = np.zeros(z.shape)
     lean[:2] = bristles.patch.asymmetries().T
     bent = np.zeros((len(frames), count))
     slips = np.zeros((len(frames), count), dtype=bool)
@@ -190,20 +231,21 @@ def slip_field(
     slip = np.zeros(count)
     frame = 1
     factor = softening(bristles, np.maximum(loads, 0.0))
-    bent[0] = _bent(factor[0] * state, levers @ first, lean, law)
+    bent[0] = _bent(factor[0] * z, levers @ first, lean, law)
     for k, (step, dt) in enumerate(zip(displacements, np.diff(times), strict=True)):
         if not dt > 0.0:
             continue
-        before = state
+        before = z
+        behind = face
         state, _ = bristles.step(
             state, step / dt, max(0.5 * (loads[k] + loads[k + 1]), 0.0), dt
         )
-        moved = (levers @ step).T
-        length = np.linalg.norm(moved, axis=0)
-        distance += length
-        slip += np.linalg.norm(moved - (state - before), axis=0)
+        z, face = parted(bristles, state)
+        moved = (levers @ (step - (face - behind))).T
+        distance += np.linalg.norm(moved, axis=0)
+        slip += np.linalg.norm(moved - (z - before), axis=0)
         if frame < len(frames) and k + 1 == frames[frame]:
-            bent[frame] = _bent(factor[k + 1] * state, moved.T / dt, lean, law)
+            bent[frame] = _bent(factor[k + 1] * z, moved.T / dt, lean, law)
             slips[frame] = (slip > SLIPS * distance) & (distance > AT_REST * largest)
             distance[:] = 0.0
             slip[:] = 0.0

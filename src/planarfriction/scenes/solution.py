@@ -180,11 +180,13 @@ class Solution:
         return names.index(validation.choice("contact", contact, names))
 
     def slip_events(self) -> tuple[SlipEvent, ...]:
-        """Find when each contact slips: onset, end, path and angle of each `SlipEvent`.
+        """Find when each contact slips: onset, end, path, angle and incipient slip of each `SlipEvent`.
 
         A contact slips while its bristles take up less than half of its motion, `|u - zdot| > |u|/2`, and if it moves
-        further than a full deflection mu_c/sigma_0; there is no threshold on the speed. Onset and end are interpolated
-        linearly between samples. Bristles have to be recorded: `simulate(scene, bristles="all")`.
+        further than a full deflection mu_c/sigma_0; there is no threshold on the speed. On a pad, it slips while this
+        holds cell by cell for cells with more than nine tenths of the load. Incipient slip begins with a tenth of the
+        load. Times are interpolated linearly between samples. Bristles have to be recorded:
+        `simulate(scene, bristles="all")`.
 
         Raises InvalidValueError if they are not, FileError for a solution without its scene.
         """

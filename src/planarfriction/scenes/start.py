@@ -208,7 +208,7 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
     holds = float(formulas.stribeck(np, np.zeros(()), law)) * load * weights
     stiffness = law.sigma_0 * load * weights
-    pad = model.reduction.pad
+    pad = model.pad
     if pad is not None:
         stiffness = pad.pieces(patch, model.law)
     largest = np.full(len(levers), float(formulas.stribeck(np, np.zeros(()), law)))

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from planarfriction._engine.cells import hung_cells
+from planarfriction._engine.cells.hung_cells import HungContact
 from planarfriction._engine.compiler.memory import places_of, rows_of
 from planarfriction._engine.coupled.face_steps import Hanging, step
-from planarfriction._engine.protocol import StepFunctions
+from planarfriction._engine.protocol import SEEN_SIZE, StepFunctions, calls_of
 from planarfriction._engine.records.base import StepJacobians
 from planarfriction._engine.records.distributed import CompiledDistributed
-from planarfriction._engine.records.packed import PackedModel
+from planarfriction._engine.records.packed import PackedModel, rates
 from planarfriction._engine.records.patches import PackedPatches, packed_patches
 from planarfriction._engine.records.pressing import Pressing
 from planarfriction.errors import InvalidValueError, SolverError
@@ -67,6 +70,37 @@ class CompiledSoft(CompiledDistributed):
             records=records, states=pieces.states + 3, keepalive=kept
         )
 
+    def packed(
+        self, loads: Sequence[float | None], between: tuple[float, float] | None = None
+    ) -> PackedModel:
+        """See `CompiledModel`: the pieces on their face, whose displacement follows with the time."""
+        return self._faced(self._pieces.packed(loads, between))
+
+    def _faced(self, pieces: PackedModel) -> PackedModel:
+        """Return pieces, and the face that they hang on, as the solver reads them."""
+        (weights, _) = pieces.keepalive
+        levers = self.patch.levers()[pieces.cells]
+        law = self.law.numbers
+        by = "rn,nda,ndb->rab"
+        viscous = law.sigma_2 * np.einsum(by, weights, levers, levers)
+        stiff = law.sigma_0 * self.stiff[pieces.cells]  # pyright: ignore
+        springs = -(stiff[:, None, None] * levers).swapaxes(0, 1).reshape(-1, 3)
+        face = HungContact(
+            pieces.records[0], calls_of(pieces.functions), pieces.states, self.compliance,
+            viscous[0], np.ascontiguousarray(springs), self.lag, np.zeros(SEEN_SIZE),
+        )  # fmt: skip
+        columns = {"cells": pieces.records, "viscous": places_of(viscous)}
+        arms = np.array([1.0, 1.0, 1.0 / (pieces.radius or 1.0)])
+        longest = float(pieces.state_scale.max())
+        return pieces._replace(
+            functions=hung_cells.FUNCTIONS,
+            records=rows_of(face, len(pieces.records), **columns),
+            states=pieces.states + 3,
+            workspace=pieces.workspace + hung_cells.OWN,
+            state_scale=np.append(pieces.state_scale, longest * arms),
+            keepalive=(*pieces.keepalive, pieces.records, face, viscous),
+        )
+
     def step(self, *inputs: Any) -> tuple[np.ndarray, np.ndarray]:
         """See `CompiledModel`. Raises SolverError if the twist of a face was not found."""
         new, wrench = super().step(*inputs)
@@ -86,8 +120,16 @@ class CompiledSoft(CompiledDistributed):
         pressure: Any = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """See `CompiledModel`."""
-        rule = "have no common compliance for rates, which depend on the time in which the face follows"
-        raise InvalidValueError("pad", rule, type(self.pad).__name__)
+        if pressure is not None:
+            rule = "be None for rates on a pad with a common compliance"
+            raise InvalidValueError("moments", rule, "some")
+        z = state.reshape(-1, self._size)
+        loads = load.reshape(-1)
+        weights = self.patch.weights(loads if self.depends_on_load else None)
+        pieces = self._pieces._packed(np.atleast_2d(weights))
+        v = np.column_stack([twist.reshape(-1, 3), loads])
+        rate, pull = rates(self._faced(pieces), z, v)
+        return rate.reshape(state.shape), pull.reshape(twist.shape)
 
     def step_jacobians(
         self,

@@ -89,8 +89,12 @@ class Friction:
         self.placed = [Placed(m, each, unprepared=True) for each in patches]
         _check(m, self.placed)
         worlds = data.nworld if data is not None else validation.count("worlds", worlds)
-        own = _parameters(m, self.placed, worlds) | dict(parameters or {})
         models = [patch.model for patch in patches]
+        own = _parameters(m, self.placed, worlds)
+        # A stiffness of pads alone does not feel that of laws.
+        if not any(getattr(each.compiled, "springs", 1.0) for each in models):
+            del own["sigma_0"]
+        own |= dict(parameters or {})
         follows = [each.follows for each in self.placed]
         self.coupled = CoupledPatches(
             models, worlds=worlds, follows=follows, parameters=own
