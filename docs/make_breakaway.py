@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,6 +20,7 @@ from typing import Any
 import numpy as np
 
 import planarfriction as pf
+from planarfriction.cli.doctor import processor
 from planarfriction.derivatives import rollout, rollout_states, rollout_vjp
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import style
@@ -60,6 +64,15 @@ PRICED |= {f"{n} discs": discs(n) for n in COUNTS} | {
     "a disc a cell": lambda patch: discs(patch.cells)(patch)
 }
 """Models whose steps are timed."""
+
+INSTRUCTIONS: dict[str, dict[str, str]] = {
+    "AVX2": {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx2,+fma,+avx"},
+    "AVX-512": {},
+}
+"""Settings of Numba for each instruction set of which times are told; none: those of a processor that has it."""
+
+TICKS = 0.2
+"""Least processor time [s] of a measurement: some systems count it in steps of 10 ms."""
 
 SEEDS = 10
 """Driven motions of each shape."""
@@ -226,7 +239,7 @@ def driven(shape: str) -> dict[str, list[list[float]]]:
     }
 
 
-def prices(steps: int = 20_000, rounds: int = 9) -> dict[str, dict[str, float]]:
+def prices(steps: int = 20_000, rounds: int = 5) -> dict[str, dict[str, float]]:
     """Return by model its states, and the times of a rollout and of its gradient over the published model's."""
     twists = mixed_twists(steps)
     loads = np.full(steps, 2.0)
@@ -242,25 +255,48 @@ def prices(steps: int = 20_000, rounds: int = 9) -> dict[str, dict[str, float]]:
         "step": lambda model: rollout(model, model.rest(), twists, loads, 1e-4),
         "gradient": gradient,
     }
-    times: dict[str, dict[str, list[float]]] = {
-        name: {work: [] for work in works} for name in models
+    least: dict[str, dict[str, float]] = {
+        name: dict.fromkeys(works, math.inf) for name in models
     }
-    for turn in range(-1, rounds):  # the first compiles
-        for name, model in models.items():
-            for work, done in works.items():
-                begin = time.process_time()
-                done(model)
+    # Works one after the other: memory that gradients leave behind slows steps down.
+    for work, done in works.items():
+        for turn in range(-1, rounds):  # the first compiles
+            for name, model in models.items():
+                found = _processor_time(lambda model=model: done(model))  # noqa: B023
                 if turn >= 0:
-                    times[name][work].append(time.process_time() - begin)
+                    least[name][work] = min(least[name][work], found)
     return {
         name: {"states": float(np.prod(models[name].state_shape))}
-        | {
-            work: float(np.median(np.divide(own[work], times["published"][work])))
-            for work in works
-        }
-        | {"ns": float(np.median(own["step"])) / steps * 1e9}
-        for name, own in times.items()
+        | {work: own[work] / least["published"][work] for work in works}
+        | {"ns": own["step"] / steps * 1e9}
+        for name, own in least.items()
     }
+
+
+def _processor_time(work: Callable[[], Any]) -> float:
+    """Return the processor time of a work [s], done so often that the ticks of its clock do not count."""
+    begin = time.process_time()
+    count = 0
+    while (taken := time.process_time() - begin) < TICKS:
+        work()
+        count += 1
+    return taken / count
+
+
+def prices_with(instructions: str) -> dict[str, dict[str, float]]:
+    """Return `prices` with loops compiled for an instruction set, in a process of their own."""
+    if instructions == "AVX-512" and "avx512f" not in dict(processor())["features"]:
+        raise SystemExit("times of AVX-512 need a processor that has it")
+    work = "import json, make_breakaway; print(json.dumps(make_breakaway.prices()))"
+    done = subprocess.run(
+        [sys.executable, "-c", work],
+        env=os.environ
+        | {"PYTHONPATH": os.pathsep.join([str(DOCS), *sys.path])}
+        | INSTRUCTIONS[instructions],
+        stdout=subprocess.PIPE,
+        check=True,
+    )
+    return json.loads(done.stdout)
 
 
 def shaken(shape: str, level: float) -> dict[str, float]:
@@ -325,7 +361,7 @@ def table_of_models(kept: dict[str, Any]) -> Rows:
         ]
     ]
     for name in MODELS:
-        price = kept["prices"][name]
+        price = kept["prices AVX2"][name]
         slip = 1e3 * kept[f"two pads {name}"]["slip"]
         errors = 100 * np.abs(
             np.concatenate([kept[f"breakaway {shape}"][name] for shape in SHAPES])
@@ -366,7 +402,7 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
         [
             "discs",
             "states",
-            "step",
+            *(f"step, {name}" for name in INSTRUCTIONS),
             "maximum force error: median run",
             "worst run",
             "maximum torque error: median run",
@@ -375,7 +411,8 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
         ]
     ]
     for name in (*map(str, COUNTS), "a disc a cell", "all cells", "published"):
-        price = kept["prices"].get(name) or kept["prices"][f"{name} discs"]
+        by_name = [kept[f"prices {each}"] for each in INSTRUCTIONS]
+        price = [each.get(name) or each[f"{name} discs"] for each in by_name]
         runs = [
             np.array(kept[f"driven {shape}"][name])
             for shape in few.SHAPES
@@ -388,7 +425,8 @@ def table_of_cells(kept: dict[str, Any]) -> Rows:
             "all cells": "none: one point per cell",
             "published": "none: 3 states",
         }
-        rows.append([words.get(name, name), f"{price['states']:.0f}", f"{price['step']:.2g}",
+        rows.append([words.get(name, name), f"{price[0]['states']:.0f}",
+                     *(f"{each['step']:.2g}" for each in price),
                      f"{np.median(largest):.2g} %", f"{largest.max():.2g} %", f"{np.median(torque):.2g} %",
                      f"{torque.max():.2g} %", f"{np.median(rms):.2g} %"])  # fmt: skip
     return rows
@@ -409,7 +447,7 @@ def draw(kept: dict[str, Any]) -> style.PlotFigure:
         look = {"color": colour, "marker": style.MARKERS[role], "mec": "white"}
         drawn = np.maximum(np.concatenate(errors), 1e-3)
         left.plot(places, drawn, ls="", ms=4.0, mew=0.3, alpha=0.8, **look)
-        price = kept["prices"][name]["step"]
+        price = kept["prices AVX2"][name]["step"]
         worst = max(each.max() for each in errors)
         handles += right.plot(price, worst, ls="", ms=7, **look, label=TITLES.get(name, name))  # fmt: skip
     for edge in np.arange(0.5, len(SHAPES) - 1):
@@ -439,7 +477,9 @@ def measures() -> Iterator[tuple[str, Callable[[], Any]]]:
     yield from (
         (f"two pads {name}", lambda name=name: two_pads(name)) for name in MODELS
     )
-    yield "prices", prices
+    yield from (
+        (f"prices {each}", lambda each=each: prices_with(each)) for each in INSTRUCTIONS
+    )
     yield from (
         (f"driven {shape}", lambda shape=shape: driven(shape)) for shape in few.SHAPES
     )
