@@ -41,7 +41,8 @@ MIRRORS = {
     "_engine/published": "_engine/test_steps.py models/test_rates.py models/test_batches.py test_golden.py"
     " limit_surface/test_closed_forms.py derivatives/test_rollouts_of_every_model.py",
     "_engine/body": "solvers/test_structured.py test_golden.py derivatives/test_scene.py scenes derivatives",
-    "_engine/coupled": "test_coupling.py test_sliding_body.py test_coupling_pads.py test_coupling_hard.py",
+    "_engine/coupled": "test_coupling.py test_sliding_body.py test_coupling_pads.py test_coupling_hard.py"
+    " models/test_pads.py",
     "_engine/records": "models/test_batches.py models/test_state_types.py models/test_steps.py test_golden.py models",
     "_engine/compiler": "_engine/compiler",
     "_engine": "_engine test_golden.py models derivatives limit_surface patch test_coupling.py",

@@ -574,22 +574,23 @@ def test_a_face_that_nothing_finds_is_an_error(made_worse):
         made_worse.step(made_worse.rest(), [1e-3, 0.0, 0.0], 1.0, 1e-3)
 
 
-def test_a_pad_does_not_see_where_its_frame_is():
-    """The same square beside the origin, at the same motion."""
+@pytest.mark.parametrize("kind", [DistributedModel, ReducedModel])
+def test_a_pad_does_not_see_where_its_frame_is(kind):
+    """The same square beside the origin, at the same motion; discs are fitted once more there."""
     x, y = 0.04, -0.03
     corners = [
         (x + i * 0.01, y + j * 0.01) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))
     ]
     beside = ContactPatch.polygon(corners, cells=7)
     near, far = (
-        DistributedModel(patch, QUASISTATIC, pad=PADS["half space"])
-        for patch in (SQUARE, beside)
+        kind(patch, QUASISTATIC, pad=PADS["half space"]) for patch in (SQUARE, beside)
     )
     vx, vy, spin = 1e-2, 2e-3, 0.5
     _, wanted = near.step(near.rest(), [vx, vy, spin], 3.0, 1e-2)
     _, found = far.step(far.rest(), [vx + spin * y, vy - spin * x, spin], 3.0, 1e-2)
     found[2] -= x * found[1] - y * found[0]
-    np.testing.assert_allclose(found, wanted, rtol=1e-9)
+    close = 1e-9 if kind is DistributedModel else 1e-5
+    np.testing.assert_allclose(found, wanted, rtol=close, atol=1e-3 * close)
 
 
 def test_a_moment_moves_the_load_and_not_the_stiffness():

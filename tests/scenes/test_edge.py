@@ -357,3 +357,23 @@ def test_what_an_edge_cannot_have_is_refused():
         pf.simulate(
             dataclasses.replace(scene, contacts=[dataclasses.replace(pad, model=fixed)])
         )
+
+
+@pytest.mark.parametrize("model", PADS[1:])
+def test_a_pad_over_an_edge_does_not_see_where_its_frame_is(model):
+    """The same pad, drawn beside its origin, ends where the other one does."""
+    x = 0.03
+    y = -0.02
+    patch = model.patch
+    beside = type(model)(
+        pf.ContactPatch.polygon(
+            [(x + i * WIDTH / 2, y + j * WIDTH / 2) for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))],
+            cells=round(patch.cells**0.5),
+        ),
+        LAW,
+    )  # fmt: skip
+    ends = [
+        end_of(pf.simulate(slide(each, (0.1, -1.0, 2.0), pad=pad)))
+        for each, pad in ((model, {}), (beside, {"position": (-x, -y)}))
+    ]
+    np.testing.assert_allclose(ends[1], ends[0], rtol=1e-4, atol=1e-7)
