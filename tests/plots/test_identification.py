@@ -5,12 +5,14 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import identify
+from planarfriction.plots import style
+from planarfriction.plots.identification import _draw_loops
 
 FIRST, SECOND = np.linspace(0.0, 1.0, 101), np.linspace(5.0, 7.0, 51)
 
 
-def drawn():
-    """Draw a made-up fit of two logs of millinewtons, 0.1 mN of noise, with two values far off in the first one."""
+def fitted(channel=("fx", "N")):
+    """Return a made-up fit of two logs of millinewtons, 0.1 mN of noise, with two values far off in the first one."""
     off = np.zeros(101)
     off[[10, 20]] = 7e-4, -9e-4
     histories = [
@@ -19,6 +21,7 @@ def drawn():
             "time": time,
             "measured": 2e-3 * np.sin(time)[:, None] + away,
             "predicted": 2e-3 * np.sin(time)[:, None],
+            "twist": np.full((len(time), 3), 1e-3),
         }
         for name, time, away in (
             ("first", FIRST, off[:, None]),
@@ -35,12 +38,30 @@ def drawn():
         np.eye(1),
         (),
         np.array([1e-4]),
-        (("fx", "N"),),
+        (channel,),
         tuple(histories),
         law,
         model,
         (1, 2),
-    ).plot()
+    )
+
+
+def drawn():
+    return fitted().plot()
+
+
+@pytest.mark.parametrize(
+    ("channel", "speed", "way"),
+    [
+        (("fx", "N"), "velocity [m/s]", "m]"),
+        (("tau", "N m"), "velocity [rad/s]", "rad]"),
+    ],
+)
+def test_forces_stand_over_speeds_and_torques_over_spins(channel, speed, way):
+    over_speed, over_way = style.new_figure(6.0, 3.0).subplots(1, 2)
+    _draw_loops(over_speed, over_way, fitted(channel), 0)
+    assert over_speed.get_xlabel() == speed
+    assert over_way.get_xlabel().endswith(way)
 
 
 def test_logs_follow_each_other_in_the_unit_of_the_label():
