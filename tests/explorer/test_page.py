@@ -504,12 +504,10 @@ def test_the_server_is_local_and_a_taken_port_is_one_line():
         addresses = {each.getsockname()[0] for each in server._http._sockets.values()}
         assert addresses == {"127.0.0.1"}
         # Tornado leaves the socket that found no port to the garbage collector, which warns.
-        with (
-            warnings.catch_warnings(),
-            refused("port must be free"),
-        ):
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore", ResourceWarning)
-            open_server(server.port)
+            with refused("port must be free"):
+                open_server(server.port)
             gc.collect()
     finally:
         server.stop()
