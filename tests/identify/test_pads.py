@@ -1,4 +1,4 @@
-"""Stiffness of pads from logs: intervals hold the truth, and what a log does not tell is said."""
+"""Stiffness of pads from logs: intervals hold the truth; a wrong pad and what logs do not determine are said first."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ ALL = ("shift", "turn", "slip")
 def test_a_log_of_small_cycles_and_slips_tells_the_pad(name):
     pad, first = PADS[name]
     found = identify_pad(noisy(exact(pad, 60, *ALL), 1), PATCH, first, START)
-    assert found.findings == ()
+    assert found.verdicts == ()
     for each, value, error in zip(
         found.names, found.values, found.standard_errors, strict=True
     ):
@@ -81,23 +81,53 @@ def test_a_log_of_small_cycles_and_slips_tells_the_pad(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "parts", "untold"),
+    ("name", "parts", "unknown"),
     [
         ("measured", ("shift",), {"common", "mu_c"}),
         ("measured", ("shift", "turn"), set()),
         ("half-space", ("shift",), {"mu_c"}),
     ],
 )
-def test_what_a_log_does_not_tell_comes_before_the_numbers(name, parts, untold):
-    """Small shifts alone do not tell what is common, nor friction; turns in which the rim slips tell both."""
+def test_what_is_not_identifiable_comes_before_the_numbers(name, parts, unknown):
+    """Small shifts alone do not tell what is common, nor friction; rotations in which the rim slips tell both."""
     pad, first = PADS[name]
     found = identify_pad(noisy(exact(pad, 60, *parts), 2), PATCH, first, START)
-    assert {each for each in found.names if not found.identifiable(each)} == untold
+    assert {each for each in found.names if not found.identifiable(each)} == unknown
     lines = str(found).splitlines()
-    said = len(untold)
-    assert all("is not told by the logs" in each for each in lines[:said])
+    said = len(unknown)
+    assert all(": not identifiable, add " in each for each in lines[:said])
     assert all(" = " in each for each in lines[said:])
-    assert not any(line.startswith(f"{each} =") for line in lines for each in untold)
+    assert not any(line.startswith(f"{each} =") for line in lines for each in unknown)
+
+
+WRONG = {
+    "another pad": lambda log: (log, PATCH, PADS["half-space"][1]),
+    "another patch": lambda log: (log, pf.ContactPatch.disc(0.02, 9), PADS["layer"][1]),
+    "another law": lambda log: (dragged(log), PATCH, PADS["layer"][1]),
+}
+
+
+def dragged(log):
+    """With a viscous friction that the law does not have."""
+    viscous = np.array([15.0, 15.0, 1.5e-3]) * log.twist
+    return Log(log.time, log.twist, log.wrench - viscous, LOAD)
+
+
+@pytest.mark.parametrize("wrong", WRONG.values(), ids=WRONG)
+def test_a_model_that_does_not_fit_is_said_before_the_numbers(wrong):
+    log = noisy(exact(PADS["layer"][0], 60, *ALL), 1)
+    found = identify_pad(*wrong(log), START)
+    first = found.verdicts[0]
+    assert (first.parameter, first.identifiable) == ("fit", False)
+    assert str(found).startswith("fit: neighbouring residuals are correlated")
+
+
+def test_residuals_that_are_small_do_not_count():
+    """A log without noise leaves the pattern of steps between its samples."""
+    found = identify_pad(
+        exact(PADS["layer"][0], 60, *ALL), PATCH, PADS["layer"][1], START
+    )
+    assert found.verdicts == ()
 
 
 @pytest.mark.slow

@@ -5,6 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from planarfriction._engine.compiler import jit
+from planarfriction._engine.compiler.calls import call
+from planarfriction._engine.compiler.memory import doubles, place_of
+from planarfriction._engine.protocol import SEEN_SIZE, addresses_at, calls_of
+from planarfriction._engine.records.packed import rates
 from planarfriction.derivatives import scene_sensitivities
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel, ReducedModel
@@ -354,3 +359,66 @@ def test_what_knows_no_common_compliance_says_so():
         simulate(dataclasses.replace(scene, start="equilibrium"))
     with refused("moments must be None for rates on a pad"):
         model.rate(model.rest(), np.zeros(3), 1.0, moments=(1e-3, 0.0))
+
+
+@jit
+def _solve(calls, contact, z, v, shift, r, dv, lin, stiffness, wrench, change):
+    own = addresses_at(calls)
+    z = doubles(z)
+    lin = doubles(lin)
+    call(own.linearise, (contact, z, doubles(v), lin))
+    call(own.factor, (contact, z, shift, lin, doubles(stiffness)))
+    call(own.eliminate, (contact, z, shift, doubles(r), lin, doubles(wrench)))
+    call(own.back_substitute, (contact, z, doubles(r), doubles(dv), lin, doubles(change)))  # fmt: skip
+
+
+def _jacobian(function, at, step):
+    """Differences of fourth order, `[..., n]`."""
+    columns = []
+    for direction in step * np.eye(len(at)):
+        near = function(at + direction) - function(at - direction)
+        far = function(at + 2.0 * direction) - function(at - 2.0 * direction)
+        columns.append((8.0 * near - far) / (12.0 * step))
+    return np.stack(columns, -1)
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_what_the_solver_eliminates_is_the_solution_of_its_equations(name):
+    """`(s - df/dz) dz = r + df/dV dV` and `dW = dW/dz dz + dW/dV dV`, with derivatives by differences."""
+    model = FACES[name]
+    load = 2.0
+    rng = np.random.default_rng(7)
+    state = model.rest()
+    for _ in range(20):
+        state, _ = model.step(state, [0.01, 0.002, 0.3], load, 2e-4)
+    packed = model.reduction.compiled.packed([load])
+    n = packed.states
+    z = np.ascontiguousarray(state.reshape(n))
+    v = np.zeros(SEEN_SIZE)
+    v[:4] = 0.013, -0.004, 0.2, load
+
+    def rate(z, v):
+        return np.concatenate(rates(packed, z[None], v[None]), axis=1)[0]
+
+    of_state = _jacobian(lambda each: rate(each, v), z, 1e-9)
+    of_twist = _jacobian(lambda each: rate(z, np.append(each, v[3:])), v[:3], 1e-5)
+    shift = 1e4
+    r = rng.normal(size=n) * packed.state_scale * shift
+    dv = np.zeros(6)
+    dv[:3] = rng.normal(size=3) * [0.01, 0.01, 1.0]
+    stiffness, wrench, change, lin = (
+        np.zeros(size) for size in (18, 3, n, packed.workspace)
+    )
+    given = (z, v), (r, dv, lin, stiffness, wrench, change)
+    first, last = (list(map(place_of, each)) for each in given)
+    calls = calls_of(packed.functions)
+    _solve(place_of(calls), place_of(packed.records), *first, shift, *last)
+
+    inverse = np.linalg.inv(shift * np.eye(n) - of_state[:n])
+    of_r = of_state[n:] @ inverse
+    np.testing.assert_allclose(wrench, of_r @ r, rtol=1e-4, atol=1e-6)
+    wanted = of_r @ of_twist[:n] + of_twist[n:]
+    close = 1e-4 * np.abs(wanted).max(axis=0)
+    assert (abs(stiffness[:9].reshape(3, 3) - wanted) < close).all()
+    wanted = inverse @ (r + of_twist[:n] @ dv[:3])
+    assert (abs(change - wanted) < 1e-4 * packed.state_scale).all()

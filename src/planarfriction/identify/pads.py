@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,7 @@ from planarfriction.derivatives import rollout
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import Log, as_tuple
 from planarfriction.identify.parameters import check_patch
+from planarfriction.identify.verdicts import CORRELATED, TWO_SIDED, Verdict
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel
 from planarfriction.pads import HalfSpace, Layer, Measured, Pad
@@ -35,10 +37,10 @@ LOGARITHMIC = "shear_modulus", "stiffness", "mu_c"
 """Estimates that are fitted as logarithms."""
 
 PRIOR = {"shear_modulus": 3.0, "stiffness": 3.0, "common": 0.5, "mu_c": 1.0}
-"""Standard deviations of fitted numbers a priori, which hold those that logs do not tell."""
+"""Standard deviations of fitted numbers a priori."""
 
-TOLD = {"shear_modulus": 0.1, "stiffness": 0.1, "common": 0.1, "mu_c": 0.1}
-"""Standard errors of fitted numbers above which logs do not tell them."""
+VAGUE = 0.1
+"""Standard error of a fitted number above which it is not identifiable."""
 
 REMEDIES = {
     "shear_modulus": "add small cycles in which the contact sticks",
@@ -46,7 +48,10 @@ REMEDIES = {
     "common": "add rotations, which have no common part, beside shifts",
     "mu_c": "add a slip of the whole contact",
 }
-"""Motion that a log lacks where it does not tell a number."""
+"""Motion that the logs lack if an estimate is not identifiable."""
+
+SMALL = 0.01
+"""Residual, as a share of the largest value of its channel, below which its pattern does not matter."""
 
 LARGEST_COMMON = 0.95
 """Largest common part that is tried [-]."""
@@ -63,14 +68,11 @@ PASSES = 3
 CHANGE = 1e-3
 """Change of a fitted number for derivatives."""
 
-TWO_SIDED = 1.96
-"""Standard errors on each side of an interval of 95 %."""
-
 
 @described
 @dataclass(frozen=True, eq=False)
 class PadFit(ByValue):
-    """Estimates of a pad, and all that its logs do not tell."""
+    """Estimates of a pad, and verdicts on them."""
 
     names: tuple[str, ...]
     """Names of the estimates, those of the pad first, then mu_c."""
@@ -78,8 +80,8 @@ class PadFit(ByValue):
     """Estimates [SI], `[F]`."""
     standard_errors: np.ndarray
     """Standard errors [SI], `[F]`."""
-    findings: tuple[str, ...]
-    """Sentences about estimates that the logs do not tell, each with the motion that is missing."""
+    verdicts: tuple[Verdict, ...]
+    """Verdicts on a pad that does not explain the logs, and on estimates that are not identifiable."""
     noise: np.ndarray
     """Standard deviation of what is left of fx, fy and tau [N, N, N m], `[3]`; infinite for a channel without data."""
     pad: Pad
@@ -93,21 +95,23 @@ class PadFit(ByValue):
         for name, value, error in zip(
             self.names, self.values, self.standard_errors, strict=True
         ):
+            half = TWO_SIDED * float(error)
             if name in LOGARITHMIC:
-                factor = float(np.exp(TWO_SIDED * error / value))
-                found[name] = (float(value / factor), float(value * factor))
+                factor = math.exp(half / value)
+                found[name] = float(value / factor), float(value * factor)
             else:
-                around = TWO_SIDED * float(error)
-                found[name] = (float(value) - around, float(value) + around)
+                found[name] = max(float(value) - half, 0.0), float(value) + half
         return found
 
     def identifiable(self, name: str) -> bool:
-        """Return True if the logs tell an estimate. Raises InvalidValueError for an unknown name."""
+        """Return True if the logs determine an estimate. Raises InvalidValueError for an unknown name."""
         validation.choice("name", name, self.names)
-        return not any(each.startswith(f"{name} ") for each in self.findings)
+        return all(
+            each.identifiable for each in self.verdicts if each.parameter == name
+        )
 
     def __str__(self) -> str:
-        lines = list(self.findings)
+        lines = [str(each) for each in self.verdicts]
         for name, (low, high) in self.intervals().items():
             if self.identifiable(name):
                 value = self.values[self.names.index(name)]
@@ -124,7 +128,8 @@ def identify_pad(
     Nonlinear least squares for the wrenches of `DistributedModel(patch, law, pad=pad)`, over the noise that the fit
     leaves; a patch of about 100 cells is quick. Of a `Pad.layer` and a `Pad.half_space` the shear modulus is estimated,
     of a `Pad.measured` the stiffness and `common`; `mu_s` keeps its ratio to `mu_c`, all else is as given. Twists are
-    taken as exact.
+    taken as exact. If neighbouring residuals are correlated, a verdict says that the model does not explain the logs,
+    and intervals are wrong.
 
     Raises InvalidValueError for what is not a log, patch, pad or law of these kinds, and as `DistributedModel` does.
     """
@@ -145,16 +150,17 @@ def identify_pad(
     prior = np.array([PRIOR[name] for name in problem.names])
     told = np.linalg.inv(scaled.T @ scaled + np.diag(prior**-2.0))
     errors = np.sqrt(np.diag(told))
-    findings = [
-        f"{name} is not told by the logs: {REMEDIES[name]}"
+    verdicts = problem.verdicts(left)
+    verdicts += [
+        Verdict(name, False, REMEDIES[name])
         for name, error in zip(problem.names, errors, strict=True)
-        if error > TOLD[name]
+        if error > VAGUE
     ]
     values = problem.values(x)
     per = np.where(problem.logarithmic, values, 1.0)
     noise = np.where(problem.channels, spread, np.inf)
     pad, law = problem.with_values(x)
-    return PadFit(problem.names, values, per * errors, tuple(findings), noise, pad, law)
+    return PadFit(problem.names, values, per * errors, tuple(verdicts), noise, pad, law)
 
 
 class _Problem:
@@ -206,6 +212,19 @@ class _Problem:
             load = log.normal_force[1:]
             found.append(rollout(model, None, twist, load, steps).wrenches)
         return np.concatenate(found)
+
+    def verdicts(self, left: np.ndarray) -> list[Verdict]:
+        """Return a verdict on the fit if neighbouring residuals `[T, 3]` are correlated, as noise is not."""
+        square = (left**2).sum(axis=0)
+        large = np.sqrt(square / len(left)) > SMALL * np.abs(self.measured).max(axis=0)
+        large &= self.channels > 0.0
+        pairs = (left[1:] * left[:-1]).sum(axis=0)
+        alike = np.max(pairs[large] / square[large], initial=0.0)
+        if alike <= CORRELATED:
+            return []
+        reason = f"neighbouring residuals are correlated ({alike:.2f})"
+        cause = "the kind of pad, the law, the patch or the measurement is wrong"
+        return [Verdict("fit", False, f"{reason}: {cause}")]
 
     def start(self, weights: np.ndarray) -> np.ndarray:
         """Return the best of some numbers, with the friction that the largest force asks for."""

@@ -421,7 +421,7 @@ def draw_ladder(rows: list[Row], shifts: dict[str, float]) -> PlotFigure:
             axes.set_title(title, loc="left")
             axes.margins(x=0.12, y=0.1)
             if some:
-                axes.set_xlim(left=0.45 * axes.dataLim.x0)
+                axes.set_xlim(left=0.3 * axes.dataLim.x0)
             axes.xaxis.set_major_locator(FixedLocator(TICKS))
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_locator(NullLocator())

@@ -308,7 +308,7 @@ def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
                 ).set_path_effects(list(HALO))
             axes.set(xscale="log", yscale="log", xlabel="largest position error [m]")
             axes.set_title(problem.name, loc="left")
-            axes.margins(x=0.26)
+            axes.margins(x=0.36)
             tidy(axes)
         panels[0].set_ylabel("wall time [s]")
     return figure
