@@ -1,6 +1,7 @@
 """Loads of cells that are given anew at each step: against all cells, closed forms and the energy of bristles."""
 
 import functools
+import pickle
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from planarfriction.derivatives import (
     rollout_states,
     rollout_vjp,
 )
+from planarfriction.models.cell_loads import seen
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=1.0, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
@@ -131,11 +133,8 @@ def test_no_pressure_makes_energy(name, steps):
     rng = np.random.default_rng(4)
     before = np.ones((200, cells))
     state = model.rest(200)
-    few = model.reduction
-    stiff = few.pad.pieces(few.patch, LAW)
     loads = before
     energy = np.zeros(200)
-    pressed = 1.0
     for _ in range(steps):
         cover = rng.uniform(0.0, 1.0, before.shape) ** 0.3
         new = rng.exponential(1.0 / cells, before.shape) * rng.integers(0, 2, before.shape)  # fmt: skip
@@ -144,8 +143,8 @@ def test_no_pressure_makes_energy(name, steps):
         state, wrench = model.step(
             state, twist, None, dt, loads=(loads, new), cover=(before, cover)
         )
-        pressed = model._cells.under(new, cover).stiffer
-        after = 0.5 * (stiff * pressed * (state**2).sum(axis=1)).sum(axis=1)
+        stiff = LAW.sigma_0 * model._cells.under(new, cover).numbers[:, -1]
+        after = 0.5 * (stiff * (state**2).sum(axis=1)).sum(axis=1)
         work = -dt * (wrench * twist).sum(axis=1)
         assert (after <= energy + work + 1e-12 * (energy + abs(work))).all()
         energy = after
@@ -268,6 +267,59 @@ def test_derivatives_are_those_of_the_step(name):
     np.testing.assert_allclose(got, new, atol=1e-6 * abs(new).max())
 
 
+QUICK = ["cells of a layer", "discs", "discs with a metric", "discs of a layer", "common compliance"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_loads_in_order_go_straight_to_compiled_code(name):
+    """As one contact, as a batch, and as lists, which are checked in Python, results are the same."""
+    model = MODELS[name]
+    rng = np.random.default_rng(9)
+    state, twist, loads = drawn(model, 3, rng)
+    before = np.roll(loads, 1, axis=0)
+    shares = rng.uniform(0.1, 1.0, loads.shape)
+    covers = np.where(before > 0.0, shares, 0.0), np.where(loads > 0.0, shares, 0.0)
+    for given in (
+        {"loads": loads},
+        {"loads": (before, loads)},
+        {"loads": loads, "cover": covers[1]},
+        {"loads": (before, loads), "cover": covers},
+    ):
+        ends = model.step(state, twist, None, 1e-3, **given)
+        borne = seen(given["loads"], given.get("cover"))
+        cells = model._bearing(loads)
+        assert model.compiled.step_borne(cells, state, twist, 1e-3, borne)
+        for b in range(3):
+            one = {k: _row(each, b) for k, each in given.items()}
+            alone = model.step(state[b], twist[b], None, 1e-3, **one)
+            listed = {k: _row(each, b, list) for k, each in given.items()}
+            checked = model.step(state[b], list(twist[b]), None, 1e-3, **listed)
+            for got, *wanted in zip(ends, alone, checked, strict=True):
+                for each in wanted:
+                    np.testing.assert_array_equal(got[b], each)
+
+
+def _row(value, b, kind=np.asarray):
+    return (
+        tuple(kind(each[b]) for each in value)
+        if isinstance(value, tuple)
+        else kind(value[b])
+    )
+
+
+def test_a_model_with_another_law_and_one_from_a_file_bear_loads():
+    model = MODELS["discs of a layer"]
+    state, twist, loads = drawn(model, 3, np.random.default_rng(10))
+    model.step(state, twist, None, 1e-3, loads=loads)
+    other = model.with_law(LAW)
+    new = pf.ReducedModel(GRADED, LAW, pad=LAYER)
+    for one, wanted in ((pickle.loads(pickle.dumps(model)), model), (other, new)):
+        got = one.step(state, twist, None, 1e-3, loads=loads)
+        wanted = wanted.step(state, twist, None, 1e-3, loads=loads)
+        for each, right in zip(got, wanted, strict=True):
+            np.testing.assert_array_equal(each, right)
+
+
 def test_loads_that_make_no_sense_are_refused():
     model = MODELS["discs of a layer"]
     loads = model.patch.weights()
@@ -275,7 +327,13 @@ def test_loads_that_make_no_sense_are_refused():
     for given, words in (
         ({"loads": loads[1:]}, r"loads.*have shape \[..., 384\]"),
         ({"loads": -loads}, "loads.*>= 0"),
+        ({"loads": loads * np.nan}, "loads.*finite"),
+        ({"loads": (-loads, loads)}, "loads.*>= 0"),
+        ({"loads": (-loads, loads), "cover": (loads, loads)}, "loads.*>= 0"),
+        ({"loads": loads.astype(str)}, "loads.*numbers"),
         ({"loads": loads, "cover": 2.0 * np.ones(384)}, r"cover.*\[0, 1\]"),
+        ({"loads": loads, "cover": -np.ones(384)}, r"cover.*>= 0"),
+        ({"loads": loads, "cover": np.ones(24)}, r"cover.*shape"),
         ({"loads": loads, "cover": 0.0 * loads}, "cover.*> 0 if a cell is loaded"),
         ({"loads": loads, "cover": (2.0 + loads, loads)}, r"cover.*\[0, 1\]"),
         ({"loads": [loads, [1.0]]}, "loads.*rows of equal length"),
@@ -283,6 +341,17 @@ def test_loads_that_make_no_sense_are_refused():
     ):
         with refused(words):
             model.step(*inputs, None, 1e-3, **given)
+    still = np.zeros(3)
+    for wrong, words in (
+        ((inputs[0], still * np.nan, None, 1e-3), "twist.*finite"),
+        ((inputs[0] * np.nan, still, None, 1e-3), "state.*finite"),
+        ((inputs[0], still, None, -1e-3), "dt.*>= 0"),
+        ((inputs[0], [True, 0.0, 0.0], None, 1e-3), "twist.*truth"),
+        ((inputs[0], still[:2], None, 1e-3), "twist.*shape"),
+        ((inputs[0][1:], still, None, 1e-3), "state.*shape"),
+    ):
+        with refused(words):
+            model.step(*wrong, loads=loads)
     with refused("normal_force.*None if loads"):
         model.step(*inputs, 1.0, 1e-3, loads=loads)
     with refused("moments.*None if loads"):
@@ -405,7 +474,7 @@ def test_derivatives_by_loads_are_those_of_differences(name):
     got = np.einsum("bdn,bn->bd", slopes.wrench_load, change.normal_force[:, 0])
     wrench = wanted.wrenches_dot[:, 0]
     np.testing.assert_allclose(got, wrench, atol=1e-9 * abs(wrench).max())
-    discs = model._bearing(loads).loads(change.normal_force[:, 0])
+    discs = model._bearing(loads).members.sums(change.normal_force[:, 0])
     axes = "bsn,bn->bs" if state.ndim == 2 else "ban,bn->ban"
     got = np.einsum(axes, slopes.state_load, discs)
     scale = abs(wanted.state_dot).max()

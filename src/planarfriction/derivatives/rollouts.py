@@ -360,7 +360,7 @@ def rollout_jvp(
         changes = validation.finite_numbers(name, tangent.normal_force)
         shape = *changes.shape[:-2], *np.shape(in_time(loads)[1])[-2:]
         changes = validation.filled(name, changes, shape)
-        heavier = model._bearing(changes).loads(changes)
+        heavier = model._bearing(changes).members.sums(changes)
         tangent = tangent._replace(normal_force=0.0)
     if faces.hangs(model, parameters):
         more = [

@@ -20,7 +20,7 @@ from planarfriction._support.pictures import picture
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LIGHTEST
 from planarfriction.laws import FrictionLaw
-from planarfriction.models.cell_loads import Cells
+from planarfriction.models.cell_loads import Cells, seen
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.moment_pressure import centre_of, moments_of
@@ -189,11 +189,13 @@ class FrictionModel(ByValue):
         for `loads` beside another load or in a model without cells.
         """
         compiled = self.compiled
-        plain = moments is None and loads is None and cover is None
-        done = plain and (
-            compiled.step_one(state, twist, normal_force, dt)
-            or compiled.step_batch(state, twist, normal_force, dt)
-        )
+        done: Any = None
+        if moments is loads is cover is None:
+            done = compiled.step_one(state, twist, normal_force, dt)
+            done = done or compiled.step_batch(state, twist, normal_force, dt)
+        elif moments is normal_force is None and type(loads) in (np.ndarray, tuple):
+            borne = seen(loads, cover)
+            done = compiled.step_borne(self._bearing(loads), state, twist, dt, borne)
         return done or compiled.step(
             *self._given(state, twist, normal_force, moments, loads, cover, dt)
         )
@@ -302,7 +304,7 @@ class FrictionModel(ByValue):
         return {
             name: value
             for name, value in self.__dict__.copy().items()
-            if name != "compiled"
+            if name not in ("compiled", "_cells")
         }
 
     # ------------------------------------------------------------------ inputs

@@ -15,67 +15,84 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction._engine.cells.gathering import Discs, gather
+from planarfriction._engine.cells.gathering import (
+    COVERED,
+    COVERED_BEFORE,
+    Bearing,
+    gather,
+)
+from planarfriction._engine.compiler.memory import StructBuffer
 from planarfriction._engine.records.pressing import Pressing
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.discs import Membership
 
+NOTHING = np.zeros(0)
+"""Numbers that do not change."""
+
 
 class Cells(NamedTuple):
-    """Cells of a patch, and the discs that stand for them."""
+    """Cells of a patch, and the bristles that stand for them."""
 
-    discs: Discs
-    """Cells, and discs of them, in lever coordinates from `middle`; cells that are bristles of their own stay."""
-    middle: np.ndarray
-    """Middle of the cells `[2]` [m], so that little is lost where they lie far from the origin."""
-    count: int
-    """Number N of cells."""
+    members: Membership
+    """Cells of each bristle."""
+    bearing: StructBuffer
+    """The same, as compiled loops read them (see `gathering.Bearing`)."""
+    rooms: list[Any]
+    """Memory for steps, which threads take and give back (see `CompiledModel.step_borne`)."""
 
     @classmethod
-    def alone(cls, count: int, stiffness: np.ndarray | None = None) -> Cells:
+    def alone(cls, bristles: Any) -> Cells:
         """Return cells each of which is a bristle of its own, which does not move."""
-        every = np.arange(count)
-        return cls.of(Membership(every, np.ones(count), every), stiffness)
+        every = np.arange(len(bristles.patch.positions))
+        members = Membership(every, np.ones(len(every)), every)
+        return cls.of(members, bristles, np.ones(len(every)))
 
     @classmethod
     def of(
         cls,
         members: Membership,
-        stiffness: np.ndarray | None,
-        discs: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
+        bristles: Any,
+        stiffness: np.ndarray,
+        levers: np.ndarray | None = None,
     ) -> Cells:
-        """Return cells in discs; `discs` are their shares, places `[N, 2]` and own second moments, if these move."""
-        count = int(members.cells.max()) + 1
-        begins = np.append(members.begins, len(members.cells))
-        stiffness = np.zeros(0) if stiffness is None else np.array(stiffness)
-        middle = np.zeros(2)
-        numbers = np.zeros((4, 0))
-        if discs is not None:
-            shares, places, squares = discs
-            middle = places.mean(axis=0)
-            x, y = (places - middle).T
-            numbers = np.array([shares, x, y, x * x + y * y + squares])
-        alike = members.cells, members.parted, begins
-        held = Discs(*alike, stiffness, numbers, np.zeros((3, len(members.begins))))
-        cells = cls(held, middle, count)
-        if discs is not None:
-            every = np.ones((1, count))
-            held.whole[:] = cells._gathered(every, every, every)[2]
-        return cells
+        """Return cells in `bristles`, of a machine form; those of a pad have a `stiffness` `[N]`, in any unit.
 
-    def loads(self, cells: np.ndarray) -> np.ndarray:
-        """Return loads `[..., n]` of discs, or changes of them, from those of cells `[..., N]`."""
-        parts = cells[..., self.discs.cells] * self.discs.parted
-        return np.add.reduceat(parts, self.discs.begins[:-1], axis=-1)
+        `levers` `[4, N]` are shares of the load, lever coordinates and own second moments of cells, if bristles move.
+        """
+        (cells, parted, begins) = members
+        whole = bristles.numbers()
+        (rows, n) = whole.shape
+        begins = np.append(begins, len(cells))
+        owner = np.repeat(np.arange(n), np.diff(begins))
+        shares = np.zeros(0)
+        if bristles.of_pad:
+            shares = parted * stiffness[cells] / members.sums(stiffness)[owner]
+        first = 3 if bristles.patch.anisotropic else 0
+        moments = np.zeros(0)
+        if levers is not None:
+            (share, x, y, squares) = levers[:, cells]
+            x, y = ((-y, x) if first else (x, y)) - whole[first : first + 2, owner]
+            seconds = x * x + y * y + squares
+            moments = (parted * share * [np.ones_like(x), x, y, seconds]).T.copy()
+        count = int(cells.max()) + 1
+        bearing = Bearing(
+            count, n, rows, first, np.array(cells), begins, np.array(parted), shares, moments, whole
+        )  # fmt: skip
+        return cls(members, StructBuffer(bearing), [])
+
+    @property
+    def count(self) -> int:
+        """Number N of cells."""
+        return self.bearing.record.count
 
     def spread(self, discs: np.ndarray) -> np.ndarray:
         """Return slopes `[..., N]` by the loads of cells from those by the loads of discs `[..., n]`."""
+        (cells, parted, begins) = self.members
         slopes = np.zeros((self.count, *discs.shape[:-1]))
-        parts = (
-            np.repeat(discs, np.diff(self.discs.begins), axis=-1) * self.discs.parted
-        )
-        np.add.at(slopes, self.discs.cells, np.moveaxis(parts, -1, 0))
+        sizes = np.diff(begins, append=len(cells))
+        parts = np.repeat(discs, sizes, axis=-1) * parted
+        np.add.at(slopes, cells, np.moveaxis(parts, -1, 0))
         return np.moveaxis(slopes, 0, -1)
 
     def under(self, loads: Any, cover: Any = None) -> Pressing:
@@ -84,46 +101,29 @@ class Cells(NamedTuple):
         Raises InvalidValueError for loads of another shape, negative or not finite, for shares outside [0, 1], and for
         shares of 0 where there is load.
         """
-        (earlier, now) = _pair("loads", loads, self.count)
-        (covered_before, covered) = (None, (now > 0.0).astype(float))
-        if cover is not None:
-            covered_before, covered = _pair("cover", cover, self.count)
-        if covered_before is None:
-            covered_before = covered if earlier is None else (earlier > 0.0) + 0.0
-        largest = max(each.max(initial=0.0) for each in (covered, covered_before))
-        if largest > 1.0:
-            raise InvalidValueError("cover", "be in [0, 1]", float(largest))
-        shapes = now.shape, covered.shape, covered_before.shape
+        loads = _pair("loads", loads, self.count)
+        cover = _pair("cover", cover, self.count)
+        for each in cover:
+            if each is not None and (largest := each.max(initial=0.0)) > 1.0:
+                raise InvalidValueError("cover", "be in [0, 1]", float(largest))
+        (*given, known) = seen(loads, cover)
+        shapes = [each.shape for each in given]
         batch = validation.common_shape("loads", shapes, "broadcast with cover")
-        given = [
-            np.ascontiguousarray(np.broadcast_to(each, batch)).reshape(-1, self.count)
-            for each in (now, covered, covered_before)
-        ]
-        if ((given[1] == 0.0) & (given[0] > 0.0)).any():
+        given = [np.broadcast_to(each, batch).flatten() for each in given]
+        own = self.bearing.record
+        (*lead, _) = batch
+        weights = np.empty((*lead, own.bristles))
+        numbers = kept = None
+        if own.stiffness.size or own.moments.size:
+            numbers = np.broadcast_to(own.whole, (*lead, *own.whole.shape)).copy()
+        if own.stiffness.size:
+            kept = np.empty_like(weights)
+        pressing = Pressing(np.empty(lead), weights, numbers, kept)
+        rows = [NOTHING if each is None else each.reshape(-1) for each in pressing]
+        gather(self.bearing.words, *given, known, *rows)
+        if (pressing.load < 0.0).any():
             raise InvalidValueError("cover", "be > 0 if a cell is loaded", 0.0)
-        weights, pads, moved = self._gathered(*given)
-        moved[:, :2] += self.middle[:, None]
-        load = given[0].sum(-1)
-        rows = load, weights, moved[:, :2], moved[:, 2], pads[:, 0], pads[:, 1]
-        return Pressing(
-            *(
-                None
-                if 0 in each.shape[1:]
-                else each.reshape((*batch[:-1], *each.shape[1:]))
-                for each in rows
-            )
-        )
-
-    def _gathered(
-        self, now: np.ndarray, cover: np.ndarray, before: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what `gather` writes."""
-        n = self.discs.whole.shape[1]
-        weights = np.empty((len(now), n))
-        pads = np.empty((len(now), 2, n if self.discs.stiffness.size else 0))
-        moved = np.empty((len(now), 3, n if self.discs.numbers.size else 0))
-        gather(now, cover, before, self.discs, weights, pads, moved)
-        return weights, pads, moved
+        return pressing
 
 
 def sequence_of(name: str, value: Any, ends: tuple[int, ...]) -> tuple[Any, Any]:
@@ -153,13 +153,32 @@ def in_time(value: Any) -> tuple[Any, Any]:
     return value if isinstance(value, tuple) and len(value) == 2 else (None, value)
 
 
-def _pair(name: str, value: Any, count: int) -> tuple[np.ndarray | None, np.ndarray]:
-    """Return the arrays before, or None, and now."""
+def seen(loads: Any, cover: Any) -> tuple[Any, Any, Any, Any, int]:
+    """Return loads and covers, now and before, as `gathering.bear` reads them."""
+    (earlier, now) = in_time(loads)
+    (before, covered) = in_time(cover)
+    known = 0 if covered is None else COVERED
+    if known and before is None and earlier is None:
+        before = covered
+    known += 0 if before is None else COVERED_BEFORE
+    earlier = now if earlier is None else earlier
+    covered = now if covered is None else covered
+    return now, earlier, covered, earlier if before is None else before, known
+
+
+def _pair(
+    name: str, value: Any, count: int
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Return the arrays before, or None, and now, or two times None."""
+    if value is None:
+        return None, None
     pair = in_time(value)
-    arrays = [None if each is None else _checked(name, each, count) for each in pair]
-    if arrays[1] is None:
+    if pair[1] is None:
         raise InvalidValueError(name, "be an array or (before, now)", value)
-    return arrays[0], arrays[1]
+    (before, now) = (
+        None if each is None else _checked(name, each, count) for each in pair
+    )
+    return before, now
 
 
 def _checked(name: str, value: Any, count: int) -> np.ndarray:

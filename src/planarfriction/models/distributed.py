@@ -94,8 +94,7 @@ class DistributedModel(FrictionModel):
 
     @functools.cached_property
     def _cells(self) -> Cells:
-        stiffness = None if self.pad is None else self.pad.pieces(self.patch, self.law)
-        return Cells.alone(self.patch.cells, stiffness)
+        return Cells.alone(self.compiled.bristles)
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Return the analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.

@@ -19,7 +19,6 @@ from planarfriction._engine.compiler import SOURCES, kept_numbers
 from planarfriction._engine.compiler.messages import show, watched
 from planarfriction._engine.compiler.sources import digest_of
 from planarfriction.laws import FrictionLaw, LuGre
-from planarfriction.models.cell_loads import Cells
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.pads import Pad, Pieces
 from planarfriction.patch import ContactPatch
@@ -83,13 +82,18 @@ def _gathered(
     members = clusters_of(patch, shares, n)
     weights = patch.weights()
     squares = (patch.cell_extents() ** 2).sum(axis=1) / 12.0
-    cells = Cells.of(members, None, (weights, patch.positions, squares))
-    places = cells.discs.whole[:2].T + cells.middle
+    middle = patch.positions.mean(axis=0)
+    x, y = (patch.positions - middle).T
+    moments = members.sums(
+        weights * np.array([np.ones_like(x), x, y, x * x + y * y + squares])
+    )
+    x, y, second = moments[1:] / moments[0]
+    radii = np.sqrt(2.0 * np.maximum(second - x * x - y * y, 0.0))
     areas = members.sums(patch.areas)
     law = PerCell(members.sums(weights) / areas)
     with warnings.catch_warnings(action="ignore"):  # of the size, said before
         few = type(patch)(
-            places, areas, law, None, patch.name, radii=cells.discs.whole[2]
+            np.stack([x, y], -1) + middle, areas, law, None, patch.name, radii=radii
         )
     return few, members.sums(stiffness)
 

@@ -98,21 +98,22 @@ class ReducedModel(FrictionModel):
         else:
             shares = patch.weights()
             members = clusters_of(patch, self.pad.shares(patch), n)
-        stiffness = None if self.pad is None else self.pad.pieces(patch, self.law)
         if members is None:
-            return Cells.alone(patch.cells, stiffness)
+            return self.reduction._cells
+        bristles = self.compiled.bristles
+        stiffness = shares if self.pad is None else self.pad.pieces(patch, self.law)
         if is_rate_law(self.law):
-            return Cells.of(members, stiffness)
-        places = np.stack(patch.lever_coordinates(*patch.positions.T), -1)
+            return Cells.of(members, bristles, stiffness)
+        places = patch.lever_coordinates(*patch.positions.T)
         squares = 0.5 * cells.lever_radii**2
-        return Cells.of(members, stiffness, (shares, places, squares))
+        levers = np.array([shares, *places, squares])
+        return Cells.of(members, bristles, stiffness, levers)
 
     def _bearing(self, loads: Any) -> Cells:
-        count = self.reduction.patch.cells
+        few = self.reduction
         shape = validation.numbers("loads", in_time(loads)[1]).shape
-        if shape[-1:] == (count,) != (self.patch.cells,):
-            alike = None if self.pad is None else np.ones(count)
-            return Cells.alone(count, alike)
+        if shape[-1:] == (few.patch.cells,) != (self.patch.cells,):
+            return few._cells
         return self._cells
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
@@ -129,6 +130,7 @@ class ReducedModel(FrictionModel):
         changed.__dict__.update(
             self.__dict__, law=law, reduction=self.reduction.with_law(law)
         )
+        changed.__dict__.pop("_cells", None)
         return changed
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:

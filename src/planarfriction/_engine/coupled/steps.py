@@ -17,11 +17,12 @@ import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 
+from planarfriction._engine.cells.gathering import Bearing, bear
 from planarfriction._engine.codegen.vectors import clear, copy, put, three, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel, sequential_jit
 from planarfriction._engine.compiler.calls import call, pointer
-from planarfriction._engine.compiler.memory import Doubles, Place, at, reader
+from planarfriction._engine.compiler.memory import Doubles, Place, at, exists, reader
 from planarfriction._engine.protocol import SLOPES
 
 SCRATCH = 7
@@ -150,6 +151,78 @@ def step_many(
         dt_b = dt[b if steps > 1 else 0]
         into = at(ends, n * b), at(wrenches, 3 * b)
         _step(table, b, at(states, n * b), seen, dt_b, *into, at(seen, 4))
+        valid = valid and xp.in_range(wrenches[3 * b])
+    return valid
+
+
+class Borne(NamedTuple):
+    """A contact whose pressure is given anew at each step, and memory for it."""
+
+    stepped: Stepped
+    bearing: Bearing
+    weights: Doubles
+    """[n]"""
+    numbers: Doubles
+    """Numbers of the bristles `[rows, n]`."""
+    kept: Doubles
+    """What is kept of deflections [n]; empty without a pad."""
+    state: Doubles
+    """State that the pressure leaves, [S]."""
+
+
+_read_borne = reader(Borne)
+
+
+@kernel
+def _first(row: np.ndarray, count: int, b: int) -> Doubles:
+    """Return the `count` numbers of contact b in a flat array, which may hold those of one for all."""
+    return at(pointer(row), b * count if row.shape[0] > count else 0)
+
+
+@kernel
+def _left(borne: Borne, z: Doubles) -> Doubles:
+    """Return the state that the pressure leaves of one before."""
+    if not exists(borne.kept):
+        return z
+    states = borne.stepped.states
+    n = borne.bearing.bristles
+    copy(z, borne.state, states)
+    for i in range(states // n):
+        for k in range(n):
+            borne.state[i * n + k] *= borne.kept[k]
+    return borne.state
+
+
+@jit
+def step_borne(
+    borne: np.ndarray, z: np.ndarray, twist: np.ndarray, dt: float, loads: np.ndarray, earlier: np.ndarray,
+    cover: np.ndarray, before: np.ndarray, known: int, result: np.ndarray,
+) -> bool:  # fmt: skip
+    """Step B contacts under loads of their N cells (see `gathering.bear`); all arrays are flat, and fit each other.
+
+    `borne` are the words of `Borne`; `z` [B S], `twist` [B 3], loads and covers [B N or N]. New states and wrenches go
+    into the first of `result`, the last `SCRATCH` of which are scratch.
+    """
+    own = _read_borne(borne)
+    s = own.stepped.states
+    n = own.bearing.count
+    count = z.shape[0] // s
+    if not (_in_order(z, z.shape[0]) and _in_order(twist, twist.shape[0])):
+        return False
+    wrenches = at(pointer(result), count * s)
+    v = at(wrenches, count * 3)
+    valid = True
+    for b in range(count):
+        copy(at(pointer(twist), 3 * b), v, 3)
+        v[3] = bear(
+            own.bearing, _first(loads, n, b), _first(earlier, n, b), _first(cover, n, b), _first(before, n, b), known,
+            own.weights, own.numbers, own.kept,
+        )  # fmt: skip
+        if not _positive(v[3], dt):
+            return False
+        left = _left(own, at(pointer(z), b * s))
+        into = at(pointer(result), b * s), at(wrenches, 3 * b)
+        _step(own.stepped, 0, left, v, dt, *into, at(v, 4))
         valid = valid and xp.in_range(wrenches[3 * b])
     return valid
 
@@ -286,6 +359,7 @@ SIGNATURES: dict[Any, tuple] = {
     step_many: (_VECTOR, _ROWS, _ROWS, _VECTOR, _VECTOR, _ROWS, _ROWS, _VECTOR),
     jacobians: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
     in_order: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
+    step_borne: (*(_VECTOR,) * 3, _NUMBER, *(_VECTOR,) * 4, types.int64, _VECTOR),
 }
 """Types of the arguments of each entry point."""
 _COMPILING = threading.Lock()

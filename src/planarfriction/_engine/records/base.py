@@ -14,13 +14,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.compiler.memory import StructBuffer
 from planarfriction._engine.coupled.steps import (
     PLAIN,
     REFUSED,
     SCRATCH,
     UNFIT,
+    Borne,
     jacobians,
     ready,
+    step_borne,
     step_many,
     step_one,
 )
@@ -267,6 +270,55 @@ class CompiledModel:
         except REFUSED:
             return None
         return new if state.ndim == 2 else new.reshape(state.shape), wrench
+
+    def step_borne(
+        self, cells: Any, state: Any, twist: Any, dt: Any, given: tuple[Any, ...]
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Step one contact or a batch whose `cells` bear `given` loads (see `cell_loads.seen`), or return None."""
+        try:
+            if type(twist) is not _ARRAY and PLAIN.issuperset(map(type, twist)):
+                twist = _MAKE(twist, float)
+            batch = twist.shape[:-1]
+            alike = (cells.count,), (*batch, cells.count)
+            if (
+                type(dt) not in PLAIN
+                or twist.shape[-1:] != (3,)
+                or state.shape != (*batch, *self.state_shape)
+            ):
+                return None
+            inputs = [state.reshape(-1), twist.reshape(-1), dt]
+            for row in given[:-1]:
+                if row.shape not in alike:
+                    return None
+                inputs.append(row.reshape(-1))
+        except (*REFUSED, AttributeError):
+            return None
+        behind = state.size
+        result = _EMPTY(behind + twist.size + SCRATCH + self.behind)
+        room = cells.rooms.pop() if cells.rooms else self._room(cells)
+        try:
+            done = step_borne(room[0].words, *inputs, given[-1], result)
+        except REFUSED:
+            return None
+        finally:
+            cells.rooms.append(room)
+        if not done:
+            return None
+        wrench = result[behind : behind + twist.size]
+        return result[:behind].reshape(state.shape), wrench.reshape(twist.shape)
+
+    def _room(self, cells: Any) -> tuple[StructBuffer, PackedModel]:
+        """Return memory for a step under given loads, and the contact that lies in it."""
+        ready(step_borne)
+        own = cells.bearing.record
+        weights = np.full((1, own.bristles), 1.0 / own.bristles)
+        given = Pressing(np.ones(1), weights, own.whole[None].copy())
+        ((_, contact, _),) = self.pressed(given.load, given)
+        (weights, numbers) = contact.keepalive[:2]
+        kept = np.empty(own.bristles if own.stiffness.size else 0)
+        words = self.step_table(contact)
+        borne = Borne(words, own, weights, numbers, kept, np.empty(self._size))  # pyright: ignore[reportArgumentType]
+        return StructBuffer(borne), contact
 
     def jacobians_one(
         self, state: Any, twist: Any, normal_force: Any, dt: Any

@@ -111,36 +111,30 @@ class CompiledDistributed(CompiledModel):
         yield slice(None), self.under(pressure), None
 
     def under(self, given: Pressing) -> PackedModel:
-        """Pack the cells under given loads, with numbers of their own if they move or their stiffness changes."""
-        packed = self._packed(given.weights)
-        if given.places is None and given.stiffer is None:
-            return packed
-        return self._anew(packed, self.numbers_under(given), packed.keepalive[0])
-
-    def _anew(
-        self, packed: PackedModel, numbers: np.ndarray, weights: np.ndarray
-    ) -> PackedModel:
-        """Return cells with `numbers` `[R, numbers, n]` and `weights` `[R, n]` of their own in each row."""
-        (record, _) = self.record(numbers[0], weights)
-        columns = {"weights": places_of(weights), "cells": places_of(numbers)}
-        rows = rows_of(record, len(weights), **columns)
-        return packed._replace(records=rows, keepalive=(weights, numbers))
+        """Pack the cells under given loads."""
+        return self._anew(self.numbers_under(given), given.weights)
 
     def numbers_under(self, given: Pressing) -> np.ndarray:
-        """Return the `numbers` of the cells under given loads `[R, numbers, n]`, or one row if they stay."""
-        numbers = self.numbers()[None]
-        if given.places is None and given.stiffer is None:
-            return numbers
-        numbers = np.tile(numbers, (len(given.weights), 1, 1))
-        if given.places is not None:
-            x, y = np.moveaxis(given.places, -2, 0)
-            first = 3 if self.patch.anisotropic else 0
-            numbers[:, first] = -y if first else x
-            numbers[:, first + 1] = x if first else y
-            numbers[:, first + 2] = KAPPA * given.radii
-        if given.stiffer is not None:
-            numbers[:, -1] *= given.stiffer
-        return numbers
+        """Return the `numbers` of the cells under given loads `[R, rows, n]`, or one row if they stay."""
+        return (
+            self._whole.keepalive[1][None] if given.numbers is None else given.numbers
+        )
+
+    @functools.cached_property
+    def _whole(self) -> PackedModel:
+        """The cells at equal weights."""
+        n = len(self.patch.positions)
+        return self._packed(np.full((1, n), 1.0 / n))
+
+    def _anew(self, numbers: np.ndarray, weights: np.ndarray) -> PackedModel:
+        """Return cells with `numbers` `[1 or R, numbers, n]` and `weights` `[R, n]` in each row."""
+        weights = np.ascontiguousarray(weights)
+        numbers = np.ascontiguousarray(numbers)
+        (record, _) = self.record(numbers[0], weights)
+        rows = len(weights)
+        cells = np.broadcast_to(places_of(numbers), rows)
+        packed = rows_of(record, rows, weights=places_of(weights), cells=cells)
+        return self._whole._replace(records=packed, keepalive=(weights, numbers))
 
     def step_jacobians(
         self,
@@ -158,7 +152,7 @@ class CompiledDistributed(CompiledModel):
         numbers = np.broadcast_to(numbers, (rows, *numbers.shape[1:]))
         numbers = np.ascontiguousarray(numbers).reshape(rows * n, -1, 1)
         weights = np.ones((rows * n, 1))
-        contact = self._anew(self._packed(pressure.weights), numbers, weights)
+        contact = self._anew(numbers, weights)
         contact = contact._replace(states=self.size)
         shares = np.maximum(pressure.weights, LIGHTEST)
         left = pressure.left(state, self.size).reshape(rows, self.size, n)

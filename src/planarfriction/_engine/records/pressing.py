@@ -14,12 +14,8 @@ class Pressing(NamedTuple):
     """Loads of the contacts `[...]` [N]."""
     weights: np.ndarray
     """Shares of them that each bears `[..., n]`."""
-    places: np.ndarray | None = None
-    """Centres of discs in lever coordinates `[..., 2, n]` [m]; None if they stay."""
-    radii: np.ndarray | None = None
-    """Radii of discs in lever coordinates `[..., n]` [m]."""
-    stiffer: np.ndarray | None = None
-    """Stiffness over that with all cells pressed `[..., n]`; None without a pad."""
+    numbers: np.ndarray | None = None
+    """Numbers of bristles `[..., rows, n]` (see `cells.CellsContact`); None if they stay as they are."""
     kept: np.ndarray | None = None
     """Share of the deflection that stays `[..., n]`; None if all does."""
 

@@ -33,6 +33,7 @@ class CompiledRateCells(CompiledDistributed):
     """Machine form of a `DistributedModel` with a `RateLaw` on a patch."""
 
     step_one = _finite(CompiledDistributed.step_one)
+    step_borne = _finite(CompiledDistributed.step_borne)
     step_batch = _finite(CompiledDistributed.step_batch)
     jacobians_one = _finite(CompiledDistributed.jacobians_one)
     evaluate = _finite(CompiledDistributed.evaluate)
