@@ -20,6 +20,7 @@ from pydrake.geometry import (
     CollisionFilterDeclaration,
     Cylinder,
     GeometrySet,
+    Mesh,
     Sphere,
 )
 from pydrake.math import RigidTransform
@@ -604,10 +605,13 @@ def test_without_drake_the_extra_is_named(monkeypatch):
 # ---------------------------------------------------------------------- pressures of contact surfaces
 
 
+TABLE = RigidTransform([0, -0.2, -0.05]), Box(0.4, 0.4, 0.1)
+
+
 def spun(
-    shape, height, model, beyond=0.0, hint=0.005, rolling=0.0, time=2e-3, **options
-):
-    """Return torque, load, covers and contact surface of a shape of 0.2 kg that spins, `beyond` an edge in y.
+    shape, height, model, beyond=0.0, hint=0.005, rolling=0.0, time=2e-3, table=TABLE, **options
+):  # fmt: skip
+    """Return wrench, load, covers and contact surface of a shape of 0.2 kg that spins, `beyond` an edge in y.
 
     It may roll along x, so fast.
     """
@@ -617,9 +621,8 @@ def spun(
     compliant = material("hydroelastic")
     compliant.UpdateProperty("hydroelastic", "resolution_hint", hint)
     plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "solid", compliant)
-    table = RigidTransform([0, -0.2, -0.05]), Box(0.4, 0.4, 0.1), "table"
     rigid = material("hydroelastic", rigid=True)
-    plant.RegisterCollisionGeometry(plant.world_body(), *table, rigid)
+    plant.RegisterCollisionGeometry(plant.world_body(), *table, "table", rigid)
     bottom = RigidTransform([0, 0, -height])
     plant.AddFrame(FixedOffsetFrame("bottom", body.body_frame(), bottom))
     plant.Finalize()
@@ -633,12 +636,12 @@ def spun(
     run.to(0.1)
     plant.SetVelocities(run.context, [0, rolling / height, 20.0, rolling, 0, 0])
     run.to(0.1 + time)
-    torque = friction.get_wrenches_output_port().Eval(run.own)[2]
+    wrench = friction.get_wrenches_output_port().Eval(run.own)
     load = friction.get_loads_output_port().Eval(run.own)[0]
     results = plant.get_contact_results_output_port().Eval(run.context)
     surface = results.hydroelastic_contact_info(0).contact_surface()
     assert friction.GetReport(run.own).converged
-    return torque, load, friction._read(run.own, "covers"), surface
+    return wrench, load, friction._read(run.own, "covers"), surface
 
 
 def test_a_ball_presses_as_its_contact_surface_does():
@@ -647,7 +650,7 @@ def test_a_ball_presses_as_its_contact_surface_does():
     patch = pf.ContactPatch.rectangle(0.02, cells=24)
     model = pf.DistributedModel(patch, law)
     where = {"beyond": -0.2, "centre": "contact"}
-    torque, load, _, surface = spun(Sphere(0.05), 0.05, model, **where)
+    (*_, torque), load, _, surface = spun(Sphere(0.05), 0.05, model, **where)
     radius = np.sqrt(surface.total_area() / np.pi)
     assert torque == pytest.approx(-8.0 / 15.0 * 0.3 * load * radius, rel=0.01)
 
@@ -659,7 +662,7 @@ def test_a_ball_that_rolls_presses_other_cells_all_the_time(few, close):
     patch = pf.ContactPatch.rectangle(0.02, cells=24)
     kind = pf.ReducedModel if few else pf.DistributedModel
     where = {"beyond": -0.2, "centre": "contact", "rolling": 0.2, "time": 0.2}
-    torque, load, _, surface = spun(Sphere(0.05), 0.05, kind(patch, law), **where)
+    (*_, torque), load, _, surface = spun(Sphere(0.05), 0.05, kind(patch, law), **where)
     radius = np.sqrt(surface.total_area() / np.pi)
     assert torque == pytest.approx(-8.0 / 15.0 * 0.3 * load * radius, rel=close)
 
@@ -670,14 +673,93 @@ def test_a_disc_over_an_edge_acts_with_the_part_that_is_borne(few):
     patch = pf.ContactPatch.disc(0.05, cells=21)
     kind = pf.ReducedModel if few else pf.DistributedModel
     shape = Cylinder(0.05, 0.02)
-    torque, load, covers, _ = spun(shape, 0.01, kind(patch, COULOMB), -0.02, 0.02)
+    model = kind(patch, COULOMB)
+    (*_, torque), load, covers, _ = spun(shape, 0.01, model, -0.02, 0.02)
     assert covers[patch.positions[:, 1] > 0.023].max() == 0.0
     assert covers[abs(patch.positions[:, 1]) < 0.01].min() > 0.5
-    places = pf.ContactPatch.disc(0.05, cells=201).positions
-    places = places[places[:, 1] < 0.02]
+    wanted = pressed_by_a_plane(pf.ContactPatch.disc(0.05, cells=201), 0.02, load)
+    assert torque == pytest.approx(wanted[1], rel=0.03)
+
+
+def pressed_by_a_plane(patch, end, load):
+    """Return force and torque of a spin, mu = 0.3, of the part of a patch up to y = `end` under a plane of pressure."""
+    places = patch.positions[patch.positions[:, 1] < end]
     pressed = load * pf.ContactPatch.points(places).weights(1.0, moments=(0.0, 0.0))
     arms = np.hypot(*places.T)
-    assert torque == pytest.approx(-0.3 * (pressed * arms).sum(), rel=0.03)
+    return 0.3 * (pressed * places[:, 1] / arms).sum(), -0.3 * (pressed * arms).sum()
+
+
+def fine_table(file, side=0.01):
+    """Return a table of 0.12 x 0.16 x 0.1 m up to y = 0 with faces of `side`: Drake's own boxes have few."""
+    corners, triangles = [], []
+    x, y, z = np.diag([0.12, 0.16, 0.1])
+    low = np.array([-0.06, -0.16, -0.1])
+    high = low + x + y + z
+    faces = (low, y, x), (low, x, z), (low, z, y), (high, -x, -y), (high, -z, -x), (high, -y, -z)  # fmt: skip
+    for corner, along, across in faces:
+        (m, n) = (round(np.linalg.norm(each) / side) for each in (along, across))
+        first = len(corners) + 1
+        for i, j in np.ndindex(m + 1, n + 1):
+            corners.append(corner + along * i / m + across * j / n)
+        for i, j in np.ndindex(m, n):
+            k = first + i * (n + 1) + j
+            triangles += [(k, k + n + 1, k + n + 2), (k, k + n + 2, k + 1)]
+    lines = [f"v {a:.6f} {b:.6f} {c:.6f}" for a, b, c in corners]
+    file.write_text("\n".join([*lines, *(f"f {a} {b} {c}" for a, b, c in triangles)]))
+    return RigidTransform(), Mesh(str(file))
+
+
+@pytest.mark.parametrize(("few", "close"), [(False, 0.01), (True, 0.02)])
+def test_a_box_over_an_edge_acts_with_the_part_that_is_borne(few, close, tmp_path):
+    """Three and four tenths of it are over the edge; the force of a spin is in the friction of all of it."""
+    patch = pf.ContactPatch.rectangle(0.06, 0.1, (12, 20))
+    model = (pf.ReducedModel if few else pf.DistributedModel)(patch, COULOMB)
+    table = fine_table(tmp_path / "table.obj")
+    for over in (0.02, 0.01):
+        shape = Box(0.06, 0.1, 0.02), 0.01
+        wrench, load, *_ = spun(*shape, model, -over, table=table)
+        whole = pf.ContactPatch.rectangle(0.06, 0.1, (120, 200))
+        force, torque = pressed_by_a_plane(whole, over, load)
+        assert wrench[2] == pytest.approx(torque, rel=close)
+        assert wrench[0] == pytest.approx(
+            force, abs=(0.05 if few else 0.01) * 0.3 * load
+        )
+
+
+@pytest.mark.parametrize("patches", [True, False])
+def test_a_box_tips_over_an_edge_where_it_does_without_patches(patches):
+    """On springs of 10 MPa over 20 mm, which a plane of pressure leaves at 0.4875 of the box; Drake's at 0.48."""
+    stiff, side, high, weight = 1e7 / 0.02, 0.06, 0.02, 0.2 * 9.81
+    least = (np.sqrt(2.0 * weight / (stiff * side)) / (6.0 * high)) ** (2.0 / 3.0)
+    assert 0.5 - 3.0 * high * least / 0.1 == pytest.approx(0.4875, abs=1e-3)
+    for over, tips in ((0.47, False), (0.49, True)):
+        builder, plant, scene_graph = bare(2e-3)
+        unit = UnitInertia.SolidBox(0.06, 0.1, 0.04)
+        body = plant.AddRigidBody("body", SpatialInertia(0.2, [0, 0, 0], unit))
+        soft, rigid = material("hydroelastic"), material("hydroelastic", rigid=True)
+        soft.UpdateProperty("hydroelastic", "hydroelastic_modulus", 1e7)
+        for each in (soft, rigid):
+            each.UpdateProperty("material", "hunt_crossley_dissipation", 100.0)
+        add = plant.RegisterCollisionGeometry
+        add(body, RigidTransform(), Box(0.06, 0.1, 0.04), "solid", soft)
+        add(plant.world_body(), *TABLE, "table", rigid)
+        bottom = RigidTransform([0, 0, -0.02])
+        plant.AddFrame(FixedOffsetFrame("bottom", body.body_frame(), bottom))
+        plant.Finalize()
+        start = RigidTransform([0, 0.1 * (over - 0.5), 0.02])
+        plant.SetDefaultFloatingBaseBodyPose(body, start)
+        model = pf.ReducedModel(pf.ContactPatch.rectangle(0.06, 0.1, (9, 15)), LAW)
+        contact = PatchContact(
+            model, frame="bottom", geometries=("body", "table"), pressure="surface"
+        )
+        if patches:
+            prepare(plant, scene_graph, [contact])
+            Friction.AddToBuilder(builder, plant, scene_graph, [contact])
+        simulator = Simulator(builder.Build())
+        simulator.AdvanceTo(0.8)
+        context = plant.GetMyContextFromRoot(simulator.get_context())
+        turn = plant.EvalBodyPoseInWorld(context, body).rotation().matrix()
+        assert (abs(np.arctan2(turn[2, 1], turn[1, 1])) > 0.15) == tips
 
 
 def test_contact_surfaces_press_cells_alone():
