@@ -1,4 +1,4 @@
-"""Steps in C whose pressure follows the moments of the load, against those of the library."""
+"""Steps in C whose pressure follows the moments of the load, or given loads, against those of the library."""
 
 import ctypes
 import shutil
@@ -99,3 +99,55 @@ def test_bad_moments(moments):
     (_, twist, load, dt, _) = (each[1] for each in inputs(made))
     state, wrench, code = run(made, before, twist, load, dt, moments)
     assert code == 2 and np.array_equal(state, before) and np.all(wrench == 7.0)
+
+
+GIVEN = "few", "distributed", "soft", "layer of points", "half-space"
+
+
+@pytest.mark.parametrize(
+    ("name", "precision"), [*((name, "double") for name in GIVEN), ("few", "float")]
+)
+def test_steps_under_given_loads(name, precision):
+    """Loads of discs or cells change at each step, and some are without; they come back without deflection."""
+    made = library(name, precision)
+    discs = made.model.reduction.patch.cells
+    rng = np.random.default_rng(8)
+    pushes = rng.exponential(2.0 / discs, (60, discs)) * (rng.random((60, discs)) > 0.3)
+    pushes[30] = 0.0
+    real = np.ctypeslib.as_ctypes_type(made.kind)
+    params = ctypes.c_char.in_dll(made.functions, "friction_default")
+    state = made.model.rest()
+    own = np.array(state, made.kind)
+    wrench = np.zeros(3, made.kind)
+    before = pushes[0]
+    found, wanted = [], []
+    for now in pushes:
+        twist = rng.normal(size=3) * [0.02, 0.02, 2.0]
+        given = (np.array(each, made.kind) for each in (twist, now))
+        pointers = [each.ctypes for each in (own, *given, wrench)]
+        state, force = made.model.step(state, twist, None, 1e-3, loads=(before, now))
+        code = made.functions.friction_step_loads(
+            ctypes.byref(params), *pointers[:3], real(1e-3), pointers[3]
+        )
+        assert code == 0
+        found.append(wrench / [1.0, 1.0, 0.01])
+        wanted.append(force / [1.0, 1.0, 0.01])
+        before = now
+    close = 1e-10 if precision == "double" else 1e-4
+    np.testing.assert_allclose(found, wanted, atol=close * np.abs(wanted).max())
+    np.testing.assert_allclose(own, state, atol=close * np.abs(state).max())
+
+
+@pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf])
+def test_bad_loads(wrong):
+    made = library("few")
+    state = made.model.rest() + 1e-9
+    loads = np.ones(made.model.reduction.patch.cells)
+    loads[3] = wrong
+    given = [state.copy(), np.zeros(3), loads, np.full(3, 7.0)]
+    params = ctypes.c_char.in_dll(made.functions, "friction_default")
+    pointers = [each.ctypes for each in given]
+    code = made.functions.friction_step_loads(
+        ctypes.byref(params), *pointers[:3], ctypes.c_double(1e-3), pointers[3]
+    )
+    assert code == 2 and np.array_equal(given[0], state) and np.all(given[3] == 7.0)
