@@ -78,6 +78,27 @@ def test_loads_of_the_pressure_are_the_normal_force(name):
         )
 
 
+@pytest.mark.parametrize("name", ["discs", "discs of a layer", "common compliance"])
+def test_loads_of_discs_act_as_those_of_the_model_of_the_discs(name):
+    """Discs stay where they are; under shares of the pressure they bear what a normal force does."""
+    model = MODELS[name]
+    few = model.reduction
+    state, twist, _ = drawn(model, 4, np.random.default_rng(11))
+    loads = 2.5 * few.patch.weights()
+    given = model.step(state, twist, None, 1e-3, loads=loads)
+    for got, wanted in zip(given, model.step(state, twist, 2.5, 1e-3), strict=True):
+        np.testing.assert_allclose(
+            got, wanted, rtol=0.0, atol=1e-12 * abs(wanted).max()
+        )
+    half = loads * (few.patch.positions[:, 0] > 0.0)
+    pairs = {"loads": (loads, half)}
+    given = model.step(state, twist, None, 1e-3, **pairs)
+    for got, wanted in zip(
+        given, few.step(state, twist, None, 1e-3, **pairs), strict=True
+    ):
+        np.testing.assert_array_equal(got, wanted)
+
+
 def test_loads_under_moments_are_those_of_the_tilted_pressure():
     model = MODELS["cells"]
     state, twist, _ = drawn(model, 4, np.random.default_rng(2))
