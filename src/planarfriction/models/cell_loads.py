@@ -109,7 +109,7 @@ class Cells(NamedTuple):
         (*given, known) = seen(loads, cover)
         shapes = [each.shape for each in given]
         batch = validation.common_shape("loads", shapes, "broadcast with cover")
-        given = [np.broadcast_to(each, batch).flatten() for each in given]
+        given = tuple(np.broadcast_to(each, batch).flatten() for each in given)
         own = self.bearing.record
         (*lead, _) = batch
         weights = np.empty((*lead, own.bristles))
@@ -120,7 +120,7 @@ class Cells(NamedTuple):
             kept = np.empty_like(weights)
         pressing = Pressing(np.empty(lead), weights, numbers, kept)
         rows = [NOTHING if each is None else each.reshape(-1) for each in pressing]
-        gather(self.bearing.words, *given, known, *rows)
+        gather(self.bearing.words, given, known, *rows)
         if (pressing.load < 0.0).any():
             raise InvalidValueError("cover", "be > 0 if a cell is loaded", 0.0)
         return pressing

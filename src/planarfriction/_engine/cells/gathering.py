@@ -137,12 +137,13 @@ def bear(
 
 @jit
 def gather(
-    bearing: np.ndarray, loads: np.ndarray, earlier: np.ndarray, cover: np.ndarray, before: np.ndarray, known: int,
-    load: np.ndarray, weights: np.ndarray, numbers: np.ndarray, kept: np.ndarray,
+    bearing: np.ndarray, given: tuple[np.ndarray, ...], known: int, load: np.ndarray, weights: np.ndarray,
+    numbers: np.ndarray, kept: np.ndarray,
 ) -> None:  # fmt: skip
     """Call `bear` for B contacts; all arrays are flat, those of numbers that do not change empty."""
     own = read_bearing(bearing)
     n = own.bristles
+    (loads, earlier, cover, before) = given
     for b in range(load.shape[0]):
         i = b * own.count
         load[b] = bear(

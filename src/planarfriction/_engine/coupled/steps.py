@@ -195,17 +195,18 @@ def _left(borne: Borne, z: Doubles) -> Doubles:
 
 @jit
 def step_borne(
-    borne: np.ndarray, z: np.ndarray, twist: np.ndarray, dt: float, loads: np.ndarray, earlier: np.ndarray,
-    cover: np.ndarray, before: np.ndarray, known: int, result: np.ndarray,
+    borne: np.ndarray, z: np.ndarray, twist: np.ndarray, dt: float, given: tuple[np.ndarray, ...], known: int,
+    result: np.ndarray,
 ) -> bool:  # fmt: skip
     """Step B contacts under loads of their N cells (see `gathering.bear`); all arrays are flat, and fit each other.
 
-    `borne` are the words of `Borne`; `z` [B S], `twist` [B 3], loads and covers [B N or N]. New states and wrenches go
-    into the first of `result`, the last `SCRATCH` of which are scratch.
+    `borne` are the words of `Borne`; `z` [B S], `twist` [B 3], the `given` loads and covers [B N or N]. New states and
+    wrenches go into the first of `result`, the last `SCRATCH` of which are scratch.
     """
     own = _read_borne(borne)
     s = own.stepped.states
     n = own.bearing.count
+    (loads, earlier, cover, before) = given
     count = z.shape[0] // s
     if not (_in_order(z, z.shape[0]) and _in_order(twist, twist.shape[0])):
         return False
@@ -359,7 +360,13 @@ SIGNATURES: dict[Any, tuple] = {
     step_many: (_VECTOR, _ROWS, _ROWS, _VECTOR, _VECTOR, _ROWS, _ROWS, _VECTOR),
     jacobians: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
     in_order: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
-    step_borne: (*(_VECTOR,) * 3, _NUMBER, *(_VECTOR,) * 4, types.int64, _VECTOR),
+    step_borne: (
+        *(_VECTOR,) * 3,
+        _NUMBER,
+        types.UniTuple(_VECTOR, 4),
+        types.int64,
+        _VECTOR,
+    ),
 }
 """Types of the arguments of each entry point."""
 _COMPILING = threading.Lock()

@@ -286,18 +286,19 @@ class CompiledModel:
                 or state.shape != (*batch, *self.state_shape)
             ):
                 return None
-            inputs = [state.reshape(-1), twist.reshape(-1), dt]
+            inputs = state.reshape(-1), twist.reshape(-1), float(dt)
+            rows = []
             for row in given[:-1]:
                 if row.shape not in alike:
                     return None
-                inputs.append(row.reshape(-1))
+                rows.append(row.reshape(-1))
         except (*REFUSED, AttributeError):
             return None
         behind = state.size
         result = _EMPTY(behind + twist.size + SCRATCH + self.behind)
         room = cells.rooms.pop() if cells.rooms else self._room(cells)
         try:
-            done = step_borne(room[0].words, *inputs, given[-1], result)
+            done = step_borne(room[0].words, *inputs, tuple(rows), given[-1], result)
         except REFUSED:
             return None
         finally:
