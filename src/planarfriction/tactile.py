@@ -253,14 +253,18 @@ def _by_forces(
     shears = half_space.compliances(points, patch.positions, patch.cell_extents(), *law)
     shears = shears.reshape(2, len(points), 2, patch.cells).swapaxes(0, 1)
     shears = shears / patch.areas
-    pieces = -few.pad.pieces(few.patch, few.law)
+    pieces = -pad.pieces(few.patch, few.law)
     if few.patch.cells == patch.cells:
         response = np.zeros((len(points), 2, few.patch.bristles, patch.cells))
         response[:, :, :2] = (
             shears * pieces
         )  # no spin of a single cell moves its neighbours
         return response
-    members = clusters_of(patch, pad.shares(patch), model.cells)
+    members = clusters_of(
+        patch,
+        pad.shares(patch),
+        model.cells,  # pyright: ignore[reportAttributeAccessIssue]
+    )
     weights = patch.weights()
     x, y = patch.positions.T
     load = members.sums(weights)

@@ -214,8 +214,13 @@ def _lines(runs: Mapping[str, xr.Dataset], name: str) -> list[_Line]:
     """Return one line of a panel for each run, or for each contact of each run."""
     lines = []
     for run, data in enumerate(runs.values()):
-        found = np.hypot(data["vx"], data["vy"]) if name == "speed" else data[name]
-        values = found.values.reshape(data.sizes["time"], -1)
+        speed = name == "speed"
+        found = (
+            np.hypot(data["vx"].values, data["vy"].values)
+            if speed
+            else data[name].values
+        )
+        values = found.reshape(data.sizes["time"], -1)
         lines += [
             _Line(run, contact, data["time"].values, each)
             for contact, each in enumerate(values.T)

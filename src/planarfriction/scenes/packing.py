@@ -346,8 +346,9 @@ class SegmentBatches:
         for c, contact in enumerate(self._scene.contacts):
             between = self._between[c]
             if between is None:
+                model = old[c] if old else None
                 self.models.append(
-                    old[c] if old else packed_contact(contact, [None], None, outline)
+                    model or packed_contact(contact, [None], None, outline)
                 )
                 rows.append(np.zeros(len(pieces), np.int64))
                 continue

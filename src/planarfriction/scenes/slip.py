@@ -112,7 +112,7 @@ def slip_shares(
     args = twists[loaded], loads[loaded]
     motion = model.rate(np.zeros_like(states[loaded]), *args)
     rate = model.rate(states[loaded], *args)
-    few = getattr(model, "reduction", None)
+    few: Any = getattr(model, "reduction", None)
     of_cells = isinstance(few, MODELS["distributed"])
     if of_cells:
         motion, _ = parted(few, motion)
