@@ -253,7 +253,8 @@ def _by_forces(
     shears = half_space.compliances(points, patch.positions, patch.cell_extents(), *law)
     shears = shears.reshape(2, len(points), 2, patch.cells).swapaxes(0, 1)
     shears = shears / patch.areas
-    pieces = -pad.pieces(few.patch, few.law)
+    assert few.pad is not None
+    pieces = -few.pad.pieces(few.patch, few.law)
     if few.patch.cells == patch.cells:
         response = np.zeros((len(points), 2, few.patch.bristles, patch.cells))
         response[:, :, :2] = (

@@ -317,17 +317,35 @@ def _largest_speed(patches: Patches, p: ContactSolve) -> float:
 
 
 @kernel
-def _start(patches: Patches, p: ContactSolve, tolerance: float) -> tuple[float, bool]:
-    """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
+def _start(
+    patches: Patches, p: ContactSolve, tolerance: float, careful: bool
+) -> tuple[float, bool]:
+    """Step at the best of the twists that the wrenches cause, of rest, and of those that the bristles' wrenches cause.
+
+    The bristles' wrenches, as they are at rest, stand in for a guess. Return the misfit, and True for rest.
+    """
+    n = 3 * patches.count
     _host(patches, p)
     step_all(patches, p)
     misfit = _misfit(patches, p)
     if misfit > NEAR * tolerance:
-        clear(p.twist, 3 * patches.count)
+        clear(p.twist, n)
         step_all(patches, p)
         at_rest = _misfit(patches, p)
         if at_rest <= misfit:
             return at_rest, True
+        guessed = careful
+        for i in range(n):
+            guessed = guessed or p.wrench[i] != 0.0
+        if not guessed:
+            for i in range(n):
+                p.wrench[i] = p.load[i // 3] * p.unit[i]
+            _host(patches, p)
+            step_all(patches, p)
+            moving = _misfit(patches, p)
+            if moving < misfit:
+                return moving, False
+            clear(p.wrench, n)
         _host(patches, p)
         step_all(patches, p)
     return misfit, False
@@ -391,7 +409,7 @@ def _search(
     patches: Patches, p: ContactSolve, tolerance: float, most: int, careful: bool
 ) -> tuple[float, bool]:
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
-    misfit, rest = _start(patches, p, tolerance)
+    misfit, rest = _start(patches, p, tolerance, careful)
     best = math.inf
     known = False
     if patches.soft > 0:
