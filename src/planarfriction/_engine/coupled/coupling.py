@@ -396,12 +396,13 @@ def restrain(patches: Patches, p: ContactSolve) -> bool:
 
 @kernel
 def _stick(patches: Patches, p: ContactSolve) -> None:
-    """Write the slopes of pads that stick all over."""
+    """Write the slopes of patches that stick all over; the stiffness of a pad does not grow with its load."""
     for k in range(patches.count):
+        per = p.dt[0]
+        if patches.pad[k] != 0:
+            per = p.dt[0] / p.load[k] if p.load[k] > 0.0 else 0.0
         for i in range(9 * k, 9 * k + 9):
-            elastic = p.dt[0] * patches.stuck[i]
-            per = 1.0 / p.load[k] if p.load[k] > 0.0 else 0.0
-            p.unit_slopes[i] = -per * elastic - patches.viscous[i]
+            p.unit_slopes[i] = -per * patches.stuck[i] - patches.viscous[i]
 
 
 @kernel
@@ -411,11 +412,9 @@ def _search(
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
     misfit, rest = _start(patches, p, tolerance, careful)
     best = math.inf
-    known = False
-    if patches.soft > 0:
-        known = rest and not careful
-        if known:
-            _stick(patches, p)
+    known = patches.linear > 0 and rest and not careful
+    if known:
+        _stick(patches, p)
     for iteration in range(most + 1):
         p.iterations[0] = iteration
         if misfit < best:
@@ -433,8 +432,7 @@ def _search(
         _go(patches, p, keep_loads, rest, careful)
         rest = False
         misfit = _misfit(patches, p)
-        if patches.soft > 0:
-            known = misfit <= SHARP * best and not careful
+        known = patches.soft > 0 and misfit <= SHARP * best and not careful
     if not misfit <= best:
         _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best
