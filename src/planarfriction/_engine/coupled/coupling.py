@@ -412,9 +412,11 @@ def _search(
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
     misfit, rest = _start(patches, p, tolerance, careful)
     best = math.inf
-    known = patches.linear > 0 and rest and not careful
-    if known:
-        _stick(patches, p)
+    known = False
+    if patches.linear > 0:
+        known = rest and not careful
+        if known:
+            _stick(patches, p)
     for iteration in range(most + 1):
         p.iterations[0] = iteration
         if misfit < best:
