@@ -71,7 +71,7 @@ REFUSED = [
                 contacts=[dataclasses.replace(plate().contacts[0], normal_force=2.0)],
             ),
         ),
-        "start must be 'rest' or 'sliding' if the contacts do not hold the body (they hold 32.7",
+        "start must be 'rest' or 'sliding' if the contacts do not hold the body (they hold 32.9",
     ),
     (
         lambda: gripped(
