@@ -16,10 +16,10 @@ import planarfriction as pf
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import Grid, PerCell
+from tests.support.contacts import SOFT as FINGER
 from tests.support.refusals import refused
 
 SQUARE = pf.ContactPatch.rectangle(0.02, cells=3)
-FINGER = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 MODEL = pf.DistributedModel(SQUARE, pf.LuGre())
 SIGNAL = pf.Signal([0.0, 1.0], [1.0, 2.0])
 ELLIPSOID = pf.LimitSurfaceEllipsoid(SQUARE)

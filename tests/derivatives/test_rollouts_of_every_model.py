@@ -12,24 +12,16 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import derivatives
+from tests.support import contacts
+from tests.support.contacts import FOUR as PATCH
+from tests.support.contacts import SURFACES, TIP
 
-LAWS = {
-    "plain": pf.LuGre(mu_s=1.2),
-    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)),
-    "wide": pf.LuGre(
-        mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3)
-    ),
-}
-SURFACES = {
-    "cells": pf.LimitSurfaceCells,
-    "table": pf.LimitSurfaceTable,
-    "published": pf.LimitSurfaceTablePublished,
-    "ellipsoid": pf.LimitSurfaceEllipsoid,
+LAWS = contacts.LAWS | {
+    "wide": pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=0.3)
 }
 SPEEDS = {"stick": 1e-6, "around": 3e-3, "slip": 1e-1}
 """Largest change of the speed from step to step [m/s]; full deflection takes 1e-6 m, a step 1e-4 s."""
 
-PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 METRIC = pf.friction_metric(0.6, along=0.5, across=1.0)
 EACH = [pf.friction_metric(0.3 * i, 0.6, 1.1) for i in range(PATCH.cells)]
 DIRECTED = {
@@ -40,12 +32,6 @@ DIRECTED = {
         PATCH, asymmetry=(0.3, -0.2), radii=np.full(PATCH.cells, 0.002)
     ),
 }
-
-X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
-LIGHT = np.maximum(1.0 - ((X - 1e-3) ** 2 + Y**2) / 0.003**2, 0.0)
-HEAVY = np.sqrt(np.maximum(1.0 - (X**2 + (Y - 1e-3) ** 2) / 0.0045**2, 0.0))
-TIP = pf.ContactPatch.from_pressure({0.5: LIGHT, 4.0: HEAVY}, cell_size=1e-3)
-"""Grows, flattens and moves with the load; no cell gets its first load between the two maps."""
 
 LOAD, DT, T = 2.0, 1e-4, 12
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.patch import PUBLISHED_PATCHES
+from tests.support.contacts import FEET
 
 CELLS, EXACT, TABLE = pf.LimitSurfaceCells, pf.LimitSurfaceExact, pf.LimitSurfaceTable
 PUBLISHED, ELLIPSOID = pf.LimitSurfaceTablePublished, pf.LimitSurfaceEllipsoid
@@ -28,9 +29,6 @@ def random_map(seed):
     return pf.ContactPatch.from_pressure(pressure, (0.002, 0.0015))
 
 
-FEET = pf.ContactPatch.points(
-    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
-)
 PATCHES = {
     name: PUBLISHED_PATCHES[name]()
     for name in ("Square", "Circle", "LineGrad", "NonConvex2")

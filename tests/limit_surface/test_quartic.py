@@ -13,6 +13,7 @@ from planarfriction._engine.published import surfaces as kernels
 from planarfriction.errors import MissingExtraError
 from planarfriction.limit_surface import quartic as quartic_fit
 from planarfriction.patch import PUBLISHED_PATCHES
+from tests.support.contacts import FEET
 from tests.support.refusals import refused
 
 pytest.importorskip(
@@ -20,9 +21,6 @@ pytest.importorskip(
 )
 pytestmark = pytest.mark.quartic
 
-FEET = pf.ContactPatch.points(
-    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
-)
 PATCHES = {
     name: PUBLISHED_PATCHES[name]()
     for name in ("Square", "Circle", "LineGrad", "NonConvex1")

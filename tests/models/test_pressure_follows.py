@@ -6,11 +6,11 @@ import pytest
 import planarfriction as pf
 from planarfriction.coupling import CoupledPatches, HostStep
 from planarfriction.errors import InvalidValueError
+from tests.support.contacts import SOFT
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
 PATCH = pf.ContactPatch.rectangle(0.1, 0.06, 9)
-SOFT = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 LEANING = PATCH.with_friction_metric(np.diag([2.0, 1.0]), asymmetry=(0.1, 0.0))
 MODELS = {
     "distributed": pf.DistributedModel(PATCH, LAW),
