@@ -12,6 +12,7 @@ import planarfriction as pf
 from planarfriction import formulas, geometry
 from planarfriction.patch import PUBLISHED_PATCHES
 from tests.support.contacts import FEET, LAWS, SURFACES, friction_model, lengths
+from tests.support.differences import differences
 from tests.support.refusals import refused
 
 PATCH = PUBLISHED_PATCHES["NonConvex2"]()
@@ -283,19 +284,6 @@ def test_mirroring(kind):
 
 
 # ---------------------------------------------------------------------- Jacobians
-
-
-def differences(function, x, steps):
-    """Central differences of fourth order along each entry of `x`, in its last axes."""
-    columns = []
-    for index in np.ndindex(x.shape):
-        change = np.zeros_like(x)
-        change[index] = steps[index]
-        near = np.subtract(function(x + change), function(x - change))
-        far = np.subtract(function(x + 2 * change), function(x - 2 * change))
-        columns.append((8.0 * near - far) / (12.0 * steps[index]))
-    columns = np.stack(columns, -1)
-    return columns.reshape(*columns.shape[:-1], *x.shape)
 
 
 def state_scale(model):
