@@ -17,7 +17,7 @@ from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import Grid, PerCell
 from tests.support.contacts import SOFT as FINGER
-from tests.support.refusals import refused
+from tests.support.refusals import refusal, refused
 
 SQUARE = pf.ContactPatch.rectangle(0.02, cells=3)
 MODEL = pf.DistributedModel(SQUARE, pf.LuGre())
@@ -181,9 +181,7 @@ MASKS = ("weights", "pressure", "profile")
 
 
 def refuses(name, call, value):
-    with pytest.raises(InvalidValueError) as caught:
-        call(value)
-    message = str(caught.value)
+    message = refusal(call, value, kind=InvalidValueError)
     assert (
         name.partition(" of ")[0] in message
         and len(message) <= 300

@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction import derivatives
 from planarfriction.derivatives import PARAMETERS
-from tests.support.contacts import ELASTIC, LAWS, SURFACES, friction_model
+from tests.support.contacts import (
+    ELASTIC,
+    LAWS,
+    SURFACES,
+    friction_model,
+    published_finger,
+)
 from tests.support.contacts import FOUR as PATCH
 from tests.support.refusals import refused
 
@@ -373,11 +379,7 @@ def test_twists_whose_squares_leave_the_range_of_numbers_are_rest(surface):
 
 # ---------------------------------------------------------------------- errors
 
-FINGER = pf.ContactPatch.rectangle(
-    0.02,
-    cells=21,
-    pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01),
-)
+FINGER = pf.ContactPatch.rectangle(0.02, cells=21, pressure=published_finger())
 
 
 def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():

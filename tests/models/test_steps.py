@@ -17,6 +17,7 @@ from tests.support.contacts import (
     SURFACES,
     friction_model,
     lengths,
+    published_finger,
 )
 from tests.support.refusals import refused
 
@@ -257,11 +258,7 @@ def test_a_contact_without_load_forgets(kind):
     assert not model.wrench(state, TWIST, 0.0).any()
 
 
-FINGER = pf.ContactPatch.rectangle(
-    0.02,
-    cells=21,
-    pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01),
-)
+FINGER = pf.ContactPatch.rectangle(0.02, cells=21, pressure=published_finger())
 
 
 def soft(

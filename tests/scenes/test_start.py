@@ -10,6 +10,7 @@ import planarfriction as pf
 from planarfriction.errors import FileError
 from planarfriction.scenes.start import contact_map, first_states
 from tests.support.differences import scene_slopes
+from tests.support.files import again
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_0=1e5, elasto_plastic=0.9)
@@ -147,9 +148,7 @@ def test_a_block_that_slides_goes_as_far_as_friction_lets_it():
 
 def test_files_and_solutions_keep_the_start(tmp_path):
     scene = held(MODELS[0])
-    for name in ("scene.toml", "scene.json"):
-        scene.to_file(tmp_path / name)
-        assert pf.Scene.from_file(tmp_path / name) == scene
+    again(scene, tmp_path)
     solution = pf.simulate(scene, t_end=0.02)
     assert (
         pf.Solution.load(solution.save(tmp_path / "run.nc")).scene.start

@@ -28,6 +28,16 @@ FEET = pf.ContactPatch.points(
 FINGER = pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
 """Pressure of a fingertip of 6 mm at 1 N."""
 SOFT = pf.ContactPatch.disc(0.01, 9, pressure=FINGER)
+CELL = 0.02 / 21
+"""Width of a cell of published patches [m]."""
+
+
+def published_finger(**changes):
+    """Return the soft finger of the published runs, with changes."""
+    return pf.SoftFinger(
+        **{"c": 6 * CELL, "n": 1 / 3, "k": 2.0, "radius_max": 0.01, **changes}
+    )
+
 
 X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
 LIGHT = np.maximum(1.0 - ((X - 1e-3) ** 2 + Y**2) / 0.003**2, 0.0)
