@@ -478,3 +478,24 @@ def test_what_else_is_refused():
         derivatives.rollout_jacobian(model, *drive(model), DT, names=["mu_k"])
     with refused(r"^twist must"):
         derivatives.rollout_jvp(model, None, [[], [1.0, None], []], 1.0, DT)
+
+
+# ---------------------------------------------------------------------- pads with a common compliance
+
+
+def test_a_face_without_load_forgets_and_takes_no_numbers():
+    pad = pf.Pad.measured(4e3, 0.4)
+    law = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_1=0.0, v_s=2e-2, elasto_plastic=0.9)
+    model = pf.ReducedModel(PATCH, law, pad=pad)
+    _, twists, loads = drive(model_of("ellipsoid"))
+    state, _ = model.step(model.rest(), 0.01 * twists[0], 3.0, DT)
+    loads[2] = 0.0
+    bars = np.ones((T, 3))
+    found, before = (
+        derivatives.rollout_vjp(model, state, twists[:t], loads[:t], DT, bars[:t])
+        for t in (T, 2)
+    )
+    np.testing.assert_allclose(found.state, before.state, rtol=1e-12)
+    assert np.isfinite(found.normal_force).all() and not found.twist[2].any()
+    with refused("parameters must be None for a pad with a common compliance"):
+        derivatives.rollout(model, state, twists, loads, DT, parameters=np.ones(8))
