@@ -89,6 +89,15 @@ def test_frames_pass_through_the_samples_without_overshoot():
     assert track.poses[:, 1].min() >= -0.01 and track.poses[:, 1].max() <= 0.0
 
 
+@pytest.mark.parametrize(("kick", "shown"), [(-800.0, 0.2), (0.5, 0.5)])
+def test_a_kick_at_the_start_does_not_shrink_the_arrow_of_friction(kick, shown):
+    run = synthetic.solution()
+    force = np.full((201, 1), 0.1)
+    force[:2, 0] = kick, 0.2
+    (contact,) = track_of(changed(run, fx=force), np.array([0.0, 1.0])).contacts
+    assert contact.wrenches[:, 0] == pytest.approx([shown, 0.1])
+
+
 @pytest.mark.parametrize("moves", [None, (0.02, -0.03, 0.7)])
 @pytest.mark.parametrize("mounted_on", ["world", "body"])
 def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):

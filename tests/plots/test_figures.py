@@ -275,6 +275,21 @@ def test_histories_show_the_data_in_the_units_of_their_labels():
     assert figure.legends == []
 
 
+def test_histories_stand_in_columns_above_one_time():
+    run = synthetic.solution()
+    figure = plots.plot_histories(run)
+    left, right = figure.axes[::2], figure.axes[1::2]
+    for column, name in ((left, "body"), (right, "contacts")):
+        places = [axes.get_position() for axes in column]
+        assert np.ptp([place.x0 for place in places]) < 1e-9
+        assert (np.diff([place.y0 for place in places]) < 0.0).all()
+        assert column[0].get_title().startswith(name)
+        assert [axes.get_xlabel() for axes in column] == ["", "", "", "time [s]"]
+    assert left[0].get_position().x0 < right[0].get_position().x0
+    figure = plots.plot_histories(run, panels=("fx", "x"))
+    assert [axes.get_xlabel() for axes in figure.axes] == ["", "time [s]"]
+
+
 def test_every_contact_has_its_line_and_its_entry():
     run = synthetic.solution(synthetic.scene(contacts=3))
     figure = plots.plot_histories({"a": run, "b": run})
