@@ -286,6 +286,7 @@ def test_histories_stand_in_columns_above_one_time():
         assert column[0].get_title().startswith(name)
         assert [axes.get_xlabel() for axes in column] == ["", "", "", "time [s]"]
     assert left[0].get_position().x0 < right[0].get_position().x0
+    assert [axes.get_ylabel()[0] for axes in left] == ["x", "y", "θ", "s"]
     figure = plots.plot_histories(run, panels=("fx", "x"))
     assert [axes.get_xlabel() for axes in figure.axes] == ["", "time [s]"]
 
