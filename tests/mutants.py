@@ -56,7 +56,8 @@ MIRRORS = {
     "torch": "tensors",
     "jax": "tensors",
     "adapters/drake": "adapters/test_drake*.py adapters/test_pressure*.py adapters/test_wheels*.py",
-    "adapters/mjx": "adapters/test_mjx*.py adapters/test_turning.py adapters/test_pressure*.py adapters/test_wheels*.py",
+    "adapters/mjx": "adapters/test_mjx*.py adapters/test_turning.py adapters/test_pressure*.py"
+    " adapters/test_wheels*.py",
     "adapters/mujoco": "adapters/test_mujoco.py adapters",
     "adapters/mujoco_warp": "adapters/test_mujoco_warp*.py adapters/test_single*.py adapters/test_mjx_surfaces.py",
     "_support/equality.py": "contracts/test_values.py contracts/test_representations.py",
