@@ -459,39 +459,27 @@ def _weights(model):
 # ---------------------------------------------------------------------- Newton's method
 
 
-def _statistics(seed, sets, environments, steps, height):
+@pytest.mark.parametrize(
+    "seed, sets, environments, steps, height",
+    [
+        (11, 1, 100, 12, 0.0),
+        pytest.param(12, 3, 210, 40, 0.0, marks=pytest.mark.slow),
+        pytest.param(12, 3, 210, 40, 0.05, marks=pytest.mark.slow),
+    ],
+)
+def test_few_iterations_and_no_step_is_lost(seed, sets, environments, steps, height):
+    """Slow: a hundred thousand steps."""
     generator = np.random.default_rng(seed)
-    counts = []
-    residuals = []
+    found = []
     for k in (1, 2, 3, 4):
         for _ in range(sets):
             patches = random_patches(generator, k)
             bodies = random_bodies(generator, environments, k, height)
-            for *_, step in random_run(generator, patches, bodies, steps):
-                counts.append(step.iterations)
-                residuals.append(step.residual)
-    return np.concatenate(counts), np.concatenate(residuals)
-
-
-def test_few_iterations_and_no_step_is_lost():
-    counts, residuals = _statistics(11, 1, 100, 12, 0.0)
-    assert (
-        counts.mean() < 5.0
-        and np.percentile(counts, 99) <= 15
-        and (residuals > 1e-6).mean() <= 1e-3
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("height", [0.0, 0.05])
-def test_a_hundred_thousand_random_steps(height):
-    counts, residuals = _statistics(12, 3, 210, 40, height)
-    assert len(counts) > 100_000
-    assert (
-        counts.mean() < 5.0
-        and np.percentile(counts, 99) <= 15
-        and (residuals > 1e-6).mean() <= 1e-3
-    )
+            run = random_run(generator, patches, bodies, steps)
+            found += [(step.iterations, step.residual) for *_, step in run]
+    counts, residuals = np.array(found).swapaxes(0, 1)
+    assert counts.mean() < 5.0 and np.percentile(counts, 99) <= 15
+    assert (residuals > 1e-6).mean() <= 1e-3
 
 
 def test_what_does_not_converge_says_so_and_has_the_best_found():

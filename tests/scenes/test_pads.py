@@ -17,6 +17,7 @@ from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, driven, simulate
 from planarfriction.scenes.start import first_slopes, first_states
 from planarfriction.sliding_body import SlidingBody
+from tests.support.differences import differences
 from tests.support.refusals import refused
 
 ONE = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
@@ -417,16 +418,6 @@ def _solve(calls, contact, z, v, shift, r, dv, lin, stiffness, wrench, change):
     call(own.back_substitute, (contact, z, doubles(r), doubles(dv), lin, doubles(change)))  # fmt: skip
 
 
-def _jacobian(function, at, step):
-    """Differences of fourth order, `[..., n]`."""
-    columns = []
-    for direction in step * np.eye(len(at)):
-        near = function(at + direction) - function(at - direction)
-        far = function(at + 2.0 * direction) - function(at - 2.0 * direction)
-        columns.append((8.0 * near - far) / (12.0 * step))
-    return np.stack(columns, -1)
-
-
 @pytest.mark.parametrize("name", FACES)
 def test_what_the_solver_eliminates_is_the_solution_of_its_equations(name):
     """`(s - df/dz) dz = r + df/dV dV` and `dW = dW/dz dz + dW/dV dV`, with derivatives by differences."""
@@ -445,8 +436,8 @@ def test_what_the_solver_eliminates_is_the_solution_of_its_equations(name):
     def rate(z, v):
         return np.concatenate(rates(packed, z[None], v[None]), axis=1)[0]
 
-    of_state = _jacobian(lambda each: rate(each, v), z, 1e-9)
-    of_twist = _jacobian(lambda each: rate(z, np.append(each, v[3:])), v[:3], 1e-5)
+    of_state = differences(lambda each: rate(each, v), z, 1e-9)
+    of_twist = differences(lambda each: rate(z, np.append(each, v[3:])), v[:3], 1e-5)
     shift = 1e4
     r = rng.normal(size=n) * packed.state_scale * shift
     dv = np.zeros(6)
