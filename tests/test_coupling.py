@@ -317,6 +317,19 @@ def test_shapes_follow_the_loads_that_come_out():
         )
 
 
+@pytest.mark.parametrize("response", [0.0, 1e-12, 1e-6, 1e-3])
+def test_a_load_that_follows_the_wrench_does_so_whatever_the_twist_does(response):
+    """A self-energising brake on a drum that nothing slows down, or little: its load is that of the lever."""
+    patches = CoupledPatches([pf.DistributedModel(SOFT, LAW)])
+    lever = np.array([[-0.5, 0.0, 0.0]])
+    twist, load = np.array([[0.01, 0.0, 0.5]]), np.ones(1)
+    host = HostStep(twist, load, np.zeros((1, 3)), response * np.eye(3), lever)
+    step = patches.step(patches.rest(), host, 1e-2)
+    assert step.converged
+    assert step.normal_force > 1.2
+    assert step.normal_force == pytest.approx(1.0 + lever @ step.wrench[0], rel=1e-6)
+
+
 # ---------------------------------------------------------------------- in time
 
 

@@ -181,6 +181,7 @@ def displacement(model: Any, state: Any, markers: Markers) -> Any:
     Raises InvalidValueError for a model without cells, a state of another shape, and markers of another model.
     """
     xp, z = _bristles(model, state)
+    validation.instance("markers", markers, Markers, "made by markers(model, points)")
     points, axes, d, n = markers.response.shape
     if z.shape[-2:] != (d, n):
         rule = f"belong to a model with bristles {list(z.shape[-2:])}"

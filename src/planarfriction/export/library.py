@@ -192,7 +192,7 @@ def export_c(
     """
     checked_name(name)
     validation.choice("precision", precision, PRECISIONS)
-    validation.count("patches", patches, 1, MOST_PATCHES)
+    patches = validation.count("patches", patches, 1, MOST_PATCHES)
     validation.instance("casadi", casadi, bool, "True or False")
     if (casadi or controller is not None) and precision != "double":
         raise InvalidValueError(

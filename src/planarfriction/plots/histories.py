@@ -95,7 +95,9 @@ def plot_histories(
         rule = f"name at least one of {', '.join(_PANELS)}"
         raise InvalidValueError("panels", rule, panels)
     if axes is not None:
-        drawn = list(np.ravel(np.asarray(axes, dtype=object)))
+        if isinstance(axes, np.ndarray) and axes.dtype == object:
+            axes = axes.ravel().tolist()
+        drawn = axes if isinstance(axes, list | tuple) else [axes]
         for each in drawn:
             style.check_axes("axes", each, size)
         if len(drawn) != len(chosen):

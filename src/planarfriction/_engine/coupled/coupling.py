@@ -79,6 +79,9 @@ ROUNDING = 1e-13
 NOISE = 1e-14
 """Difference of a twist from that which wrenches cause, in the sum of what they add, that is their rounding."""
 
+LIGHTNESS = 1e-3
+"""Speed [m/s] for which the whole load of a patch counts if it is wrong: a millionth of it is the usual tolerance."""
+
 PRECISION = 1e-9
 """Error of a twist, in the largest speed that goes into it, with which a step has converged."""
 
@@ -122,7 +125,7 @@ def _host(patches: Patches, p: ContactSolve) -> None:
 def _misfit(patches: Patches, p: ContactSolve) -> float:
     """Return the difference of the twists and loads from those that the models' wrenches there cause [m/s].
 
-    A load counts as the speed that all of it would cause as friction.
+    A load counts as the speed that all of it would cause as friction, and where it causes hardly any, by its share.
     """
     n = 3 * patches.count
     w = p.change
@@ -134,6 +137,10 @@ def _misfit(patches: Patches, p: ContactSolve) -> float:
         missing = (
             xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
         )
+        if missing != 0.0:
+            share = abs(missing) / (p.load[k] + abs(missing))
+            finite = finite and xp.is_finite(share)
+            largest = xp.maximum(largest, LIGHTNESS * share)
         for i in range(3 * k, 3 * k + 3):
             gap = abs(_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
             if i == 3 * k + 2:
