@@ -16,6 +16,7 @@ the force is to the limit. In a contact that sticks all over, displacements tell
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -87,13 +88,12 @@ class Slips:
             self.tip.model.with_law(law), normal_force=grip, mass=mass,
             centre_of_mass=(across, up), t_end=END,
         )  # fmt: skip
-        return scene
+        return dataclasses.replace(scene, save_every=FRAME)
 
     def labels(self, solution: pf.Solution) -> dict[str, Any]:
         """Return what a camera, a force sensor and an oracle would tell of a slip."""
-        run = pf.simulate(solution.scene, bristles="all", save_every=FRAME)
-        data = run.data
-        events = run.slip_events()
+        data = solution.data
+        events = solution.slip_events()
         slid = [event for event in events if event.onset > SETTLED]
         moved = pf.tactile.displacement(
             self.tip.model, data.bristles_fingers.values, self.tip.markers
@@ -101,7 +101,7 @@ class Slips:
         wrench = np.stack([data[name].values[:, 0] for name in ("fx", "fy", "tau")], 1)
         return {
             "markers": moved.astype(np.float32),
-            "twist": run.contact_twist().astype(np.float32),
+            "twist": solution.contact_twist().astype(np.float32),
             "wrench": wrench.astype(np.float32),
             "normal_force": data.normal_force.values[:, 0].astype(np.float32),
             "incipient": slid[0].incipient if slid else np.nan,
@@ -113,7 +113,7 @@ def simulated(tip: Fingertip, count: int) -> tuple[Any, np.ndarray]:
     """Return the labels of slips as a dataset, and their friction coefficients."""
     slips = Slips(tip)
     cases = list(range(count))
-    data = pf.sweep(slips.scene, {"case": cases}, measure=slips.labels)
+    data = pf.sweep(slips.scene, {"case": cases}, bristles="all", measure=slips.labels)
     return data, np.array([slips.friction(case) for case in cases])
 
 

@@ -37,31 +37,38 @@ MIRRORS = {
     " models/test_pads.py models/test_energy.py laws test_golden.py",
     "_engine/cells": "_engine/test_cell_blocks.py _engine/test_discs.py models/test_batches.py models/test_rates.py"
     " models/test_anisotropic.py models/test_pressure_follows.py models/test_pads.py test_golden.py"
-    " derivatives/test_rollouts_of_every_model.py scenes/test_edge.py",
+    " derivatives/test_rollouts_of_every_model.py scenes/test_edge.py models/test_cell_loads.py scenes/test_pads.py",
     "_engine/published": "_engine/test_steps.py models/test_rates.py models/test_batches.py test_golden.py"
     " limit_surface/test_closed_forms.py derivatives/test_rollouts_of_every_model.py",
     "_engine/body": "solvers/test_structured.py test_golden.py derivatives/test_scene.py scenes derivatives",
-    "_engine/coupled": "test_coupling.py test_sliding_body.py test_coupling_pads.py test_coupling_hard.py"
-    " models/test_pads.py",
-    "_engine/records": "models/test_batches.py models/test_state_types.py models/test_steps.py test_golden.py models",
+    "_engine/coupled": "test_coupling*.py test_sliding_body*.py models/test_pads.py models/test_cell_loads.py"
+    " models/test_pressure_follows.py scenes/test_pads.py",
+    "_engine/records": "models/test_batches.py models/test_state_types.py models/test_steps.py test_golden.py models"
+    " scenes/test_edge.py scenes/test_pads.py",
     "_engine/compiler": "_engine/compiler",
     "_engine": "_engine test_golden.py models derivatives limit_surface patch test_coupling.py",
     "models": "models test_golden.py derivatives",
-    "coupling.py": "test_coupling.py test_coupling_hard.py models/test_pressure_follows.py",
+    "coupling.py": "test_coupling*.py models/test_pressure_follows.py models/test_cell_loads.py",
+    "sliding_body.py": "test_sliding_body*.py models/test_cell_loads.py",
+    "pads.py": "models/test_pads*.py models/test_pad_discs.py scenes/test_pads.py",
+    "half_space.py": "models/test_pads*.py test_tactile.py",
     "cli": "cli identify/test_experiments.py sweeps/test_settings.py",
     "torch": "tensors",
     "jax": "tensors",
+    "adapters/drake": "adapters/test_drake*.py adapters/test_pressure*.py adapters/test_wheels*.py",
+    "adapters/mjx": "adapters/test_mjx*.py adapters/test_turning.py adapters/test_pressure*.py"
+    " adapters/test_wheels*.py",
     "adapters/mujoco": "adapters/test_mujoco.py adapters",
-    "equality.py": "contracts/test_values.py contracts/test_representations.py",
-    "described.py": "contracts/test_docstrings.py",
+    "adapters/mujoco_warp": "adapters/test_mujoco_warp*.py adapters/test_single*.py adapters/test_mjx_surfaces.py",
+    "_support/equality.py": "contracts/test_values.py contracts/test_representations.py",
+    "_support/described.py": "contracts/test_docstrings.py contracts/test_representations.py",
+    "_support/pictures.py": "contracts/test_representations.py",
+    "_support/shown.py": "plots/test_figures.py test_errors.py explorer",
+    "_support/reading.py": "_support/test_reading.py patch/test_map_kinds.py scenes/test_refusals.py",
+    "_support/validation.py": "_support/test_validation.py contracts/test_bad_input.py",
     "extend.py": "contracts/test_docs.py",
-    "pictures.py": "contracts/test_representations.py",
-    "shown.py": "plots/test_figures.py explorer",
-    "reading.py": "_support/test_reading.py test_reading.py scenes/test_refusals.py",
-    "validation.py": "_support/test_validation.py test_validation.py contracts/test_bad_input.py",
-    "writing.py": "_support/test_writing.py test_writing.py",
 }
-"""Tests of parts of the package, where no file or folder has their name; the longest beginning counts."""
+"""Tests of parts of the package, as files, patterns and folders, where none has their name; the longest counts."""
 
 
 def places(file: Path) -> Iterator[tuple[int, int, str]]:
@@ -128,11 +135,9 @@ def tests_of(name: str) -> list[str]:
     found: list[Path] = [ROOT / "tests" / "/".join(folders) / f"test_{stem}.py"]
     for place in places:
         path = ROOT / "tests" / place
-        files = path.rglob("test_*.py") if path.is_dir() else [path]
-        found += sorted(
-            filter(Path.exists, files),
-            key=lambda f: -f.read_text().count(stem),
-        )
+        folder = path.is_dir()
+        files = path.rglob("test_*.py") if folder else path.parent.glob(path.name)
+        found += sorted(files, key=lambda file: -file.read_text().count(stem))
     # Those that share words with its name first, then in the order of the table.
     words = {*stem.split("_")}
     found.sort(key=lambda file: -len(words & {*file.stem.split("_")}))

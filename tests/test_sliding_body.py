@@ -212,6 +212,23 @@ def test_energy_that_a_step_cannot_gain_says_nothing_of_its_size():
         np.testing.assert_allclose(end.wrench / scale, (-5e3, 0.0, 0.0), atol=1e-5)
 
 
+def on_a_turntable(mu, size, radius, spin, dt, steps):
+    """Return the body and the pose of one that begins to turn with its turntable."""
+    patch = pf.ContactPatch.disc(radius=size)
+    body = pf.SlidingBody(MASS, 1e-4, pf.ReducedModel(patch, pf.LuGre(mu)))
+    state = body.rest()
+    pose = np.array([radius, 0.0, 0.0])
+    twist = np.array([0.0, spin * radius, spin])
+    for _ in range(steps):
+        carried = (-spin * pose[1], spin * pose[0], spin)
+        middle = pose[2] + 0.5 * dt * spin
+        state, twist, _ = body.step(
+            state, twist, MASS * 9.81, dt, angle=middle, support_velocity=carried
+        )
+        pose += dt * twist
+    return body, pose
+
+
 @pytest.mark.parametrize(
     "spin, radius, mu",
     [(1.0, 0.25, 0.3), (2.0, 0.25, 0.3), (3.0, 0.5, 1.0), (10.0, 0.02, 0.3)],
@@ -219,30 +236,15 @@ def test_energy_that_a_step_cannot_gain_says_nothing_of_its_size():
 @pytest.mark.parametrize("dt", [2e-3, 4e-3])
 def test_a_body_on_a_turntable_keeps_its_place(spin, radius, mu, dt):
     """Along tangents it would move outwards by `exp(w^2 dt T/2)`, which is 8 % at 2 rad/s; along chords not at all."""
-    body = pf.SlidingBody(
-        MASS, 1e-4, pf.ReducedModel(pf.ContactPatch.disc(radius=0.03), pf.LuGre(mu))
-    )
-    state = body.rest()
-    pose = np.array([radius, 0.0, 0.0])
-    turned = 0.0
     duration = 4.0
-    twist = np.array([0.0, spin * radius, spin])
-    for _ in range(round(duration / dt)):
-        carried = (-spin * pose[1], spin * pose[0], spin)
-        middle = pose[2] + 0.5 * dt * spin
-        state, twist, _ = body.step(
-            state, twist, MASS * 9.81, dt, angle=middle, support_velocity=carried
-        )
-        pose += dt * twist
-        turned += dt * spin
+    body, pose = on_a_turntable(mu, 0.03, radius, spin, dt, round(duration / dt))
+    turned = spin * duration
     x, y = geometry.rotate(pose[:2], -turned)
     # Bristles carry the centripetal force.
     deflection = spin**2 * radius / (9.81 * body.models.law.sigma_0)
     # and 1e-9 m/s are the tolerance of a step
-    assert (
-        abs(x - radius) < 2.0 * deflection + 1e-9 * duration
-        and abs(y) < 2.0 * deflection + 1e-9 * duration
-    )
+    allowed = 2.0 * deflection + 1e-9 * duration
+    assert abs(x - radius) < allowed and abs(y) < allowed
     assert pose[2] == pytest.approx(turned, abs=1e-7)
 
 
@@ -250,23 +252,10 @@ def test_a_body_on_a_turntable_slides_where_friction_ends():
     """At `mu g/w^2` friction is as large as the centripetal force."""
     mu = 0.3
     spin = 2.0
-    dt = 2e-3
-    body = pf.SlidingBody(
-        MASS, 1e-4, pf.ReducedModel(pf.ContactPatch.disc(radius=1e-3), pf.LuGre(mu))
-    )
     for share in (0.97, 1.03):
-        pose = np.array([share * mu * 9.81 / spin**2, 0.0, 0.0])
-        state = body.rest()
-        twist = np.array([0.0, spin * pose[0], spin])
-        begin = pose[0]
-        for _ in range(500):
-            carried = (-spin * pose[1], spin * pose[0], spin)
-            middle = pose[2] + 0.5 * dt * spin
-            state, twist, _ = body.step(
-                state, twist, MASS * 9.81, dt, angle=middle, support_velocity=carried
-            )
-            pose += dt * twist
-        slid = np.hypot(*pose[:2]) - begin
+        radius = share * mu * 9.81 / spin**2
+        _, pose = on_a_turntable(mu, 1e-3, radius, spin, 2e-3, 500)
+        slid = np.hypot(*pose[:2]) - radius
         assert abs(slid) < 2e-5 if share < 1.0 else slid > 1e-3
 
 

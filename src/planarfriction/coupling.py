@@ -266,7 +266,7 @@ class CoupledPatches(ByValue):
                 np.ascontiguousarray(states[:, own]), model.components
             )
             loads[:, p] = each.load
-            held[p] = model.bristles.under(each)
+            held[p] = model.bristles.under(each)  # pyright: ignore[reportAttributeAccessIssue]
         return held
 
     def _problems(

@@ -243,6 +243,9 @@ class HalfSpace(Pad):
 
     def pieces(self, patch: ContactPatch, law: FrictionLaw) -> np.ndarray:
         """See `Pad.pieces`."""
+        return self._pieces(patch)
+
+    def _pieces(self, patch: ContactPatch) -> np.ndarray:
         stuck = self._stuck(patch)
         shift = 0.5 * (stuck.stiffness[0, 0] + stuck.stiffness[1, 1])
         return LOCAL * shift * stuck.shares
@@ -250,7 +253,7 @@ class HalfSpace(Pad):
     def compliance(self, patch: ContactPatch) -> np.ndarray | None:
         """See `Pad.compliance`."""
         levers = patch.levers()
-        stiffness = np.repeat(self.pieces(patch, None)[:, None], patch.bristles, 1)
+        stiffness = np.repeat(self._pieces(patch)[:, None], patch.bristles, 1)
         own = np.einsum("nd,nda,ndb->ab", stiffness, levers, levers)
         missing = np.linalg.inv(self._stuck(patch).stiffness) - np.linalg.inv(own)
         size, axes = np.linalg.eigh(missing)

@@ -181,6 +181,7 @@ def displacement(model: Any, state: Any, markers: Markers) -> Any:
     Raises InvalidValueError for a model without cells, a state of another shape, and markers of another model.
     """
     xp, z = _bristles(model, state)
+    validation.instance("markers", markers, Markers, "made by markers(model, points)")
     points, axes, d, n = markers.response.shape
     if z.shape[-2:] != (d, n):
         rule = f"belong to a model with bristles {list(z.shape[-2:])}"
@@ -253,6 +254,7 @@ def _by_forces(
     shears = half_space.compliances(points, patch.positions, patch.cell_extents(), *law)
     shears = shears.reshape(2, len(points), 2, patch.cells).swapaxes(0, 1)
     shears = shears / patch.areas
+    assert few.pad is not None
     pieces = -few.pad.pieces(few.patch, few.law)
     if few.patch.cells == patch.cells:
         response = np.zeros((len(points), 2, few.patch.bristles, patch.cells))
@@ -260,7 +262,11 @@ def _by_forces(
             shears * pieces
         )  # no spin of a single cell moves its neighbours
         return response
-    members = clusters_of(patch, pad.shares(patch), model.cells)
+    members = clusters_of(
+        patch,
+        pad.shares(patch),
+        model.cells,  # pyright: ignore[reportAttributeAccessIssue]
+    )
     weights = patch.weights()
     x, y = patch.positions.T
     load = members.sums(weights)

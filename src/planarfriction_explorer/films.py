@@ -6,12 +6,13 @@ import tempfile
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from planarfriction.families import MODELS, SCENES
 from planarfriction.plots import plot_histories
 from planarfriction.scenes import Scene, simulate
 from planarfriction.scenes.files import read_table
+from planarfriction.sweeps.settings import Settable
 from planarfriction_explorer.drawing import as_file, plain_name
 from planarfriction_explorer.state import State
 
@@ -31,12 +32,18 @@ input[type=range].anim-slider {width: 96%}
 """The player of matplotlib as wide as there is room for; it begins to play by itself."""
 
 
-def ready_scene(state: State, name: str, model: str) -> Scene:
-    """Return the ready scene `name` with patch and law of the state in the `model`.
+def ready_scene(
+    state: State, name: str, model: str, pad: dict[str, Any] | None = None
+) -> Scene:
+    """Return the ready scene `name` with patch and law of the state in the `model`, on a pad as scene files have it.
 
-    Raises `FrictionError` where the model does not take the law, or the scene not the patch.
+    Raises `FrictionError` where the model does not take the law or the pad, or the scene not the patch.
     """
-    return SCENES.choose(name)(MODELS.choose(model)(state.drawing.patch, state.law))
+    model = MODELS.choose(model)(state.drawing.patch, state.law)
+    scene = SCENES.choose(name)(model)
+    if pad is None:
+        return scene
+    return Settable(scene)(**{f"{each.name}.pad": pad for each in scene.contacts})
 
 
 def read_scene(name: str, content: bytes) -> Scene:

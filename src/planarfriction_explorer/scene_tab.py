@@ -21,6 +21,12 @@ _WORDS = (
     "Paths in a file start from the folder in which the explorer was started."
 )
 
+PADS_OFFERED = {
+    "layer": ("shear_modulus", "thickness"),
+    "half-space": ("shear_modulus",),
+}
+"""Kinds of pads and what they are given by."""
+
 _FRAME = "width:100%;max-width:790px;aspect-ratio:790/560;min-height:350px;border:0"
 
 _PICTURE = "width:100%;min-width:640px;max-width:960px"  # small screens scroll: its letters stay legible
@@ -50,6 +56,29 @@ class SceneTab:
             css_classes=["model"],
             width=190,
         )
+        self.pad = pn.widgets.Select(
+            label="Pad",
+            options=["none", *PADS_OFFERED],
+            description="Elastic pad; a half-space needs sigma_1 = 0 and two mirror symmetries.",
+            css_classes=["pad"],
+            width=130,
+        )
+        self.modulus = pn.widgets.FloatInput(
+            label="Shear modulus [MPa]",
+            description="Of the material; of silicone 0.1 to 0.5 [MPa].",
+            value=0.2,
+            step=0.1,
+            visible=False,
+            width=150,
+        )
+        self.thickness = pn.widgets.FloatInput(
+            label="Thickness [mm]",
+            description="Of the layer, less than the size of the patch [mm].",
+            value=3.0,
+            step=0.5,
+            visible=False,
+            width=150,
+        )
         self.file = pn.widgets.FileInput(
             label="Scene file", accept="", css_classes=["scene-file"], width=300
         )
@@ -61,21 +90,45 @@ class SceneTab:
         )
         self.result = pn.pane.HTML("", sizing_mode="stretch_width")
         self._running = False
-        self.scene.param.watch(
-            lambda event: self.model.param.update(visible=event.new in SCENES), "value"
-        )
+        for each in (self.scene, self.pad):
+            each.param.watch(lambda _: self._offer(), "value")
         self.file.param.watch(
             lambda event: attempt(lambda: self._read(event.new)) if event.new else None,
             "value",
         )
         self.button.on_click(lambda _: attempt(self._pressed))
         choices = pn.FlexBox(
-            self.scene, self.model, self.file, self.button, align_items="flex-end"
+            self.scene,
+            self.model,
+            self.pad,
+            self.modulus,
+            self.thickness,
+            self.file,
+            self.button,
+            align_items="flex-end",
         )
         note = pn.pane.HTML(_WORDS, sizing_mode="stretch_width")
         self.layout = pn.Column(
             note, choices, self.words, self.result, sizing_mode="stretch_width"
         )
+
+    def _offer(self) -> None:
+        """Show the fields that the scene takes."""
+        ready = self.scene.value in SCENES
+        self.model.visible = self.pad.visible = ready
+        needs = PADS_OFFERED.get(str(self.pad.value), ())
+        self.modulus.visible = ready and "shear_modulus" in needs
+        self.thickness.visible = ready and "thickness" in needs
+
+    def _pad(self) -> dict[str, Any] | None:
+        """Return the pad as scene files have it, or None."""
+        kind = str(self.pad.value)
+        given = {
+            "shear_modulus": 1e6 * (self.modulus.value or 0.0),
+            "thickness": 1e-3 * (self.thickness.value or 0.0),
+        }
+        needs = PADS_OFFERED.get(kind)
+        return needs and {"kind": kind, **{name: given[name] for name in needs}}
 
     def _read(self, content: bytes) -> None:
         name = self.file.filename or "scene.toml"
@@ -89,14 +142,16 @@ class SceneTab:
             self._rest("Stopped.")
             return
         name = str(self.scene.value)
-        scene = self._loaded.get(name) or ready_scene(
-            self._state(), name, str(self.model.value)
-        )
+        choice = self._state(), name, str(self.model.value), self._pad()
         self._running = True
         self.button.label = "Stop"
         self.result.object = ""
         self._say("Simulating (the first time this compiles) ...")
-        self._live.now(lambda task: self._work(scene, task))
+        self._live.now(
+            lambda task: self._work(
+                self._loaded.get(name) or ready_scene(*choice), task
+            )
+        )
 
     def _work(self, scene: Scene, task: Task) -> None:
         said = ""

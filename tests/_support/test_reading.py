@@ -16,6 +16,7 @@ from planarfriction.errors import FileError
 from planarfriction.identify import Log
 from planarfriction.patch import map_files as patch_files
 from planarfriction.patch import read_pressure_map
+from tests.support.refusals import refusal as one_line
 from tests.support.refusals import refused
 
 NOISE = np.random.default_rng(0).bytes(300)
@@ -31,13 +32,6 @@ READERS = {
     "run.nc": pf.Solution.load,
 }
 """A file of each kind, and what reads it."""
-
-
-def one_line(act, *arguments):
-    with pytest.raises(FrictionError) as caught:
-        act(*arguments)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 # ---------------------------------------------------------------------- what is no file

@@ -16,10 +16,10 @@ import planarfriction as pf
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import Grid, PerCell
-from tests.support.refusals import refused
+from tests.support.contacts import SOFT as FINGER
+from tests.support.refusals import refusal, refused
 
 SQUARE = pf.ContactPatch.rectangle(0.02, cells=3)
-FINGER = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 MODEL = pf.DistributedModel(SQUARE, pf.LuGre())
 SIGNAL = pf.Signal([0.0, 1.0], [1.0, 2.0])
 ELLIPSOID = pf.LimitSurfaceEllipsoid(SQUARE)
@@ -181,9 +181,7 @@ MASKS = ("weights", "pressure", "profile")
 
 
 def refuses(name, call, value):
-    with pytest.raises(InvalidValueError) as caught:
-        call(value)
-    message = str(caught.value)
+    message = refusal(call, value, kind=InvalidValueError)
     assert (
         name.partition(" of ")[0] in message
         and len(message) <= 300

@@ -21,9 +21,9 @@ from planarfriction.errors import (
     SweepInterrupted,
 )
 from planarfriction.patch import PerCell
+from tests.support.contacts import SOFT as FINGER
 
 SQUARE = pf.ContactPatch.rectangle(0.02, cells=5)
-FINGER = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 TIMES = np.linspace(0.0, 1.0, 30)
 

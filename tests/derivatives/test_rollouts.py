@@ -12,31 +12,23 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction import derivatives
 from planarfriction.derivatives import PARAMETERS
+from tests.support.contacts import (
+    ELASTIC,
+    LAWS,
+    SURFACES,
+    friction_model,
+    published_finger,
+)
+from tests.support.contacts import FOUR as PATCH
 from tests.support.refusals import refused
 
-PLAIN = pf.LuGre(mu_s=1.2)
-ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
-WIDE = pf.LuGre(mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
-LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC, "wide": WIDE}
-SURFACES = {
-    "cells": pf.LimitSurfaceCells,
-    "table": pf.LimitSurfaceTable,
-    "published": pf.LimitSurfaceTablePublished,
-    "ellipsoid": pf.LimitSurfaceEllipsoid,
-}
-PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LOAD, DT, T = 2.0, 1e-4, 12
 
 every_surface = pytest.mark.parametrize("kind", SURFACES)
 every_law = pytest.mark.parametrize("law", LAWS)
 
 
-@functools.cache
-def model_of(kind, law="elasto-plastic"):
-    """A model by name: "distributed" or the reduced one with a kind of limit surface."""
-    if kind == "distributed":
-        return pf.DistributedModel(PATCH, LAWS[law])
-    return pf.ReducedModelPublished(PATCH, LAWS[law], surface=SURFACES[kind](PATCH))
+model_of = functools.cache(friction_model)
 
 
 def radius(model):
@@ -342,7 +334,20 @@ def test_one_load_for_each_contact_and_rest():
     assert gradient.state.shape == (3,) and gradient.normal_force.shape == (2, 1)
 
 
-# ---------------------------------------------------------------------- other models
+def test_changes_broadcast_with_contacts():
+    model = model_of("table", "wide")
+    state, twists, loads = drive(model)
+    changed_state, _, _ = drive(model, 1)
+    scales = np.array([0.5, 1.0, 2.0])[:, None, None]
+    tangent = derivatives.RolloutTangent(changed_state, 0.0, 1.0)
+    found = derivatives.rollout_jvp(model, state, scales * twists, 2.0, DT, tangent)
+    assert found.wrenches_dot.shape == (3, T, 3)
+    for each, scale in zip(found.wrenches_dot, scales, strict=True):
+        tangent = derivatives.RolloutTangent(changed_state, normal_force=np.ones(T))
+        alone = derivatives.rollout_jvp(model, state, scale * twists, 2.0, DT, tangent)
+        assert np.array_equal(each, alone.wrenches_dot)
+    held = derivatives.rollout_jvp(model, state, twists, loads, DT)
+    assert not held.wrenches_dot.any() and not held.state_dot.any()
 
 
 # ---------------------------------------------------------------------- ends of the range
@@ -374,11 +379,7 @@ def test_twists_whose_squares_leave_the_range_of_numbers_are_rest(surface):
 
 # ---------------------------------------------------------------------- errors
 
-FINGER = pf.ContactPatch.rectangle(
-    0.02,
-    cells=21,
-    pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01),
-)
+FINGER = pf.ContactPatch.rectangle(0.02, cells=21, pressure=published_finger())
 
 
 def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
@@ -446,7 +447,55 @@ def test_a_roll_out_of_no_model_names_all_models():
         pf.rollout("reduced", None, np.zeros((3, 3)), 1.0, DT)
 
 
-def test_unknown_names_are_refused():
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"twist": np.zeros((T, 2))},
+            rf"tangent.twist must have shape \[..., {T}, 3\], got shape \[{T}, 2\]",
+        ),
+        (
+            {"parameters": np.zeros(7)},
+            r"tangent.parameters must have shape \[..., 12\]",
+        ),
+        ({"state": [np.nan, 0.0, 0.0]}, "tangent.state must be finite"),
+        (
+            {"normal_force": np.zeros((4, T)), "state": np.zeros((5, 3))},
+            "batch axes must broadcast",
+        ),
+    ],
+)
+def test_wrong_changes_are_one_clear_line(changes, message):
+    model = model_of("table")
+    tangent = derivatives.RolloutTangent(**changes)
+    with refused(message):
+        derivatives.rollout_jvp(model, *drive(model), DT, tangent)
+
+
+def test_what_else_is_refused():
     model = model_of("ellipsoid")
     with refused("did you mean 'mu_s'"):
         derivatives.rollout_jacobian(model, *drive(model), DT, names=["mu_k"])
+    with refused(r"^twist must"):
+        derivatives.rollout_jvp(model, None, [[], [1.0, None], []], 1.0, DT)
+
+
+# ---------------------------------------------------------------------- pads with a common compliance
+
+
+def test_a_face_without_load_forgets_and_takes_no_numbers():
+    pad = pf.Pad.measured(4e3, 0.4)
+    law = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_1=0.0, v_s=2e-2, elasto_plastic=0.9)
+    model = pf.ReducedModel(PATCH, law, pad=pad)
+    _, twists, loads = drive(model_of("ellipsoid"))
+    state, _ = model.step(model.rest(), 0.01 * twists[0], 3.0, DT)
+    loads[2] = 0.0
+    bars = np.ones((T, 3))
+    found, before = (
+        derivatives.rollout_vjp(model, state, twists[:t], loads[:t], DT, bars[:t])
+        for t in (T, 2)
+    )
+    np.testing.assert_allclose(found.state, before.state, rtol=1e-12)
+    assert np.isfinite(found.normal_force).all() and not found.twist[2].any()
+    with refused("parameters must be None for a pad with a common compliance"):
+        derivatives.rollout(model, state, twists, loads, DT, parameters=np.ones(8))

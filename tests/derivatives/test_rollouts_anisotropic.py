@@ -7,8 +7,8 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import derivatives
+from tests.support.contacts import FOUR as PLAIN
 
-PLAIN = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 GRAIN = pf.friction_metric(0.6, along=0.5, across=1.0)
 LAW = pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.6))
 PATCHES = {

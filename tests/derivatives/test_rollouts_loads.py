@@ -5,10 +5,8 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import derivatives
+from tests.support.contacts import HEAVY, TIP
 
-X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
-LIGHT = np.maximum(1.0 - ((X - 1e-3) ** 2 + Y**2) / 0.003**2, 0.0)
-HEAVY = np.sqrt(np.maximum(1.0 - (X**2 + (Y - 1e-3) ** 2) / 0.0045**2, 0.0))
 METRIC = pf.friction_metric(0.6, along=0.5, across=1.0)
 
 ELASTIC = pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
@@ -76,9 +74,7 @@ def test_a_shape_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(metric):
 
 
 def test_without_load_the_slope_is_the_wrench_per_newton_of_a_small_one():
-    model = pf.DistributedModel(
-        pf.ContactPatch.from_pressure({0.5: LIGHT, 4.0: HEAVY}, cell_size=1e-3), ELASTIC
-    )
+    model = pf.DistributedModel(TIP, ELASTIC)
     state, twists = drive(model, 7)
     loads = LOADS.copy()
     loads[4] = 0.0

@@ -12,24 +12,16 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import derivatives
+from tests.support import contacts
+from tests.support.contacts import FOUR as PATCH
+from tests.support.contacts import SURFACES, TIP
 
-LAWS = {
-    "plain": pf.LuGre(mu_s=1.2),
-    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)),
-    "wide": pf.LuGre(
-        mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3)
-    ),
-}
-SURFACES = {
-    "cells": pf.LimitSurfaceCells,
-    "table": pf.LimitSurfaceTable,
-    "published": pf.LimitSurfaceTablePublished,
-    "ellipsoid": pf.LimitSurfaceEllipsoid,
+LAWS = contacts.LAWS | {
+    "wide": pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=0.3)
 }
 SPEEDS = {"stick": 1e-6, "around": 3e-3, "slip": 1e-1}
 """Largest change of the speed from step to step [m/s]; full deflection takes 1e-6 m, a step 1e-4 s."""
 
-PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 METRIC = pf.friction_metric(0.6, along=0.5, across=1.0)
 EACH = [pf.friction_metric(0.3 * i, 0.6, 1.1) for i in range(PATCH.cells)]
 DIRECTED = {
@@ -40,12 +32,6 @@ DIRECTED = {
         PATCH, asymmetry=(0.3, -0.2), radii=np.full(PATCH.cells, 0.002)
     ),
 }
-
-X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
-LIGHT = np.maximum(1.0 - ((X - 1e-3) ** 2 + Y**2) / 0.003**2, 0.0)
-HEAVY = np.sqrt(np.maximum(1.0 - (X**2 + (Y - 1e-3) ** 2) / 0.0045**2, 0.0))
-TIP = pf.ContactPatch.from_pressure({0.5: LIGHT, 4.0: HEAVY}, cell_size=1e-3)
-"""Grows, flattens and moves with the load; no cell gets its first load between the two maps."""
 
 LOAD, DT, T = 2.0, 1e-4, 12
 
@@ -127,7 +113,17 @@ STIFF = {
     "pad, few": Case(lambda: pf.ReducedModel(MANY, LAWS["wide"], cells=20, pad=PAD)),
 }
 """Loads fall below those that hold what bristles carry."""
-CASES = FIXED | SOFT | STIFF
+COMMON = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_1=0.0, v_s=0.5, elasto_plastic=0.9)
+FACES = {
+    "face": Case(
+        lambda: pf.ReducedModel(
+            pf.ContactPatch.rectangle(0.02, cells=7), COMMON, cells=9,
+            pad=pf.Pad.measured(4e4, 0.4),
+        ), 0.3,
+    ),
+}  # fmt: skip
+"""Pads with a common compliance, whose law is not a vector of numbers."""
+CASES = FIXED | SOFT | STIFF | FACES
 
 every_case = pytest.mark.parametrize("name", CASES)
 
@@ -161,6 +157,26 @@ def drive(case, seed=0, steps=T):
         * twist_sizes(model)
     )
     return state, twists, random.uniform(1.0, 3.0, steps)
+
+
+def parameters_of(model):
+    """Return the parameters of a model, those of a law for a pad with a common compliance."""
+    if model.law is not COMMON:
+        return derivatives.parameters_of(model)
+    names = derivatives.parameter_names(model)
+    return np.array([getattr(COMMON.numbers, name) for name in names])
+
+
+def rolled(model, state, twists, loads, parameters):
+    """Return the rollout of a model with other numbers of its law."""
+    if model.law is not COMMON:
+        return derivatives.rollout(
+            model, state, twists, loads, DT, parameters=parameters
+        )
+    numbers = dict(zip(derivatives.parameter_names(model), parameters, strict=True))
+    ratio = numbers.pop("breakaway_ratio")
+    law = dataclasses.replace(COMMON, elasto_plastic=ratio, **numbers)
+    return derivatives.rollout(model.with_law(law), state, twists, loads, DT)
 
 
 def interrupted(case, seed=0):
@@ -202,7 +218,7 @@ def test_the_gradient_of_a_rollout_is_that_of_differences(name):
     case = CASES[name]
     model = case.model
     (state, twists, loads) = drive(case, 3)
-    parameters = derivatives.parameters_of(model)
+    parameters = parameters_of(model)
     bars = cotangents(model)
     lengths = np.where(
         np.arange(len(parameters)) >= 10, model.patch.contact_radius(LOAD), 1e-3
@@ -219,13 +235,13 @@ def test_the_gradient_of_a_rollout_is_that_of_differences(name):
         "normal_force": 1.0,
         "parameters": np.maximum(np.abs(parameters), lengths),
     }
+    if model.law is COMMON:  # which takes no other sigma_1 than 0
+        units["parameters"] *= parameters > 0.0
     gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, *bars)
 
     def value(of, change):
         changed = {**inputs, of: inputs[of] + change * units[of]}
-        run = derivatives.rollout(
-            model, *list(changed.values())[:3], DT, parameters=changed["parameters"]
-        )
+        run = rolled(model, *changed.values())
         return float((bars[0] * run.wrenches).sum() + (bars[1] * run.state).sum())
 
     for of, found in gradient._asdict().items():
@@ -251,7 +267,7 @@ def test_forwards_is_the_transpose_of_backwards(name):
     model = case.model
     inputs = interrupted(case, 4)
     (bar, end_bar) = cotangents(case.model)
-    parameters = derivatives.parameters_of(model)
+    parameters = parameters_of(model)
     changes = [*drive(case, 5), parameters * random.normal(size=len(parameters))]
     found = derivatives.rollout_jvp(
         model, *inputs, DT, derivatives.RolloutTangent(*changes)
@@ -298,7 +314,7 @@ def test_changes_of_parameters_are_the_jacobian(name):
         )
     assert found.state_dot.shape == (len(directions), *model.state_shape)
     gradient = derivatives.rollout_vjp(model, *inputs, DT, bar).parameters
-    own = derivatives.parameters_of(model)
+    own = parameters_of(model)
     terms = own * bar[..., None] * by.d_wrenches
     sizes = np.abs(terms).sum((0, 1))
     assert (
@@ -310,7 +326,9 @@ def test_changes_of_parameters_are_the_jacobian(name):
             gradient[derivatives.parameter_names(model).index("breakaway_ratio")] == 0.0
         )
     *_, chosen = derivatives.rollout_jacobian(model, *inputs, DT, ("v_s", "mu_c"))
-    assert np.array_equal(chosen, by.d_wrenches[..., [5, 3]])
+    names = derivatives.parameter_names(model)
+    places = [names.index("v_s"), names.index("mu_c")]
+    assert np.array_equal(chosen, by.d_wrenches[..., places])
 
 
 @pytest.mark.parametrize(
@@ -324,7 +342,7 @@ def test_a_batch_is_a_loop(name):
     twists = np.stack([drive(case, seed)[1] for seed in range(2)])  # [2]
     loads = drive(case)[2]
     dt = random.uniform(0.5e-4, 1e-4, T)
-    own = derivatives.parameters_of(model)
+    own = parameters_of(model)
     parameters = own * random.uniform(0.9, 1.0, (3, 1, len(own)))
     bar = random.normal(size=(3, 2, T, 3)) * twist_sizes(model)
     end_bar = random.normal(size=(3, 2, *model.state_shape)) * 1e6 / state_sizes(model)

@@ -15,6 +15,7 @@ from planarfriction.derivatives import (
 )
 from planarfriction.errors import SolverError
 from planarfriction.scenes import SolverOptions
+from tests.support.differences import MOTION, WRENCH, assert_sensitivities
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(
@@ -27,7 +28,6 @@ LAW = pf.LuGre(
     elasto_plastic=pf.ElastoPlastic(0.5),
 )
 NAMES = tuple(SCENE_PARAMETERS)
-MOTION = ("vx", "vy", "omega", "x", "y", "theta")
 FACTORS = dict.fromkeys(NAMES, 1.0)
 SURFACES = {"ellipsoid": pf.LimitSurfaceEllipsoid, "table": pf.LimitSurfaceTable}
 
@@ -166,7 +166,7 @@ def test_motion_and_wrenches_are_those_of_simulate(kind):
         assert found.motion[:, i] == pytest.approx(
             data[name].values, abs=1e-7 * np.abs(data[name].values).max()
         )
-    for i, name in enumerate(("fx", "fy", "tau")):
+    for i, name in enumerate(WRENCH):
         assert found.wrenches[..., i] == pytest.approx(
             data[name].values, abs=1e-5 * np.abs(data[name].values).max()
         )
@@ -200,24 +200,12 @@ def test_derivatives_are_central_differences(kind, h, rtol):
     """
     found = sensitivities(kind)
     for p, name in enumerate(NAMES):
-        tight = [
-            pf.simulate(slide(kind, **{name: 1.0 + i * h}), rtol=1e-11, atol=1e-11).data
-            for i in (1, -1, 2, -2)
-        ]
-        for values, names in (
-            (found.d_motion[..., p], MOTION),
-            (found.d_wrenches[..., p], ("fx", "fy", "tau")),
-        ):
-            for i, variable in enumerate(names):
-                near, back, far, far_back = (data[variable].values for data in tight)
-                expected = (8.0 * (near - back) - (far - far_back)) / (12.0 * h)
-                error = np.abs(values[..., i] - expected).max()
-                # and 1e-13 m of rounding in each run
-                assert error <= rtol * np.abs(expected).max() + 1e-13 / h, (
-                    name,
-                    variable,
-                    error / np.abs(expected).max(),
-                )
+
+        def changed(by, name=name):
+            return slide(kind, **{name: by})
+
+        # and 1e-13 m of rounding in each run
+        assert_sensitivities(found, p, changed, 1.0, h, rtol, 1e-13 / h)
 
 
 def test_derivatives_end_where_a_slide_stops():

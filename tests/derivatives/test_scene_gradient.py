@@ -9,7 +9,8 @@ import pytest
 import planarfriction as pf
 from planarfriction.derivatives import path, scene_gradient, scene_sensitivities
 from planarfriction.scenes import SolverOptions, packing
-from tests.derivatives.test_scene import LAW, MOTION, model_of, slide
+from tests.derivatives.test_scene import LAW, model_of, slide
+from tests.support.differences import MOTION, assert_sensitivities
 from tests.support.refusals import refused
 
 KNOTS = np.array([0.0, 0.05, 0.15, 0.3, 0.34])
@@ -78,18 +79,9 @@ def test_derivatives_to_knots_and_start_are_differences(kind):
     numbers += [("force", 2, 1, 1e-4), ("force", 3, 2, 1e-6)]
     most = 5e-5 if "fixed" in kind else 3e-5 if kind == "reduced" else 1e-5
     for name, k, component, h in numbers:
-        scenes = [changed(scene, name, k, component, i * h) for i in (1, -1, 2, -2)]
-        tight = [pf.simulate(each, rtol=1e-11, atol=1e-11).data for each in scenes]
         p = found.columns[name].start + (3 * k + component if name == "force" else k)
-        for values, names in (
-            (found.d_motion[..., p], MOTION),
-            (found.d_wrenches[..., p], ("fx", "fy", "tau")),
-        ):
-            for i, variable in enumerate(names):
-                near, back, far, far_back = (data[variable].values for data in tight)
-                expected = (8.0 * (near - back) - (far - far_back)) / (12.0 * h)
-                error = np.abs(values[..., i] - expected).max() / np.abs(expected).max()
-                assert error <= most, (found.names[p], variable, error)
+        make = functools.partial(changed, scene, name, k, component)
+        assert_sensitivities(found, p, make, 0.0, h, most)
 
 
 def test_a_sliding_block_loses_speed_to_each_knot_of_its_load():
@@ -268,22 +260,11 @@ def test_derivatives_through_friction_that_depends_on_the_direction(kind):
     for p, (name, at) in enumerate(
         (("mu", 1.0), ("r", 1.0), ("load", 1.0), ("vy", 0.03))
     ):
-        h = 1e-4 * at
-        tight = [
-            pf.simulate(scene(**{name: at + i * h}), rtol=1e-11, atol=1e-11).data
-            for i in (1, -1, 2, -2)
-        ]
-        for values, names in (
-            (found.d_motion[..., p], MOTION),
-            (found.d_wrenches[:, 0, :, p], ("fx", "fy", "tau")),
-        ):
-            for i, variable in enumerate(names):
-                near, back, far, far_back = (
-                    np.ravel(data[variable].values) for data in tight
-                )
-                expected = (8.0 * (near - back) - (far - far_back)) / (12.0 * h)
-                error = np.abs(values[..., i] - expected).max() / np.abs(expected).max()
-                assert error <= 5e-6, (name, variable, error)
+
+        def changed(number, name=name):
+            return scene(**{name: number})
+
+        assert_sensitivities(found, p, changed, at, 1e-4 * at, 5e-6)
     agree(scene(), numbers, 2e-6, 2e-5)
 
 

@@ -35,7 +35,7 @@ def test_labels_are_those_of_the_slip(example, tip):
     """The plate hangs still until its grip falls, and the force at the onset is near the limit of friction."""
     slips = example.Slips(tip)
     scene = slips.scene(3)
-    found = slips.labels(pf.simulate(scene))
+    found = slips.labels(pf.simulate(scene, bristles="all"))
     mu, weight = slips.friction(3), scene.body.mass * 9.81
     clock = example.FRAME * np.arange(len(found["normal_force"]))
     assert example.SETTLED < found["incipient"] < found["onset"] < example.END

@@ -211,7 +211,9 @@ def test_each_control_says_what_it_is_in_the_unit_of_its_label(page):
     for kind in LAWS:
         page.controls.law.value = kind
         found += page.controls.parameters
-    for each in [*found, page.scenes.scene, page.scenes.model]:
+    tab = page.scenes
+    found += [tab.scene, tab.model, tab.pad, tab.modulus, tab.thickness]
+    for each in found:
         words = getattr(each, "description", None) or icons[each]
         unit = re.search(r"\[[^]]+\]", each.label or "")
         assert len(words) > 5 and (unit is None or unit[0] in words), each.label
@@ -368,8 +370,22 @@ def test_a_scene_file_is_offered_and_a_wrong_one_is_one_line(page):
         and not scenes.model.visible
         and not page.message.visible
     )
+    scenes.pad.value = "layer"
+    assert not (scenes.pad.visible or scenes.modulus.visible)
     scenes.scene.value = "free-slide"
-    assert scenes.model.visible
+    assert scenes.model.visible and scenes.pad.visible and scenes.thickness.visible
+
+
+def test_a_pad_has_the_fields_that_it_needs(page):
+    tab = page.scenes
+    tab.modulus.value = 0.3
+    assert tab._pad() is None and not (tab.modulus.visible or tab.thickness.visible)
+    tab.pad.value = "half-space"
+    assert tab.modulus.visible and not tab.thickness.visible
+    assert tab._pad() == {"kind": "half-space", "shear_modulus": pytest.approx(0.3e6)}
+    tab.pad.value = "layer"
+    tab.thickness.value = None
+    assert tab.thickness.visible and tab._pad()["thickness"] == 0.0
 
 
 def test_the_map_has_room_around_it_and_shows_each_picture():

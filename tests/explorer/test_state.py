@@ -585,6 +585,18 @@ def test_a_scene_is_run_with_the_contact_on_the_screen():
         ready_scene(state, "free-slide", "reduce")
 
 
+def test_a_ready_scene_is_run_on_a_pad():
+    layer = {"kind": "layer", "shear_modulus": 0.2e6, "thickness": 1e-3}
+    (contact,) = ready_scene(State(), "in-hand", "reduced", layer).contacts
+    assert contact.model.pad == pf.Pad.layer(0.2e6, 1e-3) and contact.count == 2
+    with refused(
+        "pad must be left out of a contact whose model has none", FrictionError
+    ):
+        ready_scene(State(), "in-hand", "reduced-published", layer)
+    with refused("shear_modulus must be > 0", FrictionError):
+        ready_scene(State(), "in-hand", "reduced", layer | {"shear_modulus": 0.0})
+
+
 def test_a_film_is_one_file_beside_its_histories_and_can_be_cancelled(monkeypatch):
     monkeypatch.setattr(films, "DPI", 20.0)  # quick to draw
     monkeypatch.setattr("planarfriction.plots.animation.LEAST_FRAMES", 6)

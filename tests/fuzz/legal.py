@@ -58,6 +58,11 @@ SKIPPED = {
 }
 """Not attacked, and why."""
 
+UNCHECKED = {
+    "scenes.foot": "torque",  # a foot that turns a million times takes as long
+}
+"""Arguments of which some wrong ones ask for more than a minute: not attacked."""
+
 RECORDS = """
     Rollout RolloutVJP RolloutJacobian RolloutStates RolloutTangent RolloutJVP SceneGradient SceneSensitivities
     Identification Verdict MotionPlan GripPlan GripReport HoldPlan Push PushPlan PushReport Solution Progress
@@ -147,80 +152,62 @@ def objects() -> dict[str, Any]:
     return {
         # parts
         "patch": PATCH, "law": LAW, "model": model, "scene": scene, "solution": solution, "solutions": solution,
-        "surface": surface, "reference": surface, "few": PATCH, "slide": pf.identify.Slide(time, pose), "log": log,
-        "contacts": [pf.Contact(model, 1.0)], "beside": pf.LimitSurfaceEllipsoid(PATCH),
-        "member": LAW, "method": pf.solvers.RODAS3, "body": pf.Body(1.0, 0.01), "progress": lambda *_: None,
-        "max_steps": 100_000, "batch": (2, 3),
+        "surface": surface, "reference": surface, "slide": pf.identify.Slide(time, pose),
+        "contacts": [pf.Contact(model, 1.0)], "beside": pf.LimitSurfaceEllipsoid(PATCH), "method": pf.solvers.RODAS3,
+        "body": pf.Body(1.0, 0.01), "progress": lambda *_: None, "max_steps": 100_000, "batch": (2, 3),
         "make": lambda: None, "words": "words",
         # numbers
-        "mass": 1.0, "inertia": 0.01, "radius": 0.01, "width": 0.02, "height": 0.01, "length": 0.02, "area": 1e-6,
-        "shear_modulus": 2e5, "thickness": 1e-3, "poisson_ratio": 0.4, "bodies": 1, "lag": 1e-3, "stiffness": 1e4,
-        "common": 0.0, "pad": None,
-        "inner_radius": 0.005, "outer_radius": 0.01, "cells": 5, "mu": 0.5, "mu_c": 0.5, "mu_s": 0.6, "t_end": 0.02,
-        "angle": 0.1, "along": 0.4, "across": 0.6, "c": 0.006, "n": 0.3, "k": 2.0, "normal_force": 2.0,
-        "sigma_0": 1e5, "sigma_1": 100.0, "sigma_2": 0.1, "v_s": 1e-3, "gamma": 2.0, "dt": 1e-3, "time": TIMES,
-        "cell_size": 0.001, "offset": 2.0, "amplitude": 1.0, "frequency": 2.0, "count": 2, "degree": 2, "parts": 2,
-        "refined": 2,
-        "x_min": 0.0, "y_min": 0.0, "cell_width": 0.001, "cell_height": 0.001, "columns": 5, "rows": 5,
-        "load": 1, "speed": 0.01, "spin": 1.0, "segments": 5, "samples": 20, "save_every": 0.01, "stop_speed": 1e-4,
-        "controller": None, "grip": 30.0, "start": "rest", "margin": 0.5, "ramp": 0.01, "fall": 2.0,
-        "rtol": 1e-4, "atol": 1e-3, "t": 0.05, "elasto_plastic": 0.9, "creep_speed": 1e-5, "relaxation_time": 0.01,
-        "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None, "acceleration": 3.0,
-        "arm": 0.06, "share": 0.5, "forefoot": model,
-        "times_repeated": 2, "gravity": (0.0, -9.81), "size": (0.15, 0.08), "fingers": 2, "phase": 0.0,
+        "mass": 1.0, "inertia": 0.01, "radius": 0.01, "width": 0.02, "height": 0.01, "length": 0.02,
+        "shear_modulus": 2e5, "thickness": 1e-3, "poisson_ratio": 0.4, "stiffness": 1e4, "inner_radius": 0.005,
+        "outer_radius": 0.01, "cells": 5, "mu": 0.5, "mu_c": 0.5, "mu_s": 0.6, "t_end": 0.02, "angle": 0.1,
+        "along": 0.4, "across": 0.6, "c": 0.006, "n": 0.3, "k": 2.0, "normal_force": 2.0, "sigma_0": 1e5,
+        "sigma_1": 100.0, "sigma_2": 0.1, "v_s": 1e-3, "dt": 1e-3, "time": TIMES, "cell_size": 0.001, "offset": 2.0,
+        "amplitude": 1.0, "frequency": 2.0, "count": 2, "degree": 2, "parts": 2, "refined": 2, "x_min": 0.0,
+        "y_min": 0.0, "cell_width": 0.001, "cell_height": 0.001, "columns": 5, "rows": 5, "load": 1, "speed": 0.01,
+        "spin": 1.0, "segments": 5, "samples": 20, "save_every": 0.01, "stop_speed": 1e-4, "grip": 30.0,
+        "margin": 0.5, "ramp": 0.01, "fall": 2.0, "rtol": 1e-4, "atol": 1e-3, "t": 0.05, "elasto_plastic": 0.9,
+        "breakaway_ratio": 0.5, "radius_max": 0.02, "acceleration": 3.0, "share": 0.5, "forefoot": model,
+        "size": (0.15, 0.08),
         # arrays
         "positions": [(0.0, 0.0), (0.01, 0.0), (0.0, 0.01)], "areas": [1e-6] * 3, "weights": [1.0, 2.0, 3.0],
-        "position": (0.0, 0.01), "velocity": None, "force": None, "vertices": [(0, 0), (0.01, 0), (0, 0.01)],
+        "position": (0.0, 0.01), "vertices": [(0, 0), (0.01, 0), (0, 0.01)],
         "outline": [(0.0, 0.0), (0.1, 0.0), (0.0, 0.1)], "gradient": (5.0, 2.0), "centre_of_mass": (0.002, 0.0),
-        "deflections": np.zeros((2, PATCH.cells)),
-        "loads": [1.0, 2.0], "values": [1.0, 2.0], "times": [0.0, 0.1], "value": 2.0, "pressure": None,
-        "twist": TWISTS[9], "wrench": np.array([0.5, 0.1, 0.001]), "state": Fresh(lambda: np.zeros(3)),
-        "about": (0.0, 0.0), "options": pf.scenes.SolverOptions(rtol=1e-4, atol=1e-3),
-        "wrenches_bar": np.ones((20, 3)), "state_bar": np.zeros(3), "metric": np.eye(2) * 0.25, "asymmetry": (0.1, 0.0),
-        "moments": (1e-3, -2e-3), "motion": TWISTS, "pose": pose, "breaks": [0.0, 0.1, 0.2],
-        "noise": (1e-3, 1e-3, 0.02), "window": 7,
-        "velocity_weight": 1.0, "kept": np.array([True, False, True]), "coefficients": None,
+        "deflections": np.zeros((2, PATCH.cells)), "loads": [1.0, 2.0], "values": [1.0, 2.0], "times": [0.0, 0.1],
+        "value": 2.0, "twist": TWISTS[9], "wrench": np.array([0.5, 0.1, 0.001]), "state": Fresh(lambda: np.zeros(3)),
+        "options": pf.scenes.SolverOptions(rtol=1e-4, atol=1e-3), "wrenches_bar": np.ones((20, 3)),
+        "state_bar": np.zeros(3), "metric": np.eye(2) * 0.25, "asymmetry": (0.1, 0.0), "moments": (1e-3, -2e-3),
+        "motion": TWISTS,
         # choices and texts
-        "hold": "previous", "name": "name", "mounted_on": "world", "at": "origin", "bristles": "none",
-        "direction": "y", "on_load_change": "keep", "names": ("mu",), "path": "out", "profile": None, "placement": 1,
-        "data": Fresh(lambda: PATCH.to_dict()), "folder": None, "grid": None, "parameters": None, "states": None,
-        "wrench_axis": None, "axis": None,
+        "name": "name", "at": "origin", "on_load_change": "keep", "data": Fresh(lambda: PATCH.to_dict()),
         # instances, for their methods
         "ContactPatch": SOFT, "Coulomb": pf.Coulomb(0.5), "CoulombStribeck": pf.CoulombStribeck(), "Dahl": pf.Dahl(),
-        "LuGre": LAW, "DistributedModel": pf.DistributedModel(PATCH, LAW),
-        "ReducedModelPublished": soft,
-        "ReducedModel": DISCS, "Signal": signal, "Scene": scene,
-        "SlidingBody": pf.SlidingBody(0.2, 1e-4, DISCS), "Spring": pf.Spring(10.0), "MapReading": pf.patch.MapReading(),
-        "Solution": solution, "Grid": pf.patch.Grid.around_origin(0.02, 0.02, 5, 5), "SoftFinger": SOFT.pressure,
+        "LuGre": LAW, "DistributedModel": pf.DistributedModel(PATCH, LAW), "ReducedModelPublished": soft,
+        "ReducedModel": DISCS, "Signal": signal, "Scene": scene, "SlidingBody": pf.SlidingBody(0.2, 1e-4, DISCS),
+        "Spring": pf.Spring(10.0), "MapReading": pf.patch.MapReading(), "Solution": solution,
+        "Grid": pf.patch.Grid.around_origin(0.02, 0.02, 5, 5), "SoftFinger": SOFT.pressure,
         "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
         "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),
-        "PerCell": pf.patch.PerCell([1.0, 2.0, 3.0]),
-        "Pad": pf.Pad.layer(2e5, 1e-3), "Layer": pf.Pad.layer(2e5, 1e-3), "HalfSpace": pf.Pad.half_space(2e5),
-        "Measured": pf.Pad.measured(1e4), "AtLoad": pf.Pad.at_load(2.0),
-        "Pieces": pf.pads.Pieces(np.full(PATCH.cells, 1e4)), "each": np.full(PATCH.cells, 1e4),
+        "PerCell": pf.patch.PerCell([1.0, 2.0, 3.0]), "Pad": pf.Pad.layer(2e5, 1e-3),
+        "Layer": pf.Pad.layer(2e5, 1e-3), "HalfSpace": pf.Pad.half_space(2e5), "Measured": pf.Pad.measured(1e4),
+        "AtLoad": pf.Pad.at_load(2.0), "Pieces": pf.pads.Pieces(np.full(PATCH.cells, 1e4)),
         "Drive": pf.joints.Drive(100.0, 7.0), "Plant": pf.joints.Plant(inertia=0.05), "JointLog": turned,
         "JointFriction": pf.joints.JointFriction(0.5), "tau_motor": 0.3, "tau_external": -0.1,
-        "FrictionObserver": watcher,
-        **{name: getattr(pf.online, name)(watcher) for name in ("Hold", "Hinge")},
+        "FrictionObserver": watcher, **{name: getattr(pf.online, name)(watcher) for name in ("Hold", "Hinge")},
         **{name: getattr(pf.online, name)(watcher, 0.02) for name in ("SlideBy", "TurnBy")},
-        "Sensors": pf.online.Sensors(),
-        "Slider": pf.planning.Slider(pf.LimitSurfaceEllipsoid(PATCH), SQUARE),
+        "Sensors": pf.online.Sensors(), "Slider": pf.planning.Slider(pf.LimitSurfaceEllipsoid(PATCH), SQUARE),
         **{name: getattr(pf, name)(PATCH) for name in pf.__all__ if name.startswith("LimitSurface")},
     }  # fmt: skip
 
 
 SPECIAL: dict[str, dict[str, Any]] = {
-    "Contact": {"pressure": "fixed", "height": 0.0, "edge": False},
-    "SlidingBody": {"models": DISCS, "positions": (0.0, 0.0), "angles": 0.0},
+    "Contact": {"pressure": "fixed", "height": 0.0},
+    "SlidingBody": {"models": DISCS, "positions": (0.0, 0.0)},
     "SlidingBody.step": {
         "loads": None,
-        "cover": None,
         "state": Fresh(lambda: np.zeros(np.prod(DISCS.state_shape))),
         "twist": (0.01, 0.0, 0.1),
         "normal_force": 1.0,
-        "dt": 1e-3,
         "wrench": (0.0, 0.0, 0.0),
-        "angle": 0.1,
         "support_velocity": (0.0, 0.1, 0.2),
     },
     **{
@@ -233,12 +220,11 @@ SPECIAL: dict[str, dict[str, Any]] = {
             "points": [[0.0, 0.001]],
             "markers": Fresh(lambda: pf.tactile.markers(DISCS, [[0.0, 0.001]])),
             "solution": Fresh(_recorded),
-            "contact": None,
         }
         for name in TACTILE
     },
-    "plots.plot_slip": {"contact": None, "times": [0.0, 0.01], "size": None},
-    "Spring": {"stiffness": 10.0, "anchor": (0.0, 0.0, 0.0), "at": (0.0, 0.0)},
+    "plots.plot_slip": {"times": [0.0, 0.01], "size": None},
+    "Spring": {"stiffness": 10.0, "at": (0.0, 0.0)},
     "Slider": {"outline": SQUARE},
     "Slider.gaps": {"point": (0.0, 0.0)},
     "planning.motion_cone": {"at": (-0.01, 0.002), "normal": (1.0, 0.0)},
@@ -255,8 +241,6 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "model": pf.ReducedModel(PATCH, LAW, cells=9),
         "batch": (),
         "surface": pf.LimitSurfaceEllipsoid(PATCH),
-        "sensors": pf.online.Sensors(),
-        "bias": (0.03, 0.03, 3e-4),
     },
     **{
         f"online.{name}": {
@@ -278,32 +262,18 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "patch.PerCell": {"values": [1.0, 2.0, 3.0]},
     "ContactPatch.from_pressure": {
         "pressure": np.ones((3, 3)),
-        **dict.fromkeys(
-            (
-                "loads",
-                "header",
-                "index",
-                "frame",
-                "frame_shape",
-                "threshold",
-                "invert",
-                "width",
-            )
-        ),
+        "loads": None,
+        "width": None,
     },
     "Log.from_axis": {
         "time": TIMES,
         "force": -TWISTS[:, 0],
         "velocity": TWISTS[:, 0],
         "position": None,
-        "axis": "x",
     },
     "Spring.pull": {"time": TIMES, "pose": TWISTS},
     "ContactPatch.discs": {"n": None},
-    "ContactPatch": dict.fromkeys(
-        ("pressure", "metric", "asymmetry", "cell_size", "point_shares", "radii")
-    ),
-    "ContactPatch.moments": {"about": None},
+    "ContactPatch": dict.fromkeys(("metric", "asymmetry", "cell_size")),
     "Scene.from_dict": {"data": Fresh(lambda: objects()["scene"].to_dict())},
     "Signal.from_dict": {
         "data": Fresh(lambda: {"times": [0.0, 1.0], "values": [1.0, 2.0]})
@@ -324,7 +294,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     **{
         f"{model}.{name}": {
             "state": Fresh(lambda shape=shape: np.zeros(shape)),
-            **({"loads": None, "cover": None} if "step" in name else {}),
+            **({"loads": None} if "step" in name else {}),
         }
         for model, shape in (
             ("DistributedModel", (2, PATCH.cells)),
@@ -333,7 +303,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         for name in ("rate", "wrench", "step", "jacobians", "step_jacobians")
     },
     **{
-        f"ReducedModelPublished.{name}": {"loads": None, "cover": None}
+        f"ReducedModelPublished.{name}": {"loads": None}
         for name in ("step", "step_jacobians")
     },
     **{
@@ -353,7 +323,6 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "wrench": Fresh(lambda: pf.LimitSurfaceCells(PATCH).wrench(TWISTS)),
         "twist": TWISTS,
     },
-    "limit_surface.LimitSurfaceQuartic": {"surface": None},
     "joints.Drive": {"kp": 100.0, "supply": 7.0, "gain": 0.003, "sag": 0.2},
     "joints.Drive.duty": {"error": 0.1 * TIMES},
     "joints.Drive.voltage": {"duty": 0.1 * TIMES},
@@ -377,19 +346,9 @@ SPECIAL: dict[str, dict[str, Any]] = {
         },
         "enabled": np.ones(len(TIMES)),
         "drive": pf.joints.Drive(100.0, 7.0),
-        "turns": 0,
     },
-    "joints.JointLog.from_csv": {
-        "path": Fresh(lambda: _joint_file("joint.csv")),
-        "drive": None,
-    },
+    "joints.JointLog.from_csv": {"path": Fresh(lambda: _joint_file("joint.csv"))},
     "joints.Plant": {"inertia": 0.05, "length": 0.1, "arm_mass": 0.02, "offset": 0.1},
-    "joints.identify_joint": {
-        "logs": Fresh(lambda: objects()["JointLog"]),
-        "plant": Fresh(lambda: objects()["Plant"]),
-        "torque_gain": 0.1,
-        "terms": ("load",),
-    },
     "joints.to_mjcf": {
         "friction": Fresh(lambda: objects()["JointFriction"]),
         "joint": "elbow",
@@ -408,7 +367,6 @@ SPECIAL: dict[str, dict[str, Any]] = {
     },
     "Scene.from_file": {"path": EXAMPLES / "drift.toml"},
     "Scene.to_file": {"path": "scene.toml"},
-    "Solution.save": {"path": "solution.nc"},
     "Log.from_csv": {"path": Fresh(lambda: _log_file("log.csv"))},
     "Log.from_solution": {
         "solution": Fresh(
@@ -423,8 +381,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "identify.MassProperties": {"gravity": 9.81},
     "Slide": {"time": TIMES, "pose": TWISTS, "twist": None},
     "identify.design_experiment": {
-        "logs": (),
-        "motions": Fresh(lambda: objects()["log"]),
+        "motions": Fresh(lambda: objects()["Log"]),
         "parameters": ("mu_c",),
         "wanted": ("mu_c",),
         "nuisance": (),
@@ -460,18 +417,14 @@ SPECIAL: dict[str, dict[str, Any]] = {
             )
         ),
         "values": {"mass": [1.0, 2.0]},
-        "out": None,
-        "executor": None,
-        "measure": None,
     },
     "scenes.pivot": {"normal_force": None, "mass": 0.02, "start": "equilibrium"},
     "scenes.curling": {"twist": (1.0, 0.0, 10.0), "start": "sliding"},
-    "export_c": {"folder": "library", "precision": "double"},
+    "export_c": {"folder": "library"},
     "ReducedModel": {"cells": 12},
     **{
-        name: {"twist": TWISTS, "loads": None, "cover": None}
+        name: {"twist": TWISTS, "loads": None}
         for name in (
-            "rollout",
             "derivatives.rollout",
             "derivatives.rollout_jvp",
             "derivatives.rollout_states",
@@ -482,7 +435,6 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "twist": TWISTS,
         "names": ("mu_c",),
         "loads": None,
-        "cover": None,
     },
     "derivatives.scene_sensitivities": {
         "parameters": ("mu",),
@@ -532,7 +484,7 @@ def _names() -> Iterator[tuple[str, Callable[..., Any]]]:
     for name in pf.__all__:
         value = getattr(pf, name)
         inner = (
-            getattr(value, "__all__", [])
+            getattr(value, "__all__", TACTILE if value is pf.tactile else [])
             if isinstance(value, types.ModuleType)
             else [None]
         )
@@ -567,7 +519,9 @@ def targets() -> list[Target]:
                 arguments[parameter.name] = special[parameter.name]
             elif parameter.name in objects():
                 arguments[parameter.name] = objects()[parameter.name]
-            elif parameter.default is parameter.empty:
+            elif parameter.default is not parameter.empty:
+                arguments[parameter.name] = parameter.default
+            else:
                 raise LookupError(
                     f"tests/fuzz/legal.py has no legal {parameter.name!r} for {name}"
                 )

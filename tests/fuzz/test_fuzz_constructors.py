@@ -37,7 +37,7 @@ def places() -> st.SearchStrategy[tuple[str, str]]:
             (name, each)
             for name in targets()
             for each in targets()[name].arguments
-            if each != "self"
+            if each not in ("self", legal.UNCHECKED.get(name))
         ]
     )
 

@@ -7,6 +7,12 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import rollout, rollout_jacobian
+from tests.support.contacts import lengths
+from tests.support.differences import (
+    assert_rate_jacobians,
+    assert_step_jacobians,
+    differences,
+)
 from tests.support.refusals import refused
 
 POINT = pf.ContactPatch.points([(0.0, 0.0)])
@@ -200,47 +206,12 @@ def test_models_of_other_laws_have_the_slopes_of_their_differences(kind, law):
     model = model_of(kind, law)
     rng = np.random.default_rng(1)
     # the third state of the published model is a moment
-    scale = law.largest_deflection * (
-        np.array([1.0, 1.0, 0.005]) if kind == "reduced-published" else 1.0
-    )
+    scale = law.largest_deflection * lengths(model)
     state = 0.5 * scale * rng.normal(size=model.state_shape)
-    sideways = scale * rng.normal(size=model.state_shape)
     twist = np.array([1e-3, -5e-4, 0.2])
-    dt = 2e-3
-    slopes = model.jacobians(state, twist, LOAD)
-    step = model.step_jacobians(state, twist, LOAD, dt)
-    ahead = rng.normal(size=3) * np.array([1e-3, 1e-3, 0.1])
-    h = 1e-5  # central differences of the second order: 1e-10 of the third derivative, above 1e-16/1e-5 of rounding
-
-    def difference(function):
-        return (function(h) - function(-h)) / (2.0 * h)
-
-    def close(found, expected):
-        assert found == pytest.approx(
-            expected, rel=1e-6, abs=1e-7 * np.abs(expected).max()
-        )
-
-    inner = "cd,d->c" if kind == "reduced-published" else "cdn,dn->cn"
-    close(
-        np.einsum(inner, slopes.rate_state, sideways),
-        difference(lambda e: model.rate(state + e * sideways, twist, LOAD)),
-    )
-    close(
-        slopes.rate_twist @ ahead,
-        difference(lambda e: model.rate(state, twist + e * ahead, LOAD)),
-    )
-    close(
-        slopes.wrench_twist @ ahead,
-        difference(lambda e: model.wrench(state, twist + e * ahead, LOAD)),
-    )
-    close(
-        step.wrench_twist @ ahead,
-        difference(lambda e: model.step(state, twist + e * ahead, LOAD, dt)[1]),
-    )
-    close(
-        step.state_twist @ ahead,
-        difference(lambda e: model.step(state, twist + e * ahead, LOAD, dt)[0]),
-    )
+    by_twist = np.array([1e-8, 1e-8, 1e-6])
+    assert_rate_jacobians(model, state, twist, LOAD, 1e-5 * scale, by_twist)
+    assert_step_jacobians(model, state, twist, LOAD, 2e-3, 1e-5 * scale, by_twist)
 
 
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
@@ -306,17 +277,16 @@ def test_sensitivities_of_other_laws_are_those_of_differences(law):
     names = pf.derivatives.parameter_names(model)
     base = pf.derivatives.parameters_of(model)
     slopes = rollout_jacobian(model, *given).d_wrenches
-    for name in ("sigma_0", "mu_c"):
-        i = names.index(name)
-        change = 1e-6 * base[i] * np.eye(len(base))[i]
-        ends = [
-            rollout(model, *given, parameters=base + sign * change).wrenches
-            for sign in (1.0, -1.0)
-        ]
-        expected = (ends[0] - ends[1]) / (2.0 * change[i])
-        assert slopes[..., i] == pytest.approx(
-            expected, rel=1e-5, abs=1e-6 * np.abs(expected).max()
-        )
+    chosen = [names.index("sigma_0"), names.index("mu_c")]
+
+    def wrenches(numbers):
+        parameters = base.copy()
+        parameters[chosen] = numbers
+        return rollout(model, *given, parameters=parameters).wrenches
+
+    wanted = differences(wrenches, base[chosen], 1e-6 * base[chosen])
+    largest = np.abs(wanted).max((0, 1))
+    assert (np.abs(slopes[..., chosen] - wanted) < 1e-6 * largest).all()
 
 
 class Halved(pf.LuGre):

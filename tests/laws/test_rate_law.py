@@ -18,6 +18,7 @@ from planarfriction.derivatives import scene_gradient, scene_sensitivities
 from planarfriction.laws.rate_law import norm, plus
 from planarfriction.patch import friction_metric
 from planarfriction.scenes import SolverOptions
+from tests.support.differences import assert_step_jacobians, scene_slopes
 from tests.support.rate_laws import BoucWen, Gum, Written
 from tests.support.refusals import refused
 
@@ -173,38 +174,8 @@ def test_derivatives_of_steps_are_differences(patch):
     model = pf.DistributedModel(patch, law)
     state = bristles(law, np.random.default_rng(2), model)
     twist = np.array([6e-3, -4e-3, 0.5])
-    load = 2.0
-    dt = 1e-4
-    found = model.step_jacobians(state, twist, load, dt)
-
-    def difference(change, index: int) -> np.ndarray:
-        (ahead, behind) = (model.step(*change(sign), dt)[index] for sign in (1.0, -1.0))
-        return 0.5 * (ahead - behind)
-
-    for i in range(3):
-        h = 1e-7 * np.eye(3)[i]
-        new, wrench = (
-            difference(lambda s, h=h: (state, twist + s * h, load), k) / 1e-7
-            for k in (0, 1)
-        )
-        assert found.state_twist[..., i] == pytest.approx(
-            new, rel=1e-5, abs=1e-6 * np.abs(found.state_twist).max()
-        )
-        assert found.wrench_twist[:, i] == pytest.approx(
-            wrench, rel=1e-5, abs=1e-6 * np.abs(wrench).max()
-        )
-    for a in range(2):
-        h = np.zeros_like(state)
-        h[a] = 1e-12
-        new = difference(lambda s, h=h: (state + s * h, twist, load), 0) / 1e-12
-        assert found.state_state[:, a] == pytest.approx(new, rel=1e-4, abs=1e-5)
-        wrench = difference(lambda s, h=h: (state + s * h, twist, load), 1) / 1e-12
-        assert found.wrench_state[:, a].sum(axis=-1) == pytest.approx(
-            wrench, rel=1e-5, abs=1e-5 * np.abs(wrench).max()
-        )
-    assert load * found.wrench_load == pytest.approx(
-        model.step(state, twist, load, dt)[1], rel=1e-12
-    )
+    by_twist = np.full(3, 1e-7)
+    assert_step_jacobians(model, state, twist, 2.0, 1e-4, 1e-12, by_twist, 1e-5)
 
 
 @pytest.mark.parametrize(
@@ -230,16 +201,13 @@ def test_derivatives_of_scenes_are_differences_and_each_other_s_transpose(patch,
     found = scene_gradient(scene, cotangent, ("mass", "r"), **numbers).gradient
     assert found == pytest.approx(forwards.d_motion[-1].T @ last, rel=1e-5)
 
-    def end(change: float) -> np.ndarray:
-        heavier = dataclasses.replace(
-            scene, body=dataclasses.replace(body, mass=0.3 * (1.0 + change))
-        )
-        data = pf.simulate(heavier, rtol=1e-10, atol=1e-10).data
-        return np.array([float(data[name][-1]) for name in ("vx", "vy", "omega")])
+    def heavier(mass: float) -> pf.Scene:
+        return dataclasses.replace(scene, body=dataclasses.replace(body, mass=mass))
 
-    expected = (end(1e-4) - end(-1e-4)) / 2e-4
-    found = forwards.d_motion[-1][[0, 1, 2], forwards.names.index("mass")]
-    assert found == pytest.approx(expected, rel=1e-4, abs=1e-4 * np.abs(expected).max())
+    mass = forwards.names.index("mass")
+    found = 0.3 * scene_slopes(heavier, 0.3, 3e-5)[0][-1, :3]
+    largest = np.abs(found).max()
+    assert forwards.d_motion[-1, :3, mass] == pytest.approx(found, abs=1e-4 * largest)
 
 
 # ---------------------------------------------------------------------- scenes, files

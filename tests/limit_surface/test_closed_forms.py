@@ -68,62 +68,28 @@ def test_ring_with_the_centre_of_rotation_on_it():
     assert order(errors) == pytest.approx(2.0, abs=0.05)
 
 
-def disc_dissipation(slide, spin, radius):
-    """Rings of a uniform disc, integrated over `2 s ds/R^2`; the kink at `v = omega s` ends the intervals."""
-    kink = min(slide / spin, radius)
-    nodes, weights = np.polynomial.legendre.leggauss(60)
-    total = 0.0
-    for low, high in ((0.0, kink), (kink, radius)):
-        # a cubic map clusters the nodes where E has its logarithm
-        t = 0.5 * (nodes + 1.0)
-        s, jacobian = (high - (high - low) * (1 - t) ** 3, 3 * (1 - t) ** 2) if low == 0.0 else (
-            low + (high - low) * t**3, 3 * t**2)  # fmt: skip
-        total += (
-            0.5
-            * weights
-            * jacobian
-            * (high - low)
-            * ring_dissipation(slide, spin, s)
-            * 2
-            * s
-        ).sum()
-    return total / radius**2
-
-
-@pytest.mark.parametrize("slide", [0.0037, 0.012])
-def test_disc(slide):
-    """Cells cut by the rim, at their centroids: second order, with the centre of rotation in the disc and outside."""
-    exact = disc_dissipation(slide, 1.0, 0.01)
+@pytest.mark.parametrize(
+    ("make", "twist"),
+    [
+        *(
+            (lambda n: pf.ContactPatch.disc(0.01, n), (0.6 * slide, -0.8 * slide, 1.0))
+            for slide in (0.0, 0.0037, 0.012)
+        ),
+        *(
+            (lambda n: pf.ContactPatch.rectangle(0.03, 0.012, n), (y, -x, 1.0))
+            for x, y in ((0.0, 0.0), (0.0031, -0.0017), (0.02, 0.004))
+        ),
+    ],
+)
+def test_cells_converge_to_the_area(make, twist):
+    """Cells cut by the rim, at their centroids; the centre of rotation in the patch and outside."""
+    exact = pf.LimitSurfaceExact(make(1)).dissipation(twist)
     errors = [
-        pf.LimitSurfaceCells(pf.ContactPatch.disc(0.01, n)).dissipation(
-            (slide * 0.6, -slide * 0.8, 1.0)
-        )
-        / exact
-        - 1.0
+        pf.LimitSurfaceCells(make(n)).dissipation(twist) / exact - 1.0
         for n in (10, 20, 40, 80)
     ]
     assert order(errors) > 1.7  # 2, and the scatter of where the kink lies in its cell
-    assert abs(errors[-1]) < 1e-4
-
-
-def test_disc_radius():
-    """A pure spin of a uniform disc: r = 2R/3."""
-    errors = [
-        pf.ContactPatch.disc(0.01, n).contact_radius() / (0.02 / 3) - 1.0
-        for n in (11, 22, 44, 88)
-    ]
-    assert order(errors) > 1.7 and abs(errors[-1]) < 1e-4
-
-
-def rod_dissipation(across, along, spin, half):
-    """Rod of that half-length with velocities across and along it at its middle."""
-
-    def integral(u):
-        return u * math.hypot(u, along) + along**2 * math.asinh(u / abs(along))
-
-    return (integral(across + spin * half) - integral(across - spin * half)) / (
-        4.0 * half * spin
-    )
+    assert abs(errors[-1]) < 2e-4
 
 
 @pytest.mark.parametrize("direction", ["x", "y"])
@@ -133,83 +99,18 @@ def rod_dissipation(across, along, spin, half):
 def test_rod(direction, across, along):
     # Counter-clockwise spin moves the +x end of a rod along x up; the +y end of one along y to the left.
     twist = (along, across, 1.0) if direction == "x" else (-across, along, 1.0)
+    line = pf.ContactPatch.line(0.02, 1, direction="x")
+    exact = pf.LimitSurfaceExact(line).dissipation((along, across, 1.0))
     errors = [
         pf.LimitSurfaceCells(
             pf.ContactPatch.line(0.02, n, direction=direction)
         ).dissipation(twist)
-        / rod_dissipation(across, along, 1.0, 0.01)
+        / exact
         - 1.0
         for n in (40, 80, 160, 320)
     ]
     # The midpoint rule on a smooth function, as long as the centre of rotation is off the rod by more than a cell.
     assert order(errors) == pytest.approx(2.0, abs=0.02)
-
-
-def corner_integral(a, b):
-    """Integral of the distance from a corner over a rectangle a x b; odd in both."""
-    if a == 0.0 or b == 0.0:
-        return 0.0
-    sign = math.copysign(1.0, a * b)
-    a = abs(a)
-    b = abs(b)
-    return (
-        sign
-        * (
-            2.0 * a * b * math.hypot(a, b)
-            + a**3 * math.asinh(b / a)
-            + b**3 * math.asinh(a / b)
-        )
-        / 6.0
-    )
-
-
-@pytest.mark.parametrize("centre", [(0.0, 0.0), (0.0031, -0.0017), (0.02, 0.004)])
-def test_rectangle_about_any_centre_of_rotation(centre):
-    """A rectangle is a signed sum of four with the centre of rotation at their corner."""
-    width = 0.03
-    height = 0.012
-    (cx, cy) = centre
-    exact = 0.0
-    for sx in (-1.0, 1.0):
-        for sy in (-1.0, 1.0):
-            exact += (
-                sx * sy * corner_integral(sx * 0.5 * width - cx, sy * 0.5 * height - cy)
-            )
-    exact /= width * height
-    twist = (cy, -cx, 1.0)  # unit spin about the centre
-    errors = [
-        pf.LimitSurfaceCells(pf.ContactPatch.rectangle(width, height, n)).dissipation(
-            twist
-        )
-        / exact
-        - 1.0
-        for n in (10, 20, 40, 80)
-    ]
-    assert order(errors) > 1.7  # 2, and the scatter of where the kink lies in its cell
-    assert abs(errors[-1]) < 2e-4
-
-
-@pytest.mark.parametrize(
-    ("k", "ratio"),
-    [(1.0, 0.5), (2.0, 3.0 * math.pi / 16.0), (3.0, None), (math.inf, 2.0 / 3.0)],
-    ids=str,
-)
-def test_soft_finger_radius(k, ratio):
-    """`r/R = 2 (3/8) Gamma(3/k)^2/(Gamma(2/k) Gamma(4/k))`, of a pure spin."""
-    exponent = min(k, 1e4)  # so flat that the rest is below the error of the cells
-    formula = (
-        0.75
-        * math.gamma(3 / exponent) ** 2
-        / (math.gamma(2 / exponent) * math.gamma(4 / exponent))
-    )
-    if ratio is not None:
-        assert formula == pytest.approx(ratio, rel=1e-3 if k > 1e4 else 1e-12)
-    patch = pf.ContactPatch.disc(0.01, 161, pressure=pf.SoftFinger(c=0.01, k=exponent))
-    surface = pf.LimitSurfaceCells(patch)
-    # Pressure at the cells' positions: 160 cells across, the rim's singularity costs most at k = 2 and above.
-    assert -surface.wrench((0.0, 0.0, 3.0))[2] == pytest.approx(
-        0.01 * formula, rel=1e-3
-    )
 
 
 # ---------------------------------------------------------------------- published numbers

@@ -5,11 +5,9 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.limit_surface.comparison import directions
+from tests.support.contacts import FEET
 
 PATCH = pf.ContactPatch.rectangle(0.1, cells=9)
-FEET = pf.ContactPatch.points(
-    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
-)
 
 
 def test_two_spheres_of_different_radius():

@@ -23,6 +23,7 @@ from tests.support.anisotropic import (
     TWIST,
     reduced,
 )
+from tests.support.differences import assert_rate_jacobians, assert_step_jacobians
 
 DRY = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_2=0.0)
 """Friction coefficient 1 in steady sliding: wrenches are those of limit surfaces."""
@@ -63,18 +64,6 @@ def surfaces(patch, segments=20):
     ]
     uniform = np.ndim(patch.metric) == 2 or patch.metric is None
     return [*kinds, pf.LimitSurfaceEllipsoid(patch)] if uniform else kinds
-
-
-def slopes(function, at, by):
-    """Central differences `[*result, *at.shape]`."""
-    columns = []
-    for index in np.ndindex(at.shape):
-        move = np.zeros(at.shape)
-        move[index] = np.broadcast_to(by, at.shape)[index]
-        columns.append(
-            (function(at + move) - function(at - move)) / (2.0 * move[index])
-        )
-    return np.stack(columns, -1).reshape(*columns[0].shape, *at.shape)
 
 
 def close(one, other, tolerance):
@@ -389,92 +378,16 @@ def test_a_metric_per_cell_is_the_sum_of_its_parts():
 def test_jacobians_are_those_of_differences(name, law):
     model = pf.DistributedModel(PATCHES[name], LAWS[law])
     state = RANDOM.normal(size=model.state_shape) * 7e-7
-    cells = PLAIN.cells
-    load = 2.0
-    dt = 1e-4
-    own = np.einsum("anbn->abn", np.ones((2, cells, 2, cells)))  # each cell sees itself
-    found = model.jacobians(state, TWIST, load)
-    close(
-        found.wrench_twist,
-        slopes(lambda v: model.wrench(state, v, load), TWIST, UNIT_TWIST),
-        1e-6,
-    )
-    close(
-        found.rate_twist,
-        slopes(lambda v: model.rate(state, v, load), TWIST, UNIT_TWIST),
-        1e-6,
-    )
-    close(
-        found.wrench_state,
-        slopes(lambda z: model.wrench(z, TWIST, load), state, 1e-12),
-        1e-6,
-    )
-    rate = slopes(lambda z: model.rate(z, TWIST, load), state, 1e-12)
-    close(found.rate_state, np.einsum("anbn->abn", rate) * own, 1e-6)
-    close(found.wrench_load, model.wrench(state, TWIST, 1.0), 1e-14)
-    found = model.step_jacobians(state, TWIST, load, dt)
-    close(
-        found.wrench_twist,
-        slopes(lambda v: model.step(state, v, load, dt)[1], TWIST, UNIT_TWIST),
-        1e-6,
-    )
-    close(
-        found.state_twist,
-        slopes(lambda v: model.step(state, v, load, dt)[0], TWIST, UNIT_TWIST),
-        1e-6,
-    )
-    close(
-        found.wrench_state,
-        slopes(lambda z: model.step(z, TWIST, load, dt)[1], state, 1e-12),
-        1e-6,
-    )
-    close(
-        found.state_state,
-        np.einsum(
-            "anbn->abn",
-            slopes(lambda z: model.step(z, TWIST, load, dt)[0], state, 1e-12),
-        ),
-        1e-6,
-    )
-    close(found.wrench_load, model.step(state, TWIST, 1.0, dt)[1], 1e-14)
+    assert_rate_jacobians(model, state, TWIST, 2.0, 1e-12, UNIT_TWIST)
+    assert_step_jacobians(model, state, TWIST, 2.0, 1e-4, 1e-12, UNIT_TWIST)
 
 
 def test_jacobians_of_the_reduced_model():
     model = reduced(PATCHES["metric"])
     state = np.array([6e-7, 7e-7, 3e-9])
     units = np.array([1e-12, 1e-12, 1e-14])
-    rates = model.jacobians(state, TWIST, 2.0)
-    steps = model.step_jacobians(state, TWIST, 2.0, 1e-4)
-    pairs = [
-        (
-            rates.wrench_twist,
-            slopes(lambda v: model.wrench(state, v, 2.0), TWIST, UNIT_TWIST),
-        ),
-        (
-            rates.wrench_state,
-            slopes(lambda z: model.wrench(z, TWIST, 2.0), state, units),
-        ),
-        (
-            rates.rate_twist,
-            slopes(lambda v: model.rate(state, v, 2.0), TWIST, UNIT_TWIST),
-        ),
-        (
-            steps.wrench_twist,
-            slopes(lambda v: model.step(state, v, 2.0, 1e-4)[1], TWIST, UNIT_TWIST),
-        ),
-        (
-            steps.wrench_state,
-            slopes(lambda z: model.step(z, TWIST, 2.0, 1e-4)[1], state, units),
-        ),
-        (
-            steps.state_twist,
-            slopes(lambda v: model.step(state, v, 2.0, 1e-4)[0], TWIST, UNIT_TWIST),
-        ),
-        (rates.wrench_load, model.wrench(state, TWIST, 1.0)),
-        (steps.wrench_load, model.step(state, TWIST, 1.0, 1e-4)[1]),
-    ]
-    for found, wanted in pairs:
-        close(found, wanted, 1e-6)
+    assert_rate_jacobians(model, state, TWIST, 2.0, units, UNIT_TWIST)
+    assert_step_jacobians(model, state, TWIST, 2.0, 1e-4, units, UNIT_TWIST)
 
 
 @every_patch

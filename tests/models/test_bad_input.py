@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.contacts import FEET, PLAIN
 from tests.support.refusals import refused
 
-FEET = pf.ContactPatch.points(
-    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
-)
-PLAIN = pf.LuGre(mu_s=1.2)
 MODELS = {
     "distributed": pf.DistributedModel(FEET, PLAIN),
     "reduced": pf.ReducedModelPublished(FEET, PLAIN),

@@ -11,26 +11,12 @@ from hypothesis import strategies as st
 import planarfriction as pf
 from planarfriction import formulas, geometry
 from planarfriction.patch import PUBLISHED_PATCHES
+from tests.support.contacts import FEET, LAWS, SURFACES, friction_model, lengths
+from tests.support.differences import differences
 from tests.support.refusals import refused
 
-PLAIN = pf.LuGre(mu_s=1.2)
-ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
-LAWS = {
-    "plain": PLAIN,
-    "elasto-plastic": ELASTIC,
-    "gamma 1.5": pf.LuGre(mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.5)),
-}
-SURFACES = {
-    "cells": pf.LimitSurfaceCells,
-    "table": pf.LimitSurfaceTable,
-    "published": pf.LimitSurfaceTablePublished,
-    "ellipsoid": pf.LimitSurfaceEllipsoid,
-}
 PATCH = PUBLISHED_PATCHES["NonConvex2"]()
 """No symmetry: its centre of pressure is off the origin and off the cells."""
-FEET = pf.ContactPatch.points(
-    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0]
-)
 LOAD = 2.0
 
 checked = settings(deadline=None, max_examples=25)
@@ -43,10 +29,7 @@ speeds = st.floats(1e-6, 10.0)
 @functools.cache
 def model_of(kind, law="elasto-plastic", feet=False):
     """A model by name: "distributed" or the reduced one with a kind of limit surface."""
-    patch = FEET if feet else PATCH
-    if kind == "distributed":
-        return pf.DistributedModel(patch, LAWS[law])
-    return pf.ReducedModelPublished(patch, LAWS[law], surface=SURFACES[kind](patch))
+    return friction_model(kind, law, FEET if feet else PATCH)
 
 
 every_model = pytest.mark.parametrize("kind", ["distributed", *SURFACES])
@@ -212,12 +195,8 @@ def test_pre_sliding_stiffness():
 
 def some_state(model, seed, size=1e-6):
     """A random state of that deflection, about where slip begins."""
-    state = np.random.default_rng(seed).normal(size=model.state_shape) * size
-    return (
-        state * (1.0, 1.0, model.patch.contact_radius())
-        if model.state_shape == (3,)
-        else state
-    )
+    random = np.random.default_rng(seed)
+    return random.normal(size=model.state_shape) * size * lengths(model)
 
 
 @every_model
@@ -307,24 +286,9 @@ def test_mirroring(kind):
 # ---------------------------------------------------------------------- Jacobians
 
 
-def differences(function, x, steps):
-    """Central differences of fourth order along each entry of `x`, in its last axes."""
-    columns = []
-    for index in np.ndindex(x.shape):
-        change = np.zeros_like(x)
-        change[index] = steps[index]
-        near = np.subtract(function(x + change), function(x - change))
-        far = np.subtract(function(x + 2 * change), function(x - 2 * change))
-        columns.append((8.0 * near - far) / (12.0 * steps[index]))
-    columns = np.stack(columns, -1)
-    return columns.reshape(*columns.shape[:-1], *x.shape)
-
-
 def state_scale(model):
     """A millionth of full deflection for every entry of the state."""
-    if model.state_shape == (3,):
-        return 1e-12 * np.array([1.0, 1.0, model.patch.contact_radius()])
-    return np.full(model.state_shape, 1e-12)
+    return np.broadcast_to(1e-12 * lengths(model), model.state_shape)
 
 
 JACOBIAN_TWISTS = {

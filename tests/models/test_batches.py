@@ -9,12 +9,10 @@ import pytest
 
 import planarfriction as pf
 from tests.support.anisotropic import PATCHES as ANISOTROPIC
+from tests.support.contacts import ELASTIC, FEET, PLAIN
 
 MAP = pf.ContactPatch.from_pressure(
     np.random.default_rng(1).uniform(size=(5, 4)) ** 3, (0.002, 0.0015), name="map"
-)
-FEET = pf.ContactPatch.points(
-    [(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0], name="feet"
 )
 SOFT = pf.ContactPatch.disc(
     0.01, 7, pressure=pf.SoftFinger(c=0.007, n=0.4, k_per_newton=1.5), name="soft"
@@ -25,10 +23,7 @@ LOADED = pf.ContactPatch.from_pressure(
 METRIC, CELLS = ANISOTROPIC["both"], ANISOTROPIC["cells"]
 ONE_METRIC = ANISOTROPIC["metric"]
 
-LAWS = {
-    "plain": pf.LuGre(mu_s=1.2),
-    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)),
-}
+LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
 
 SURFACES = {
     "cells": pf.LimitSurfaceCells(MAP),

@@ -5,11 +5,9 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.geometry import twist_at, wrench_at
+from tests.support.contacts import ELASTIC, PLAIN
 
-LAWS = {
-    "plain": pf.LuGre(mu_s=1.2),
-    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=0.9),
-}
+LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
 PATCHES = {
     "disc": pf.ContactPatch.disc(0.01, 9),
     "four cells": pf.ContactPatch.disc(0.01, 2),

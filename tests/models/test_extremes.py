@@ -6,13 +6,10 @@ import pytest
 import planarfriction as pf
 from planarfriction import derivatives
 from planarfriction.formulas import LARGEST
+from tests.support.contacts import ELASTIC, FOUR, PLAIN
 from tests.support.refusals import refused
 
-PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
-LAWS = {
-    "plain": pf.LuGre(mu_s=1.2),
-    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=0.9),
-}
+LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
 KINDS = {
     "distributed": pf.DistributedModel,
     "reduced": lambda patch, law: pf.ReducedModel(patch, law),
@@ -49,7 +46,7 @@ every_model = pytest.mark.parametrize(
 def model(request):
     """A model of a law."""
     kind, law = request.param
-    return KINDS[kind](PATCH, LAWS[law])
+    return KINDS[kind](FOUR, LAWS[law])
 
 
 def results(model, state, twist, load, dt):

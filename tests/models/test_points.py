@@ -5,6 +5,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.scenes import Signal
+from tests.support.differences import assert_step_jacobians, differences
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 SOFT = pf.ContactPatch.disc(
@@ -49,40 +50,13 @@ def test_jacobians_of_a_point():
     load = 0.05
     dt = 1e-4
     z = np.array([4e-7, -3e-7, 2e-8])
-    units = np.array([1e-10, 1e-10, 1e-10])
-    step = model.step_jacobians(z, TWIST, load, dt)
+    by_twist = np.full(3, 1e-6)
     rate = model.jacobians(z, TWIST, load)
-    for j in range(3):
-        up, down = (
-            model.step(z + sign * units[j] * np.eye(3)[j], TWIST, load, dt)
-            for sign in (1, -1)
-        )
-        for found, a, b in zip(
-            (step.state_state, step.wrench_state), up, down, strict=True
-        ):
-            np.testing.assert_allclose(
-                found[:, j],
-                (a - b) / (2 * units[j]),
-                rtol=1e-4,
-                atol=1e-4 * np.abs(found).max(),
-            )
-        h = 1e-6 * np.eye(3)[j]
-        up, down = (model.step(z, TWIST + sign * h, load, dt) for sign in (1, -1))
-        for found, a, b in zip(
-            (step.state_twist, step.wrench_twist), up, down, strict=True
-        ):
-            np.testing.assert_allclose(
-                found[:, j], (a - b) / 2e-6, rtol=1e-4, atol=1e-4 * np.abs(found).max()
-            )
-        for by, found in (
-            (model.rate, rate.rate_twist),
-            (model.wrench, rate.wrench_twist),
-        ):
-            slope = (by(z, TWIST + h, load) - by(z, TWIST - h, load)) / 2e-6
-            np.testing.assert_allclose(
-                found[:, j], slope, rtol=1e-4, atol=1e-4 * np.abs(found).max()
-            )
-    assert all(np.isfinite(part).all() for part in (*step, *rate))
+    for of, found in ((model.rate, rate.rate_twist), (model.wrench, rate.wrench_twist)):
+        wanted = differences(lambda v, of=of: of(z, v, load), TWIST, by_twist)
+        assert found == pytest.approx(wanted, abs=1e-4 * np.abs(wanted).max())
+    assert all(np.isfinite(part).all() for part in rate)
+    assert_step_jacobians(model, z, TWIST, load, dt, 1e-10, by_twist, 1e-4)
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,12 @@ import pytest
 import planarfriction as pf
 from planarfriction.coupling import CoupledPatches, HostStep
 from planarfriction.errors import InvalidValueError
+from tests.support.contacts import SOFT, lengths
+from tests.support.differences import assert_step_jacobians
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
 PATCH = pf.ContactPatch.rectangle(0.1, 0.06, 9)
-SOFT = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 LEANING = PATCH.with_friction_metric(np.diag([2.0, 1.0]), asymmetry=(0.1, 0.0))
 MODELS = {
     "distributed": pf.DistributedModel(PATCH, LAW),
@@ -85,40 +86,12 @@ def test_jacobians_are_those_of_differences_at_the_moments(model):
     state = 1e-7 * rng.normal(size=(2, *model.state_shape))
     twist = rng.normal(size=(2, 3)) * (1e-3, 1e-3, 1e-2)
     moments = 0.2 * model.patch.positions.max() * rng.normal(size=(2, 2))
-    slopes = model.step_jacobians(state, twist, load, dt, moments=moments)
-    for i, h in enumerate((1e-9, 1e-9, 1e-8)):
-        bump = h * np.eye(3)[i]
-        ends = [
-            model.step(state, twist + sign * bump, load, dt, moments=moments)
-            for sign in (1.0, -1.0)
-        ]
-        new, wrench = (
-            (one - other) / (2.0 * h) for one, other in zip(*ends, strict=True)
-        )
-        np.testing.assert_allclose(
-            slopes.wrench_twist[..., i],
-            wrench,
-            rtol=1e-5,
-            atol=1e-5 * abs(wrench).max(),
-        )
-        np.testing.assert_allclose(
-            slopes.state_twist[..., i], new, rtol=1e-5, atol=1e-5 * abs(new).max()
-        )
-    place = tuple(np.array(model.state_shape) // 2)
-    bump = np.zeros(model.state_shape)
-    bump[place] = 1e-10
-    ends = [
-        model.step(state + sign * bump, twist, load, dt, moments=moments)[1]
-        for sign in (1.0, -1.0)
-    ]
-    wrench = (ends[0] - ends[1]) / 2e-10
-    found = slopes.wrench_state[(..., slice(None), *place)]
-    np.testing.assert_allclose(found, wrench, rtol=1e-4, atol=1e-6 * abs(wrench).max())
-    wrench = model.step(state, twist, load, dt, moments=moments)[1]
-    # At a held pressure.
-    np.testing.assert_allclose(
-        slopes.wrench_load * load[:, None], wrench, rtol=1e-12, atol=1e-15
-    )
+    by_twist = np.array([1e-9, 1e-9, 1e-8])
+    for i in range(2):
+        assert_step_jacobians(
+            model, state[i], twist[i], load[i], dt, 1e-11 * lengths(model), by_twist,
+            1e-5, moments=moments[i],
+        )  # fmt: skip
 
 
 def test_rates_go_where_short_steps_go(model):

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.contacts import lengths
+from tests.support.differences import assert_step_jacobians
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
@@ -38,32 +40,11 @@ def test_derivatives_are_differences_of_steps(load):
     state = _states()[0]
     twist = TWISTS[0]
     dt = 1e-4
-    found = MODEL.step_jacobians(state, twist, load, dt)
     assert MODEL.compiled.jacobians_one(state, twist, load, dt) is not None
-
-    def change(by_state, by_twist):
-        ends = [
-            MODEL.step(state + sign * by_state, twist + sign * by_twist, load, dt)
-            for sign in (1.0, -1.0)
-        ]
-        return [0.5 * (one - other) for one, other in zip(*ends, strict=True)]
-
-    for direction in np.eye(state.size):
-        step = 1e-6 * LAW.largest_deflection * direction.reshape(state.shape)
-        new, wrench = change(step, np.zeros(3))
-        expected = found.wrench_state.reshape(3, -1) @ step.ravel()
-        # second differences of a step of a millionth, and rounding
-        np.testing.assert_allclose(wrench, expected, rtol=1e-4, atol=1e-11)
-        own = np.einsum("...ij,...j->...i", found.state_state, step)
-        np.testing.assert_allclose(new, own, rtol=1e-4, atol=1e-17)
-    for direction in np.diag([1e-8, 1e-8, 1e-6]):
-        new, wrench = change(np.zeros_like(state), direction)
-        np.testing.assert_allclose(
-            wrench, found.wrench_twist @ direction, rtol=1e-4, atol=1e-11
-        )
-        np.testing.assert_allclose(
-            new, found.state_twist @ direction, rtol=1e-4, atol=1e-17
-        )
+    by_state = 1e-5 * LAW.largest_deflection * lengths(MODEL)
+    by_twist = np.array([1e-8, 1e-8, 1e-6])
+    assert_step_jacobians(MODEL, state, twist, load, dt, by_state, by_twist, 1e-5)
+    found = MODEL.step_jacobians(state, twist, load, dt)
     small = MODEL.step(state, twist, 1e-9, dt)[1] * 1e9
     np.testing.assert_allclose(found.wrench_load, small, rtol=1e-9)
 

@@ -8,10 +8,10 @@ from numba.core.dispatcher import Dispatcher
 
 import planarfriction as pf
 from planarfriction import derivatives
+from tests.support.contacts import ELASTIC as LAW
+from tests.support.contacts import FOUR as PATCH
 from tests.support.refusals import refused
 
-PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
-LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 MODELS = {
     "distributed": pf.DistributedModel(PATCH, LAW),
     "grain": pf.DistributedModel(PATCH.with_friction_metric(np.diag([1.0, 2.0])), LAW),

@@ -10,20 +10,17 @@ from hypothesis import strategies as st
 from scipy import integrate
 
 import planarfriction as pf
+from tests.support.contacts import (
+    ELASTIC,
+    LAWS,
+    PLAIN,
+    SURFACES,
+    friction_model,
+    lengths,
+    published_finger,
+)
 from tests.support.refusals import refused
 
-PLAIN = pf.LuGre(mu_s=1.2)
-ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
-WIDE = pf.LuGre(mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
-"""A wide elasto-plastic range: smooth at the steps of an order test."""
-LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC, "wide": WIDE}
-SURFACES = {
-    "cells": pf.LimitSurfaceCells,
-    "table": pf.LimitSurfaceTable,
-    "published": pf.LimitSurfaceTablePublished,
-    "ellipsoid": pf.LimitSurfaceEllipsoid,
-}
-PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LOAD = 2.0
 TWIST = np.array([2e-3, -1e-3, 0.3])
 
@@ -31,21 +28,12 @@ every_model = pytest.mark.parametrize("kind", ["distributed", *SURFACES])
 every_law = pytest.mark.parametrize("law", LAWS)
 
 
-@functools.cache
-def model_of(kind, law="elasto-plastic"):
-    """A model by name: "distributed" or the reduced one with a kind of limit surface."""
-    if kind == "distributed":
-        return pf.DistributedModel(PATCH, LAWS[law])
-    return pf.ReducedModelPublished(PATCH, LAWS[law], surface=SURFACES[kind](PATCH))
+model_of = functools.cache(friction_model)
 
 
 def scaled(model, state):
-    """Deflections [m]: the reduced model's third one over the contact radius."""
-    return (
-        state / (1.0, 1.0, model.surface.contact_radius)
-        if model.state_shape == (3,)
-        else state
-    )
+    """Return deflections [m]."""
+    return state / lengths(model)
 
 
 def norms(model, state):
@@ -57,19 +45,13 @@ def norms(model, state):
 
 def some_state(model, seed, size):
     """A random state of that deflection."""
-    state = np.random.default_rng(seed).normal(size=model.state_shape) * size
-    return (
-        state * (1.0, 1.0, model.surface.contact_radius)
-        if model.state_shape == (3,)
-        else state
-    )
+    random = np.random.default_rng(seed)
+    return random.normal(size=model.state_shape) * size * lengths(model)
 
 
 def reference(model, state, twist, time):
     """The state after `time` at a held twist, from `rate` by a Runge-Kutta method of order 8."""
-    units = np.ones(model.state_shape) * 1e-6
-    if model.state_shape == (3,):
-        units = units * (1.0, 1.0, model.surface.contact_radius)
+    units = 1e-6 * lengths(model)
 
     def slope(_, z):
         return (
@@ -276,11 +258,7 @@ def test_a_contact_without_load_forgets(kind):
     assert not model.wrench(state, TWIST, 0.0).any()
 
 
-FINGER = pf.ContactPatch.rectangle(
-    0.02,
-    cells=21,
-    pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01),
-)
+FINGER = pf.ContactPatch.rectangle(0.02, cells=21, pressure=published_finger())
 
 
 def soft(

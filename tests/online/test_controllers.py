@@ -100,16 +100,20 @@ def test_a_controller_begins_when_the_hand_grips(kind, options, load):
     assert grips[0] == pytest.approx(grips[1], rel=1e-9)
 
 
-def held(make, change=lambda k, sample: sample, steps=1800):
-    """Controller and gripper after parts hung still from hands whose samples are changed."""
-    gripper = Gripper(few(tap=(0.0, 0.0, 0.0), tilt=0.0), 20.0, seed=1)
-    own = FrictionObserver(known_model(), batch=COUNT)
+def watch(control, gripper, change, steps):
+    """Let a controller see an empty hand, then hold parts, with samples that are changed."""
     for sample in gripper.empty_hand():
-        own.update(sample)
-    control = make(own)
+        control.observer.update(sample)
     sample = gripper.measurement
     for k in range(steps):
         sample = gripper.step(control.update(change(k, sample)))
+
+
+def held(make, change=lambda k, sample: sample, steps=1800):
+    """Controller and gripper after parts hung still from hands whose samples are changed."""
+    gripper = Gripper(few(tap=(0.0, 0.0, 0.0), tilt=0.0), 20.0, seed=1)
+    control = make(FrictionObserver(known_model(), batch=COUNT))
+    watch(control, gripper, change, steps)
     return control, gripper
 
 
@@ -145,13 +149,13 @@ def test_a_slip_sensor_that_dies_in_a_slip_drops_nothing(kind, goal, centre):
     )
     control = kind(FrictionObserver(known_model(), batch=COUNT), goal)
     dead = np.zeros(COUNT, bool)
-    for sample in gripper.empty_hand():
-        control.observer.update(sample)
-    sample = gripper.measurement
-    for _ in range(3000):
-        dead |= gripper.slip[:, kind.axis] / goal > np.linspace(0.1, 0.8, COUNT)
+
+    def dies(_, sample):
+        dead[gripper.slip[:, kind.axis] / goal > np.linspace(0.1, 0.8, COUNT)] = True
         sample.slip_velocity[dead] *= 0.0
-        sample = gripper.step(control.update(sample))
+        return sample
+
+    watch(control, gripper, dies, 3000)
     assert (dead & control.blind).all()
     assert np.hypot(*gripper.slip[:, :2].T).max() < (0.025 if kind is SlideBy else 5e-3)
     assert np.abs(gripper.slip[:, 2]).max() < 0.9
@@ -176,15 +180,14 @@ def test_a_hinge_whose_slip_sensor_dies_drops_nothing(fault):
     gripper = Gripper(parts, 30.0, seed=1)
     control = Hinge(FrictionObserver(known_model(), batch=COUNT))
     dead = np.zeros(COUNT, bool)
-    for sample in gripper.empty_hand():
-        control.observer.update(sample)
-    sample = gripper.measurement
-    for _ in range(3500):
-        dead |= (fault == "dies") & (
-            gripper.slip[:, 2] / -1.3 > np.linspace(0.1, 0.7, COUNT)
-        )
+
+    def dies(_, sample):
+        far = gripper.slip[:, 2] / -1.3 > np.linspace(0.1, 0.7, COUNT)
+        dead[far] = fault == "dies"
         sample.slip_velocity[dead] *= 0.0
-        sample = gripper.step(control.update(sample))
+        return sample
+
+    watch(control, gripper, dies, 3500)
     assert dead.all() == control.blind.all() == (fault == "dies")
     assert np.hypot(*gripper.slip[:, :2].T).max() < 0.03
     assert np.abs(gripper.slip[:, 2]).max() < 1.5

@@ -1,7 +1,6 @@
 """Contact patches: the published table, shares of the load, plain data."""
 
 import dataclasses
-import json
 import math
 import pickle
 
@@ -12,18 +11,11 @@ from hypothesis import strategies as st
 
 import planarfriction as pf
 from planarfriction.patch import PUBLISHED_PATCHES, Grid, LinearGradient
+from tests.support.contacts import CELL
+from tests.support.contacts import published_finger as soft
 
 ROUNDING = 1e-13
 """Relative: sums of some hundred terms of the same sign, each rounded at 1e-16."""
-
-CELL = 0.02 / 21
-
-
-def soft(**changes):
-    """The soft finger of the published runs with changing pressure."""
-    return pf.SoftFinger(
-        **{"c": 6 * CELL, "n": 1 / 3, "k": 2.0, "radius_max": 0.01, **changes}
-    )
 
 
 @pytest.mark.parametrize(
@@ -118,21 +110,6 @@ def test_weights_are_shares(make):
         )
 
     check()
-
-
-@pytest.mark.parametrize("make", PATCHES.values(), ids=PATCHES.keys())
-def test_plain_data_round_trips_to_the_last_bit(make):
-    patch = make()
-    again = pf.ContactPatch.from_dict(
-        json.loads(json.dumps(patch.to_dict(), allow_nan=False))
-    )
-    assert (again.name, again.grid) == (patch.name, patch.grid)
-    assert np.array_equal(again.positions, patch.positions) and np.array_equal(
-        again.areas, patch.areas
-    )
-    for load in (0.7, 3.0):
-        assert np.array_equal(again.weights(load), patch.weights(load))
-    assert again.to_dict() == patch.to_dict()
 
 
 @pytest.mark.filterwarnings("ignore:patch 'points' is .* m wide")

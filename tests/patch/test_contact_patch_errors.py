@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.patch import Grid, LinearGradient, Pressure, Uniform
 from tests.support.refusals import refused
 
@@ -175,10 +174,8 @@ GOOD = SQUARE.to_dict()
     ],
 )
 def test_every_mistake_gets_one_line(call, message):
-    with pytest.raises(InvalidValueError, match=message) as caught:
+    with refused(message):
         call()
-    assert isinstance(caught.value, FrictionError)
-    assert "\n" not in str(caught.value)
 
 
 def test_a_law_of_ones_own_cannot_make_nan():

@@ -4,11 +4,11 @@ import dataclasses
 import json
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planarfriction as pf
+from tests.support.files import again
 
 checked = settings(deadline=None, max_examples=20)
 seeds = st.integers(0, 2**32 - 1)
@@ -95,9 +95,9 @@ def numbers(patch):
 def test_patches(seed):
     for patch in patches(seed):
         data = patch.to_dict()
-        again = pf.ContactPatch.from_dict(json.loads(json.dumps(data)))
-        assert again.to_dict() == data, patch
-        for first, second in zip(numbers(patch), numbers(again), strict=True):
+        read = pf.ContactPatch.from_dict(json.loads(json.dumps(data)))
+        assert read.to_dict() == data, patch
+        for first, second in zip(numbers(patch), numbers(read), strict=True):
             np.testing.assert_array_equal(first, second, err_msg=repr(patch))
 
 
@@ -125,16 +125,13 @@ def test_scenes_and_their_digests(seed):
         pf.Signal.sine(2.0, random.random(), 3.0, t_end=0.3),
     )
     scene = pf.Scene(body, [contact], t_end=random.random() + 0.1, force=force)
-    again = pf.Scene.from_dict(json.loads(scene.to_json()))
-    assert again.to_json() == scene.to_json() and again.digest() == scene.digest()
+    read = pf.Scene.from_dict(json.loads(scene.to_json()))
+    assert read.to_json() == scene.to_json() and read.digest() == scene.digest()
 
 
-@pytest.mark.parametrize("suffix", [".toml", ".json"])
 @given(seed=seeds)
 @settings(deadline=None, max_examples=5)
-def test_files(tmp_path_factory, suffix, seed):
-    path = tmp_path_factory.mktemp("scene") / f"scene{suffix}"
+def test_files(tmp_path_factory, seed):
+    folder = tmp_path_factory.mktemp("scene")
     for patch in patches(seed):
-        scene = pf.scenes.in_hand(pf.DistributedModel(patch, pf.LuGre()))
-        scene.to_file(path)
-        assert pf.Scene.from_file(path).digest() == scene.digest()
+        again(pf.scenes.in_hand(pf.DistributedModel(patch, pf.LuGre())), folder)

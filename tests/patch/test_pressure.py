@@ -8,18 +8,11 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.patch import PUBLISHED_PATCHES, LinearGradient
+from tests.support.contacts import CELL
+from tests.support.contacts import published_finger as soft
 
 ROUNDING = 1e-13
 """Relative: sums of some hundred terms of the same sign, each rounded at 1e-16."""
-
-CELL = 0.02 / 21
-
-
-def soft(**changes):
-    """The soft finger of the published runs with changing pressure."""
-    return pf.SoftFinger(
-        **{"c": 6 * CELL, "n": 1 / 3, "k": 2.0, "radius_max": 0.01, **changes}
-    )
 
 
 def test_linear_gradient_moves_the_centre_of_pressure():

@@ -9,7 +9,7 @@ from PIL import Image
 
 import planarfriction as pf
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
-from tests.support.refusals import refused
+from tests.support.refusals import refusal, refused
 
 ROUNDING = 1e-15
 """Relative: a handful of operations, each rounded at 1e-16."""
@@ -127,15 +127,6 @@ def test_every_kind_of_file_gives_the_same_patch(tmp_path, file, write):
         assert patch.centre_of_pressure() == pytest.approx((0.0012, 0.0008))
 
 
-@pytest.mark.parametrize(
-    "text", ["0,5;1\n1,5;0\n", "0.5;1\n1.5;0\n", "0.5\t1\n1.5\t0\n"]
-)
-def test_cells_between_semicolons_and_tabs(tmp_path, text):
-    (tmp_path / "pad.csv").write_text(text)
-    patch = pf.ContactPatch.from_pressure(tmp_path / "pad.csv", 0.001)
-    assert sorted(patch.weights()) == pytest.approx([1 / 6, 1 / 3, 1 / 2])
-
-
 def test_black_and_white_image_is_a_mask(tmp_path):
     Image.fromarray((MAP > 0).astype(np.uint8) * 255).convert("1").save(
         tmp_path / "mask.png"
@@ -171,9 +162,7 @@ def test_broken_arrays(values, cell_size, message):
 @pytest.mark.parametrize(
     ("file", "content", "message"),
     [
-        ("pad.csv", "1,2\n3\n", "line 2 has 1 values, the first row has 2"),
         ("pad.csv", "# kPa\n1,2\n3,x\n", "line 3, value 2: 'x' is not a number"),
-        ("pad.csv", "1|2\n3|4\n", "line 1, value 1: '1|2' is not a number"),
         ("pad.csv", "", "the file holds no numbers"),
         ("pad.csv", b"\x89PNG\r\n\x1a\n", "not a text file (expected a pressure map)"),
         ("pad.npy", "1,2\n3,4\n", "not a readable .npy file"),
@@ -191,10 +180,8 @@ def test_broken_arrays(values, cell_size, message):
 def test_broken_files(tmp_path, file, content, message):
     path = tmp_path / file
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(FileError) as caught:
-        pf.ContactPatch.from_pressure(path, 0.001)
-    assert message in str(caught.value) and str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
+    line = refusal(pf.ContactPatch.from_pressure, path, 0.001, kind=FileError)
+    assert message in line and str(path) in line
 
 
 def test_missing_file_and_folder(tmp_path):

@@ -5,6 +5,7 @@ import pytest
 import shapely
 
 import planarfriction as pf
+from tests.support.contacts import SOFT
 from tests.support.refusals import refused
 
 LOAD = 3.0
@@ -91,10 +92,7 @@ def test_weights_are_continuous_where_cells_lift_and_beyond_the_edge():
 
 
 def test_the_own_centre_and_no_load_change_nothing():
-    soft = pf.ContactPatch.disc(
-        0.01, 9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0)
-    )
-    for patch in (RECTANGLE, soft):
+    for patch in (RECTANGLE, SOFT):
         x, y = patch.centre_of_pressure(LOAD)
         np.testing.assert_allclose(
             patch.weights(LOAD, (LOAD * y, -LOAD * x)), patch.weights(LOAD), atol=1e-15

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.errors import FrictionError
 from planarfriction.planning import (
     Pusher,
     Slider,
@@ -17,6 +16,7 @@ from planarfriction.planning import (
     plan_push,
     push,
 )
+from tests.support.refusals import refusal
 
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
 LAW = pf.LuGre(mu_c=0.5, mu_s=0.6, elasto_plastic=0.9)
@@ -71,7 +71,7 @@ REFUSED = [
                 contacts=[dataclasses.replace(plate().contacts[0], normal_force=2.0)],
             ),
         ),
-        "start must be 'rest' or 'sliding' if the contacts do not hold the body (they hold 32.7",
+        "start must be 'rest' or 'sliding' if the contacts do not hold the body (they hold 32.9",
     ),
     (
         lambda: gripped(
@@ -219,6 +219,4 @@ REFUSED = [
 
 @pytest.mark.parametrize(("call", "words"), REFUSED)
 def test_a_mistake_is_refused_in_words(call, words):
-    with pytest.raises(FrictionError) as caught:
-        call()
-    assert words in str(caught.value)
+    assert words in refusal(call)

@@ -40,14 +40,6 @@ def film_of(run, frames=5, follow=True):
     return Film(run, track, follow=follow, pace="", dpi=50.0)
 
 
-def changed(run, **values):
-    """The solution with other values of some of its variables."""
-    data = run.data.assign(
-        {name: (run.data[name].dims, each) for name, each in values.items()}
-    )
-    return dataclasses.replace(run, histories=data)
-
-
 def panels(film, kind):
     return [each for each in film.panels if isinstance(each, kind)]
 
@@ -82,11 +74,22 @@ def test_a_solution_of_one_instant_is_a_picture_too():
 def test_frames_pass_through_the_samples_without_overshoot():
     run = synthetic.solution(t_end=0.5)
     y = np.where(np.arange(51) < 25, 0.0, -0.01)  # a jump: a spline would ring
-    run = changed(run, y=y)
+    run = synthetic.changed(run, y=y)
     times = np.linspace(0.0, 0.5, 401)
     track = track_of(run, times)
     assert track.poses[::8, 1] == pytest.approx(y, abs=1e-15)
     assert track.poses[:, 1].min() >= -0.01 and track.poses[:, 1].max() <= 0.0
+
+
+@pytest.mark.parametrize(("kick", "shown"), [(-800.0, 0.2), (0.5, 0.5)])
+def test_a_kick_at_the_start_does_not_shrink_the_arrow_of_friction(kick, shown):
+    run = synthetic.solution()
+    force = np.full((201, 1), 0.1)
+    force[:2, 0] = kick, 0.2
+    (contact,) = track_of(
+        synthetic.changed(run, fx=force), np.array([0.0, 1.0])
+    ).contacts
+    assert contact.wrenches[:, 0] == pytest.approx([shown, 0.1])
 
 
 @pytest.mark.parametrize("moves", [None, (0.02, -0.03, 0.7)])
@@ -106,7 +109,7 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
     time = np.linspace(0.0, 2.0, 201)
     turn = 1.5 * time
     arm = 0.05
-    run = changed(
+    run = synthetic.changed(
         run,
         x=arm * np.cos(turn),
         y=arm * np.sin(turn),
@@ -234,7 +237,9 @@ def test_bristles_start_as_those_of_the_scene(start):
         dataclasses.replace(scene, body=body, contacts=contacts, start=start)
     )
     zero = np.zeros(201)
-    run = changed(run, x=zero, y=zero, theta=zero, normal_force=np.full((201, 1), 4.0))
+    run = synthetic.changed(
+        run, x=zero, y=zero, theta=zero, normal_force=np.full((201, 1), 4.0)
+    )
     bent = track_of(run, np.linspace(0.0, 2.0, 3)).contacts[0].slip.bent
     if start == "sliding":
         assert bent[1:] == pytest.approx(np.ones_like(bent[1:]), rel=1e-3)
@@ -273,12 +278,7 @@ def test_the_arrow_of_friction_is_in_world_axes_for_identical_contacts(
     film.show(3)
     fx, fy = (2.0 * float(run.data[name][150, 0]) for name in ("fx", "fy"))
     angle = turned + 0.5
-    force = np.array(
-        [
-            np.cos(angle) * fx - np.sin(angle) * fy,
-            np.sin(angle) * fx + np.cos(angle) * fy,
-        ]
-    )
+    force = pf.geometry.rotate(np.array([fx, fy]), angle)
     start, end = film.contacts[0][2]._posA_posB
     assert np.asarray(end) - np.asarray(start) == pytest.approx(
         film.millimetres_per_newton * force, abs=1e-9
@@ -291,11 +291,9 @@ def test_the_outline_is_drawn_where_the_body_is():
     (line,) = film.body
     drawn = (line.get_transform() - film.axes.transData).transform(line.get_xydata())
     angle = -0.3 * 4.0
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    turned = 1e3 * pf.geometry.rotate(synthetic.PLATE, angle)
     # 1e-6 mm: the way through pixels and back loses a few digits
-    assert drawn[:4] == pytest.approx(
-        1e3 * synthetic.PLATE @ turn.T + np.array([2.0, -20.0]), abs=1e-6
-    )
+    assert drawn[:4] == pytest.approx(turned + np.array([2.0, -20.0]), abs=1e-6)
 
 
 def test_a_frame_draws_and_says_where_body_and_contacts_are():
@@ -307,7 +305,7 @@ def test_a_frame_draws_and_says_where_body_and_contacts_are():
         for i, each in enumerate(scene.contacts)
     ]
     run = synthetic.solution(dataclasses.replace(scene, contacts=contacts))
-    run = changed(run, x=0.002 + 0.003 * np.asarray(run.data["time"]))
+    run = synthetic.changed(run, x=0.002 + 0.003 * np.asarray(run.data["time"]))
     film = film_of(run)
     film.show(3)  # 1.5 s
     x = 0.002 + 0.0045
@@ -317,11 +315,7 @@ def test_a_frame_draws_and_says_where_body_and_contacts_are():
     path = 1e3 * np.stack([0.002 + 0.003 * times, -0.005 * times**2], -1)
     assert film.path.get_xydata() == pytest.approx(path, abs=1e-9)
 
-    def turned(points, angle):
-        return points @ np.array(
-            [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
-        )
-
+    turned = pf.geometry.rotate
     for contact, (_, cells, arrow) in zip(contacts, film.contacts, strict=True):
         origin = np.array([x, y]) + turned(np.array(contact.position), theta)
         drawn = np.array(
@@ -366,11 +360,7 @@ def test_the_wrench_is_drawn_from_the_side_with_its_tail():
 
 
 def test_cells_are_pale_unbent_blue_bent_and_orange_where_they_slip():
-    film = film_of(
-        synthetic.solution(
-            synthetic.scene(patch=pf.ContactPatch.rectangle(0.04, 0.01, 8))
-        )
-    )
+    film = film_of(synthetic.run(patch=pf.ContactPatch.rectangle(0.04, 0.01, 8)))
     (panel,) = panels(film, CellPanel)
     bent, slips = panel.track.slip
     bent[2], slips[2] = (
@@ -390,7 +380,7 @@ def test_cells_are_pale_unbent_blue_bent_and_orange_where_they_slip():
 
 def test_a_frame_without_load_has_the_surface_of_the_last_load_before():
     run = soft_finger()
-    run = changed(
+    run = synthetic.changed(
         run, normal_force=np.repeat([0.0, 1.0, 0.0, 3.0, 0.0], 41)[:201, None]
     )
     (panel,) = panels(film_of(run), SurfacePanel)
@@ -409,7 +399,7 @@ def test_a_frame_without_load_has_the_surface_of_the_last_load_before():
 
 def test_a_patch_in_steady_sliding_has_its_wrench_on_the_limit_surface():
     patch = pf.patch.PUBLISHED_PATCHES["NonConvex2"]()
-    run = synthetic.solution(synthetic.scene(patch=patch))
+    run = synthetic.run(patch=patch)
     surface = pf.LimitSurfaceExact(patch)
     polar = np.full(201, 1.1)
     azimuth = np.linspace(0.0, 6.0, 201)
@@ -419,7 +409,7 @@ def test_a_patch_in_steady_sliding_has_its_wrench_on_the_limit_surface():
 
     _, wrenches = sample_limit_surface(surface, polar, azimuth)
     fx, fy, tau = 2.0 * wrenches.T[:, :, None]  # mu_c = 1 and 2 N
-    film = film_of(changed(run, fx=fx, fy=fy, tau=tau))
+    film = film_of(synthetic.changed(run, fx=fx, fy=fy, tau=tau))
     (panel,) = panels(film, SurfacePanel)
     seen = np.stack([points[:, :2] @ panel.along, points[:, 2]], -1)
     assert panel.points == pytest.approx(seen[::50], abs=1e-9)
@@ -436,8 +426,8 @@ def soft_finger():
     soft = pf.ContactPatch.rectangle(
         0.02, cells=9, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01)
     )
-    run = synthetic.solution(synthetic.scene(patch=soft))
-    return changed(run, normal_force=np.linspace(0.0, 4.0, 201)[:, None])
+    run = synthetic.run(patch=soft)
+    return synthetic.changed(run, normal_force=np.linspace(0.0, 4.0, 201)[:, None])
 
 
 def test_the_patch_and_its_limit_surface_follow_the_load():
@@ -457,8 +447,8 @@ def test_the_patch_and_its_limit_surface_follow_the_load():
 
 
 def test_every_contact_has_its_panels_and_the_rest_is_drawn_in_the_world():
-    assert len(film_of(synthetic.solution(synthetic.scene(contacts=2))).panels) == 4
-    film = film_of(synthetic.solution(synthetic.scene(contacts=5)))
+    assert len(film_of(synthetic.run(contacts=2)).panels) == 4
+    film = film_of(synthetic.run(contacts=5))
     assert [each.track.contact.name for each in panels(film, CellPanel)] == [
         "pad 3",
         "pad 4",
@@ -475,9 +465,7 @@ def test_the_share_that_slips_is_that_of_the_load():
     panel.show(2)
     share = 100.0 * slips[2].sum() / slips.shape[1]
     assert panel.words.get_text() == f"pad: {share:.0f} % of the load slips"
-    panel = panels(film_of(synthetic.solution(synthetic.scene(contacts=2))), CellPanel)[
-        1
-    ]
+    panel = panels(film_of(synthetic.run(contacts=2)), CellPanel)[1]
     panel.track = dataclasses.replace(
         panel.track,
         contact=dataclasses.replace(panel.track.contact, name="long" + 8 * " long"),
@@ -490,8 +478,8 @@ def test_the_share_that_slips_is_that_of_the_load():
 
 
 def far(way=1.0):
-    run = synthetic.solution(synthetic.scene(mounted_on="body"))
-    return changed(run, x=way * np.linspace(0.0, 1.0, 201))
+    run = synthetic.run(mounted_on="body")
+    return synthetic.changed(run, x=way * np.linspace(0.0, 1.0, 201))
 
 
 def sides(film):
@@ -559,24 +547,22 @@ EACH = GROOVED.with_friction_metric(
     np.linspace(1.0, 2.0, len(GROOVED.positions))[:, None, None] * np.eye(2)
 )
 DRAWN = {
-    "legs": lambda: synthetic.solution(
-        synthetic.scene(patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)]))
+    "legs": lambda: synthetic.run(
+        patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)])
     ),
     "one point": lambda: with_model(
         pf.DistributedModel(pf.ContactPatch.points([(0.0, 0.0)]), LAW)
     ),
     "own model": lambda: with_model(Own()),
-    "no outline": lambda: synthetic.solution(
-        synthetic.scene(mounted_on="body", outline=None)
-    ),
+    "no outline": lambda: synthetic.run(mounted_on="body", outline=None),
     "one sample": one_sample,
-    "cells differ": lambda: synthetic.solution(synthetic.scene(patch=EACH)),
-    "grooved": lambda: synthetic.solution(synthetic.scene(patch=GROOVED)),
+    "cells differ": lambda: synthetic.run(patch=EACH),
+    "grooved": lambda: synthetic.run(patch=GROOVED),
     "published": lambda: with_model(
         pf.ReducedModelPublished(pf.ContactPatch.disc(0.01, 7), LAW)
     ),
-    "three contacts": lambda: synthetic.solution(synthetic.scene(contacts=3)),
-    "no load": lambda: changed(
+    "three contacts": lambda: synthetic.run(contacts=3),
+    "no load": lambda: synthetic.changed(
         synthetic.solution(), normal_force=np.zeros((201, 1)), fy=np.zeros((201, 1))
     ),
 }
@@ -599,7 +585,7 @@ def test_a_frame_of_it_is_drawn(name):
 @pytest.mark.parametrize("contacts", [1, 2, 3])
 def test_no_word_of_a_frame_is_cut_or_covered(contacts):
     film = Film(
-        run := synthetic.solution(synthetic.scene(contacts=contacts)),
+        run := synthetic.run(contacts=contacts),
         track_of(run, np.linspace(0.0, 2.0, 3)),
         follow=True,
         pace="   (2 x slower)",

@@ -275,8 +275,24 @@ def test_histories_show_the_data_in_the_units_of_their_labels():
     assert figure.legends == []
 
 
+def test_histories_stand_in_columns_above_one_time():
+    run = synthetic.solution()
+    figure = plots.plot_histories(run)
+    left, right = figure.axes[::2], figure.axes[1::2]
+    for column, name in ((left, "body"), (right, "contacts")):
+        places = [axes.get_position() for axes in column]
+        assert np.ptp([place.x0 for place in places]) < 1e-9
+        assert (np.diff([place.y0 for place in places]) < 0.0).all()
+        assert column[0].get_title().startswith(name)
+        assert [axes.get_xlabel() for axes in column] == ["", "", "", "time [s]"]
+    assert left[0].get_position().x0 < right[0].get_position().x0
+    assert [axes.get_ylabel()[0] for axes in left] == ["x", "y", "θ", "s"]
+    figure = plots.plot_histories(run, panels=("fx", "x"))
+    assert [axes.get_xlabel() for axes in figure.axes] == ["", "time [s]"]
+
+
 def test_every_contact_has_its_line_and_its_entry():
-    run = synthetic.solution(synthetic.scene(contacts=3))
+    run = synthetic.run(contacts=3)
     figure = plots.plot_histories({"a": run, "b": run})
     force = figure.axes[1].get_lines()
     assert len(force) == 6
@@ -293,14 +309,6 @@ def test_every_contact_has_its_line_and_its_entry():
     assert entries["b, pad 3"].get_linestyle() == force[5].get_linestyle()
 
 
-def with_values(run, **values):
-    """The solution with other values of some of its variables."""
-    data = run.data.assign(
-        {name: (run.data[name].dims, each) for name, each in values.items()}
-    )
-    return pf.Solution(data, run.statistics, run.status, run.message, run.scene)
-
-
 def panels(figure):
     return {axes.get_ylabel().split(" [")[0]: axes for axes in figure.axes}
 
@@ -308,7 +316,7 @@ def panels(figure):
 def test_what_is_nearly_nothing_looks_like_it():
     run = synthetic.solution()
     noise = 1e-10 * np.sin(50 * run.data["time"].values)
-    shown = panels(plots.plot_histories(with_values(run, fy=noise[:, None])))
+    shown = panels(plots.plot_histories(synthetic.changed(run, fy=noise[:, None])))
     # 2 % of the largest force of the panels beside it, the normal force of 2 N
     assert np.ptp(shown["fy"].get_ylim()) == pytest.approx(0.04)
     assert shown["fy"].get_ylabel() == "fy [N]"
@@ -318,7 +326,7 @@ def test_the_kick_at_the_start_does_not_hide_the_rest():
     run = synthetic.solution()
     force = run.data["fx"].values.copy()
     force[0] = -800.0
-    shown = panels(plots.plot_histories(with_values(run, fx=force)))["fx"]
+    shown = panels(plots.plot_histories(synthetic.changed(run, fx=force)))["fx"]
     # sines of amplitude 0.1 N and 5 % of their height above and below
     assert shown.get_ylim() == pytest.approx((-0.11, 0.11), abs=2e-3)
     assert shown.get_lines()[0].get_ydata()[0] == pytest.approx(-800.0)
@@ -345,9 +353,9 @@ def test_strobe_shows_the_outline_where_the_body_is():
     plate = 1e3 * np.vstack([synthetic.PLATE, synthetic.PLATE[:1]])
     assert drawn[0] == pytest.approx(plate + np.array([2.0, 0.0]), abs=1e-6)
     angle = -0.3 * 4.0
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    turned = pf.geometry.rotate(plate, angle)
     # 1e-6 mm: the way through pixels and back loses a few digits
-    assert drawn[-1] == pytest.approx(plate @ turn.T + np.array([2.0, -20.0]), abs=1e-6)
+    assert drawn[-1] == pytest.approx(turned + np.array([2.0, -20.0]), abs=1e-6)
     assert labels(figure.axes[0]) == {"x [mm]", "y [mm]"}
     assert figure.axes[0].get_aspect() == 1.0
 
@@ -356,9 +364,7 @@ def test_strobe_shows_the_outline_where_the_body_is():
     ("mounted_on", "times"), [("world", 1), ("body", motion.INSTANTS)]
 )
 def test_pads_are_drawn_with_what_they_are_fixed_to(mounted_on, times):
-    figure = plots.plot_motion(
-        synthetic.solution(synthetic.scene(mounted_on=mounted_on))
-    )
+    figure = plots.plot_motion(synthetic.run(mounted_on=mounted_on))
     axes = figure.axes[0]
     pads = [each for each in axes.patches if isinstance(each, PathPatch)]
     assert len(pads) == times
@@ -377,7 +383,9 @@ def test_pads_and_the_path_are_drawn_where_they_are():
     ]
     run = synthetic.solution(dataclasses.replace(scene, contacts=contacts))
     done = run.data["time"].values ** 1.1
-    run = with_values(run, x=0.002 + 0.01 * done, y=-0.005 * done, theta=-0.3 * done)
+    run = synthetic.changed(
+        run, x=0.002 + 0.01 * done, y=-0.005 * done, theta=-0.3 * done
+    )
     axes = plots.plot_motion(run).axes[0]
     poses = np.stack([run.data[name].values for name in ("x", "y", "theta")], -1)
     (path,) = axes.collections
@@ -414,16 +422,16 @@ def test_pads_and_the_path_are_drawn_where_they_are():
 def test_a_motion_that_cannot_be_seen_says_how_far_it_goes():
     run = resting()
     time = run.data["time"].values
-    run = with_values(run, x=2e-6 * time, y=-1e-6 * time, theta=np.radians(1e-3) * time)
+    run = synthetic.changed(
+        run, x=2e-6 * time, y=-1e-6 * time, theta=np.radians(1e-3) * time
+    )
     title = plots.plot_motion(run).axes[0].get_title(loc="left")
     assert title == "moves by up to 4.5 µm, rotates by up to 35 µrad"
 
 
 @pytest.mark.parametrize("mounted_on", ["world", "body"])
 def test_everything_drawn_is_within_the_view(mounted_on):
-    run = synthetic.solution(
-        synthetic.scene(contacts=5, mounted_on=mounted_on), scale=3.0
-    )
+    run = synthetic.run(contacts=5, mounted_on=mounted_on, scale=3.0)
     figure = plots.plot_motion(run)
     figure.draw_without_rendering()
     axes = figure.axes[0]
@@ -463,9 +471,7 @@ FIGURES = {
     "histories": lambda: plots.plot_histories(
         {"distributed": synthetic.solution(), "reduced": synthetic.solution()}
     ),
-    "histories, contacts": lambda: plots.plot_histories(
-        synthetic.solution(synthetic.scene(contacts=4))
-    ),
+    "histories, contacts": lambda: plots.plot_histories(synthetic.run(contacts=4)),
     "motion": lambda: plots.plot_motion(synthetic.solution()),
     "solution": lambda: synthetic.solution().plot(),
 }
@@ -644,7 +650,7 @@ def test_what_cannot_be_drawn_is_named_in_one_line(call, message):
 
 def changed(run, every=1.0, **values):
     """The solution with other values of some variables, and its times so many times as long."""
-    run = with_values(run, **values)
+    run = synthetic.changed(run, **values)
     return dataclasses.replace(
         run, histories=run.data.assign_coords(time=every * run.data["time"])
     )
@@ -653,7 +659,7 @@ def changed(run, every=1.0, **values):
 def scaled(by):
     """All lengths and forces so many times as large; the body and its patch stay as they are."""
     run = synthetic.solution()
-    return with_values(
+    return synthetic.changed(
         run,
         **{
             name: by * run.data[name].values for name in ("x", "y", "vx", "vy", *FORCES)
@@ -663,7 +669,7 @@ def scaled(by):
 
 def resting():
     run = synthetic.solution()
-    return with_values(
+    return synthetic.changed(
         run,
         **{
             name: 0.0 * run.data[name].values
@@ -681,16 +687,14 @@ AWKWARD = {
         synthetic.solution(), histories=synthetic.solution().data.isel(time=[0])
     ),
     "tiny": lambda: scaled(1e-9),
-    "far": lambda: with_values(
+    "far": lambda: synthetic.changed(
         synthetic.solution(), x=3e4 * np.linspace(0.0, 1.0, 201)
     ),
-    "no outline": lambda: synthetic.solution(
-        synthetic.scene(mounted_on="body", outline=None)
+    "no outline": lambda: synthetic.run(mounted_on="body", outline=None),
+    "legs": lambda: synthetic.run(
+        patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)])
     ),
-    "legs": lambda: synthetic.solution(
-        synthetic.scene(patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)]))
-    ),
-    "long names": lambda: synthetic.solution(synthetic.scene(contacts=3, name=LONG)),
+    "long names": lambda: synthetic.run(contacts=3, name=LONG),
 }
 
 

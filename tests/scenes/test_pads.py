@@ -1,10 +1,9 @@
 """Scenes with pads, in the solver."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
+import planarfriction as pf
 from planarfriction._engine.compiler import jit
 from planarfriction._engine.compiler.calls import call
 from planarfriction._engine.compiler.memory import doubles, place_of
@@ -18,6 +17,7 @@ from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, driven, simulate
 from planarfriction.scenes.start import first_slopes, first_states
 from planarfriction.sliding_body import SlidingBody
+from tests.support.differences import differences
 from tests.support.refusals import refused
 
 ONE = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
@@ -195,11 +195,13 @@ def test_an_equilibrium_follows_the_load(pad, patch=DISCS, load=1.3):
     )
 
 
-@pytest.mark.parametrize("pad", [Pad.at_load(1.0), Pad.layer(0.2e6, 3e-3)])
+@pytest.mark.parametrize(
+    "pad", [Pad.at_load(1.0), Pad.layer(0.2e6, 3e-3), Pad.measured(1e5, common=0.4)]
+)
 @pytest.mark.parametrize("start", ["equilibrium", "sliding"])
 def test_a_scene_may_start_under_load_or_sliding(start, pad):
     """Also on discs that stand for more cells."""
-    law = LuGre(elasto_plastic=0.9)
+    law = LuGre(sigma_1=0.0, elasto_plastic=0.9)
     model = ReducedModel(_GRID, law, pad=pad, cells=8)
     contact = Contact(model, 2.5, mounted_on="body")
     given = (
@@ -350,13 +352,57 @@ def test_a_body_between_two_half_spaces_moves_as_in_steps():
     np.testing.assert_allclose(found, limit, rtol=5e-4)
 
 
+def test_faces_in_equilibrium_share_the_load_by_their_stiffness():
+    """Two pads that stick hold a pull like springs in parallel, with more of one behind its face."""
+    given = {"near": (4e3, 0.4, 0.02, 2), "far": (9e3, 0.7, -0.02, 1)}
+    contacts = [
+        Contact(DistributedModel(DISCS, SPRINGS, pad=Pad.measured(stiffness, common)),
+                2.0, position=(x, 0.0), angle=0.5 * np.pi, name=name, count=count)
+        for name, (stiffness, common, x, count) in given.items()
+    ]  # fmt: skip
+    pull = 0.5
+    scene = Scene(_body(), contacts, 0.05, force=(pull, 0.0, 0.0), start="equilibrium")
+    data = simulate(scene, bristles="all").data
+    moved = pull / sum(each[0] * each[-1] for each in given.values())
+    for name, (stiffness, common, *_) in given.items():
+        one = data.sel(contact=name)
+        np.testing.assert_allclose(one.fy, stiffness * moved, rtol=1e-9)
+        face = data[f"bristles_{name}"].values[:, -3:]
+        np.testing.assert_allclose(face[:, 1], -common * moved, rtol=1e-9)
+    assert np.abs(data[["x", "y", "theta"]].to_array()).max() < 1e-12
+
+
+def test_a_half_space_that_slips_at_its_rim_starts_as_after_a_slow_pull():
+    model = FACES["half-space"]
+    contact = Contact(model, 2.0, name="pad")
+    still = np.zeros(3)
+    pull = np.array([1.1, 0.4, 3e-3])
+    scene = Scene(
+        _body(), contact, 0.2, force=pull, start="equilibrium", save_every=0.01
+    )
+    start = simulate(scene, rtol=1e-7, atol=1e-8, bristles="all").data
+    speeds, places = (
+        np.abs(start[names].to_array()).max() for names in (["vx", "vy"], ["x", "y"])
+    )
+    assert speeds < 1e-9 and places < 1e-11
+    slow = Scene(
+        _body(), contact, 20.0, force=Signal([0.0, 20.0], [still, pull], "linear")
+    )
+    end = simulate(slow, rtol=1e-7, atol=1e-8, bristles="all").data
+    assert np.hypot(end.x[-1], end.y[-1]) > 5e-5
+    first, last = (each.bristles_pad.values[i] for each, i in ((start, 0), (end, -1)))
+    bent = np.abs(last[:-3]).max()
+    ratio = pf.tactile.slip_ratio(model, last, still, 2.0)
+    assert (ratio > 0.99).sum() >= 5
+    np.testing.assert_allclose(first[:-3], last[:-3], atol=0.04 * bent)
+    np.testing.assert_allclose(first[-3:], last[-3:], rtol=0.01)
+
+
 def test_what_knows_no_common_compliance_says_so():
     model = FACES["measured"]
     scene = Scene(_body(), Contact(model, 1.0), 0.01, force=(0.1, 0.0, 0.0))
     with refused("pad must have no common compliance for derivatives of scenes"):
         scene_sensitivities(scene, ["mu"])
-    with refused("pad must have no common compliance for a start under load"):
-        simulate(dataclasses.replace(scene, start="equilibrium"))
     with refused("moments must be None for rates on a pad"):
         model.rate(model.rest(), np.zeros(3), 1.0, moments=(1e-3, 0.0))
 
@@ -370,16 +416,6 @@ def _solve(calls, contact, z, v, shift, r, dv, lin, stiffness, wrench, change):
     call(own.factor, (contact, z, shift, lin, doubles(stiffness)))
     call(own.eliminate, (contact, z, shift, doubles(r), lin, doubles(wrench)))
     call(own.back_substitute, (contact, z, doubles(r), doubles(dv), lin, doubles(change)))  # fmt: skip
-
-
-def _jacobian(function, at, step):
-    """Differences of fourth order, `[..., n]`."""
-    columns = []
-    for direction in step * np.eye(len(at)):
-        near = function(at + direction) - function(at - direction)
-        far = function(at + 2.0 * direction) - function(at - 2.0 * direction)
-        columns.append((8.0 * near - far) / (12.0 * step))
-    return np.stack(columns, -1)
 
 
 @pytest.mark.parametrize("name", FACES)
@@ -400,8 +436,8 @@ def test_what_the_solver_eliminates_is_the_solution_of_its_equations(name):
     def rate(z, v):
         return np.concatenate(rates(packed, z[None], v[None]), axis=1)[0]
 
-    of_state = _jacobian(lambda each: rate(each, v), z, 1e-9)
-    of_twist = _jacobian(lambda each: rate(z, np.append(each, v[3:])), v[:3], 1e-5)
+    of_state = differences(lambda each: rate(each, v), z, 1e-9)
+    of_twist = differences(lambda each: rate(z, np.append(each, v[3:])), v[:3], 1e-5)
     shift = 1e4
     r = rng.normal(size=n) * packed.state_scale * shift
     dv = np.zeros(6)

@@ -9,6 +9,8 @@ from scipy.integrate import solve_ivp
 
 import planarfriction as pf
 from planarfriction.derivatives import scene_gradient, scene_sensitivities
+from tests.support.differences import scene_slopes
+from tests.support.files import again
 from tests.support.rate_laws import BoucWen
 from tests.support.refusals import refused
 
@@ -266,27 +268,18 @@ def test_derivatives_are_central_differences(name):
     knots = {"force": [0.0, 0.05]}
     found = scene_sensitivities(pushed(name), names, signals=knots)
     for key in (*names, "push"):
-        h = 1e-4
         at = 0.0 if key == "push" else 1.0
-        ends = [
-            pf.simulate(
-                pushed(name, **{key: at + side * h}), rtol=1e-10, atol=1e-10
-            ).data
-            for side in (1, -1)
-        ]
-        ends = [
-            np.stack([each[of][-1] for of in ("vx", "vy", "omega", "x", "y", "theta")])
-            for each in ends
-        ]
         column = (
             found.columns["force"].start + 1
             if key == "push"
             else found.columns[key].start
         )
-        change = (ends[0] - ends[1]) / (2.0 * h)
+        slopes, _ = scene_slopes(
+            lambda by, key=key: pushed(name, **{key: by}), at, 1e-4
+        )
         scale = np.abs(found.d_motion[-1]).max(axis=1)
         np.testing.assert_allclose(
-            found.d_motion[-1, :, column] / scale, change / scale, atol=1e-5
+            found.d_motion[-1, :, column] / scale, slopes[-1] / scale, atol=1e-5
         )
     bar, pull = np.random.default_rng(0).normal(size=(2, 6))
     pull = pull[None, None, :3]
@@ -304,11 +297,9 @@ def test_derivatives_are_central_differences(name):
 
 def test_files_hold_the_pressure(tmp_path):
     scene = slide(MODELS["few cells"])
-    scene.to_file(tmp_path / "box.toml")
-    assert (
-        'pressure = "follows"\nheight = 0.005\n' in (tmp_path / "box.toml").read_text()
-    )
-    assert pf.Scene.from_file(tmp_path / "box.toml") == scene
+    again(scene, tmp_path)
+    written = (tmp_path / "scene.toml").read_text()
+    assert 'pressure = "follows"\nheight = 0.005\n' in written
     assert (
         "pressure"
         not in slide(MODELS["few cells"], height=0.0, pressure="fixed").to_dict()[

@@ -6,6 +6,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import FileError
+from tests.support.refusals import refusal
 
 PATCHES = {
     "shape = 'cells', areas = [1]": "missing key 'positions'",
@@ -69,10 +70,7 @@ normal_force = {sine = {offset = 2.0, amplitude = 0.5, frequency = 2.0, t_end = 
 def refused(text, folder):
     path = Path(folder) / "scene.toml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(FileError) as caught:
-        pf.Scene.from_file(path)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
+    return refusal(pf.Scene.from_file, path, kind=FileError)
 
 
 @pytest.mark.parametrize("patch", PATCHES)

@@ -8,6 +8,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import FileError
 from planarfriction.scenes.slip import _stretches, centres, reach, slip_shares
+from tests.support.half_space_slip import SlippingHalfSpace
 from tests.support.refusals import refused
 
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
@@ -174,24 +175,60 @@ def test_incipient_slip_of_few_discs_is_coarse_and_early():
     assert onset == pytest.approx(0.9 ** (1 / 3), abs=0.06)
 
 
-def test_incipient_slip_of_a_half_space_comes_late():
-    """The pieces slip outside c with `u = (1 - c^2)^(1/2)` at `d/d_1 = 2 u^2 - u^3`, `Q/(mu f_N) = 3 u^2 - 2 u^3`.
+def test_slip_of_a_half_space_begins_and_ends_as_that_of_cattaneo():
+    """A ring outside c slips at `c = (1 - Q/(mu f_N))^(1/3)`, with the share `(1 - c^2)^(3/2)` of the load.
 
-    A tenth of the load slips at u^3 = 0.1, at 0.45 of the limit. A half-space slips there from 0.31 on (Cattaneo and
-    Mindlin, `c = (1 - Q/(mu f_N))^(1/3)`), and for nine tenths both are within a hundredth.
+    The pieces of the pad slip outside c at `Q/(mu f_N) = 3 u^2 - 2 u^3` with `u = (1 - c^2)^(1/2)`, later.
     """
     modulus, ratio, load = 0.2e6, 0.49, 3.0
     full = 3.0 * (2.0 - ratio) * 0.8 * load / (16.0 * modulus * RADIUS)
     pad = pf.Pad.half_space(modulus, ratio)
     model = pf.DistributedModel(fingertip(31), SHARP, pad=pad)
-    shares = np.array(dragged(model, full))
-    u = np.array([0.1, 0.9]) ** (1.0 / 3.0)
-    assert shares == pytest.approx(2.0 * u**2 - u**3, abs=0.03)
-    forces = 1.0 - (1.0 - shares) ** 1.5
-    exact = 1.0 - (1.0 - u**2) ** 1.5
-    assert forces == pytest.approx(3.0 * u**2 - 2.0 * u**3, abs=0.03)
+    forces = 1.0 - (1.0 - np.array(dragged(model, full))) ** 1.5
+    exact = 1.0 - (1.0 - np.array([0.1, 0.9]) ** (2.0 / 3.0)) ** 1.5
     assert exact == pytest.approx([0.305, 0.982], abs=1e-3)
-    assert forces[1] == pytest.approx(exact[1], abs=0.02)
+    assert forces == pytest.approx(exact, abs=0.025)
+
+
+PRESSURES = {
+    "circle": lambda x, y: np.maximum(1.0 - x * x - y * y, 0.0) ** 0.5,
+    "even circle": lambda x, y: 1.0 * (x * x + y * y < 1.0),
+    "square": lambda x, y: (1.0 - x * x) * (1.0 - y * y),
+    "even square": lambda x, y: np.ones(x.shape),
+}
+
+
+@pytest.mark.parametrize("axis", [0, 2], ids=["shift", "rotation"])
+@pytest.mark.parametrize("pressure", PRESSURES.values(), ids=PRESSURES)
+def test_incipient_slip_of_a_half_space_is_that_of_a_boundary_element_method(
+    pressure, axis
+):
+    modulus, ratio, load = 0.2e6, 0.45, 3.0
+    x, y = np.meshgrid(*[np.linspace(-0.96, 0.96, 25)] * 2)
+    patch = pf.ContactPatch.from_pressure(pressure(x, y), width=2.0 * RADIUS)
+    sides = patch.cell_extents()[0]
+    exact = SlippingHalfSpace(patch.positions, sides, modulus, ratio)
+    limits = 0.8 * load * patch.weights()
+
+    most = 3.0 * 0.8 * load / (modulus * RADIUS) / RADIUS ** (axis / 2)
+    shares, wrenches = [], []
+    for size in np.linspace(0.005, 0.04, 8) * most:
+        q = exact.tractions(size * np.eye(3)[axis], limits)
+        slips = np.hypot(*q.T) * exact.area > 0.999 * limits
+        shares.append(patch.weights() @ slips)
+        wrenches.append(exact.wrench(q)[axis])
+    wrench = np.interp(0.1, shares, wrenches)
+    model = pf.DistributedModel(patch, SHARP, pad=pf.Pad.half_space(modulus, ratio))
+    twist = most * np.eye(3)[axis]
+    scene = pf.scenes.driven(model, twist=twist, normal_force=load, t_end=1.0)
+    run = pf.simulate(scene, bristles="all", save_every=5e-4)
+    found = np.interp(
+        run.slip_events()[0].incipient,
+        run.data.time,
+        -run.data["fx" if axis == 0 else "tau"][:, 0],
+    )
+    whole = limits @ np.hypot(*patch.positions.T) ** (axis / 2)
+    assert found / whole == pytest.approx(wrench / whole, abs=0.055)
 
 
 @pytest.mark.parametrize("model", MODELS[:3], ids=lambda m: type(m).__name__)

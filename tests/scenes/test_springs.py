@@ -1,6 +1,7 @@
 """Springs: against closed forms and an integration of our own, on files, in derivatives, at rest."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from scipy.integrate import solve_ivp
 
 import planarfriction as pf
 from planarfriction.errors import FileError
+from tests.support.differences import differences, scene_slopes
+from tests.support.files import again
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=0.3, mu_s=0.4, v_s=0.01, sigma_0=1e4, sigma_1=20.0, sigma_2=0.1)
@@ -135,12 +138,8 @@ def test_forces_of_springs_are_the_slope_of_their_energy():
             40.0 * ((x - at[0]) ** 2 + (y - at[1]) ** 2) + 0.05 * (angle - pose[2]) ** 2
         )
 
-    slope = [
-        (energy(pose + 1e-6 * e) - energy(pose - 1e-6 * e)) / 2e-6 for e in np.eye(3)
-    ]
-    np.testing.assert_allclose(
-        spring.pull(0.3, pose), -np.array(slope), rtol=1e-7, atol=1e-9
-    )
+    slope = differences(energy, pose, 1e-4)
+    np.testing.assert_allclose(spring.pull(0.3, pose), -slope, rtol=1e-7, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["mass", "inertia", "x", "y", "theta", "omega"])
@@ -153,15 +152,11 @@ def test_derivatives_with_springs_are_those_of_differences(name):
     )
     given = {"parameters": [], **kind}
     found = scene_sensitivities(whole, **given)
-    step = 1e-4
-    ends = [
-        motion(pf.simulate(changed(whole, name, sign * step)))[-1]
-        for sign in (1.0, -1.0)
-    ]
-    expected = (ends[0] - ends[1]) / (2.0 * step)
+    make = functools.partial(changed, whole, name)
+    wanted = scene_slopes(make, 0.0, 1e-4)[0][-1]
     scale = np.array([1.0, 1.0, 50.0, 0.1, 0.1, 5.0])
     np.testing.assert_allclose(
-        found.d_motion[-1, :, 0] / scale, expected / scale, rtol=1e-3, atol=1e-4
+        found.d_motion[-1, :, 0] / scale, wanted / scale, rtol=1e-3, atol=1e-4
     )
     weights = np.array([1.0, -2.0, 0.1, 3.0, 1.0, 0.5])
     back = scene_gradient(
@@ -195,10 +190,7 @@ def changed(whole, name, by):
 
 
 def test_springs_in_files_come_back_to_the_last_bit(tmp_path):
-    for end in ("toml", "json"):
-        scene(1.0).to_file(tmp_path / f"a.{end}")
-        again = pf.Scene.from_file(tmp_path / f"a.{end}")
-        assert again == scene(1.0) and again.digest() == scene(1.0).digest()
+    again(scene(1.0), tmp_path)
     assert scene(1.0, springs=()).digest() != scene(1.0).digest()
     # Digests of scenes without springs stay.
     assert "spring" not in scene(1.0, springs=()).to_dict()

@@ -1,6 +1,7 @@
 """Initial states of bristles: under the load of a body that stands still, or as in steady sliding."""
 
 import dataclasses
+import functools
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import FileError
 from planarfriction.scenes.start import contact_map, first_states
+from tests.support.differences import scene_slopes
+from tests.support.files import again
 from tests.support.refusals import refused
 
 LAW = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_0=1e5, elasto_plastic=0.9)
@@ -145,9 +148,7 @@ def test_a_block_that_slides_goes_as_far_as_friction_lets_it():
 
 def test_files_and_solutions_keep_the_start(tmp_path):
     scene = held(MODELS[0])
-    for name in ("scene.toml", "scene.json"):
-        scene.to_file(tmp_path / name)
-        assert pf.Scene.from_file(tmp_path / name) == scene
+    again(scene, tmp_path)
     solution = pf.simulate(scene, t_end=0.02)
     assert (
         pf.Solution.load(solution.save(tmp_path / "run.nc")).scene.start
@@ -203,25 +204,15 @@ def test_derivatives_follow_an_equilibrium():
         held_by_two(), ("mass", "inertia"), signals=knots
     )
 
-    def end(change, by):
-        histories = pf.simulate(
-            held_by_two(change, by), rtol=1e-10, atol=1e-10
-        ).histories
-        return np.array(
-            [
-                float(histories[name].values[-1])
-                for name in ("vx", "vy", "omega", "x", "y", "theta")
-            ]
-        )
-
     for change, name in (
         ("grip", "grip.normal_force[0]"),
         ("push", "force[0].fx"),
         ("mass", "mass"),
     ):
-        difference = (end(change, 1e-5) - end(change, -1e-5)) / 2e-5
+        make = functools.partial(held_by_two, change)
+        wanted = scene_slopes(make, 0.0, 1e-5)[0][-1]
         slope = found.d_motion[-1, :, found.names.index(name)]
-        assert slope == pytest.approx(difference, abs=3e-6 * np.abs(difference).max())
+        assert slope == pytest.approx(wanted, abs=3e-6 * np.abs(wanted).max())
 
 
 def test_derivatives_to_what_moves_the_start_are_refused():

@@ -106,6 +106,19 @@ def random_bodies(
     return Bodies(jacobian, mass, size, response, load_response, load, dt)
 
 
+def _host(bodies: Bodies, free, load, wrench) -> HostStep:
+    """Return the step of a host that carries bodies."""
+    count, k = load.shape
+    places = count, k, 3
+    return HostStep(
+        free.reshape(places),
+        load,
+        wrench.reshape(places),
+        bodies.response,
+        bodies.load_response,
+    )
+
+
 def random_run(
     generator: np.random.Generator, patches: CoupledPatches, bodies: Bodies, steps: int
 ):
@@ -154,13 +167,7 @@ def random_run(
             + np.einsum("epj,ej->ep", bodies.load_response, wrench),
             0.0,
         )
-        host = HostStep(
-            free.reshape(count, k, 3),
-            load,
-            wrench.reshape(count, k, 3),
-            bodies.response,
-            bodies.load_response,
-        )
+        host = _host(bodies, free, load, wrench)
         step = patches.step(state, host, bodies.dt)
         yield state, host, bodies.dt, step
         state = step.state
@@ -194,13 +201,7 @@ def abrupt_run(
         load = np.maximum(
             bodies.load * (1.0 + 0.1 * generator.normal(size=(count, k))) + tilted, 0.0
         )
-        host = HostStep(
-            free.reshape(count, k, 3),
-            load,
-            wrench.reshape(count, k, 3),
-            bodies.response,
-            bodies.load_response,
-        )
+        host = _host(bodies, free, load, wrench)
         step = patches.step(state, host, bodies.dt)
         yield state, host, bodies.dt, step
         state = step.state

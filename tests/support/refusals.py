@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import FrictionError, InvalidValueError
 
 
 @contextlib.contextmanager
-def refused(words: str, kind: Any = InvalidValueError) -> Iterator[None]:
+def refused(words: str | None, kind: Any = InvalidValueError) -> Iterator[Any]:
     """Expect an error of a kind, or of one of several, whose message is one line that holds a pattern."""
     with pytest.raises(kind, match=words) as caught:
-        yield
+        yield caught
     assert "\n" not in str(caught.value)
+
+
+def refusal(call: Callable, *arguments: Any, kind: Any = FrictionError) -> str:
+    """Return the line with which a call is refused."""
+    with refused(None, kind) as caught:
+        call(*arguments)
+    return str(caught.value)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import xarray as xr
 
@@ -86,3 +88,16 @@ def solution(
         "reached the end",
         of,
     )
+
+
+def run(scale: float = 1.0, **options) -> pf.Solution:
+    """Return the solution of a scene with options."""
+    return solution(scene(**options), scale=scale)
+
+
+def changed(run: pf.Solution, **values) -> pf.Solution:
+    """Return the solution with other values of some of its variables."""
+    data = run.data.assign(
+        {name: (run.data[name].dims, each) for name, each in values.items()}
+    )
+    return dataclasses.replace(run, histories=data)

@@ -69,6 +69,10 @@ REFUSED = [
         "make_scene must be a function that returns a Scene, a Scene, or a path, got 3",
     ),
     (
+        lambda: swept(bristles="some"),
+        "bristles must be one of none, all, got 'some'",
+    ),
+    (
         lambda: swept(measure=3),
         "measure must be a function of a Solution, or None, got 3",
     ),

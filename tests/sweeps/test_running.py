@@ -137,6 +137,48 @@ def test_runs_of_different_length_share_their_instants():
     assert data.sel(speed=0.1, t_end=0.05).x[6:].isnull().all()
 
 
+def slide(speed, t_end=0.03):
+    return pf.scenes.free_slide(MODEL, twist=(speed, 0.0, 0.0), t_end=t_end)
+
+
+def test_bristles_are_recorded_on_request_and_runs_without_them_do_not_count(tmp_path):
+    speeds = {"speed": [0.1, 1.0]}
+    pf.sweep(slide, speeds, out=tmp_path)
+    reports = []
+    options = {"out": tmp_path, "bristles": "all"}
+    data = pf.sweep(slide, speeds, progress=reports.append, **options)
+    assert reports[-1].found == 0
+    alone = pf.simulate(slide(1.0), bristles="all").data.bristles_table
+    there = data.bristles_table.sel(speed=1.0)
+    assert there.dims == alone.dims and there.attrs == alone.attrs
+    np.testing.assert_array_equal(there, alone)
+    assert sweeps.finished_runs(slide, speeds, **options).identical(data)
+    without = sweeps.finished_runs(slide, speeds, out=tmp_path)
+    assert "bristles_table" not in without and "missing" not in without.status
+
+
+def in_a_field(solution):
+    return pf.tactile.read(solution, points=[[0.0, 0.0], [5e-3, 0.0]])
+
+
+def test_a_measured_solution_is_kept_with_its_fields_over_common_instants(tmp_path):
+    """The slow run comes to rest before it ends, and keeps its last values."""
+    speeds, options = {"speed": [0.02, 1.0]}, {"bristles": "all", "out": tmp_path}
+    data = pf.sweep(slide, speeds, measure=in_a_field, **options)
+    slow, fast = (
+        in_a_field(pf.simulate(slide(v), bristles="all")).data for v in (0.02, 1.0)
+    )
+    assert data.status.values.tolist() == ["at rest", "success"]
+    assert len(slow.time) < len(data.time) == len(fast.time)
+    for name in ("slip_ratio_table", "displacement_table", "forces_table", "x"):
+        assert data[name].dims == ("speed", *fast[name].dims)
+        np.testing.assert_array_equal(data[name][1], fast[name])
+        np.testing.assert_array_equal(data[name][0, -1], slow[name][-1])
+    assert data.slip_ratio_table.attrs == fast.slip_ratio_table.attrs
+    again = pf.sweep(slide, speeds, measure=in_a_field, **options)
+    assert again.identical(data) and len(list(tmp_path.glob("runs-*.npz"))) == 1
+
+
 def test_values_of_any_kind_have_labels():
     def with_model(model, kind, load):
         assert type(load) is int and isinstance(model, pf.ReducedModel)
@@ -291,7 +333,9 @@ def test_progress_is_told_twice_a_second_and_at_the_end(monkeypatch):
     clock = [100.0]
     told = []
     monkeypatch.setattr(running, "time", SimpleNamespace(monotonic=lambda: clock[0]))
-    going = running.Sweeping(grip, {"grip": np.arange(8.0)}, None, None, told.append)
+    going = running.Sweeping(
+        grip, {"grip": np.arange(8.0)}, None, "none", None, told.append
+    )
     book = going.book
     book.found = 2
     book.failed = 1
@@ -522,7 +566,7 @@ def test_long_sweeps_have_few_files(tmp_path, monkeypatch):
     """A file comes after half a second and a fiftieth of the time so far, and holds the runs since the last one."""
     clock = itertools.count()
     monkeypatch.setattr(records, "monotonic", lambda: 0.1 * next(clock))
-    book = records.Bookkeeper(grid_of({"a": [1.0]}), False, tmp_path)
+    book = records.Bookkeeper(grid_of({"a": [1.0]}), tmp_path)
     for number in range(10_000):  # 1,000 s
         book.add((0,), str(number), records.Record("success", "", {}), None)
         book.flush()
@@ -757,7 +801,7 @@ def test_what_is_left_is_said_in_the_unit_that_one_would_use(seconds, words):
 
 
 def test_the_first_failure_is_that_of_the_grid_whatever_ends_first():
-    book = records.Bookkeeper(grid_of({"load": [1.0, 2.0]}), False)
+    book = records.Bookkeeper(grid_of({"load": [1.0, 2.0]}))
     for i in (1, 0):
         book.add((i,), "", records.Record(records.FAILED, f"reason {i}", {}), None)
     assert book.first_failure() == "load=1.0: reason 0"

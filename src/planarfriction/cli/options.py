@@ -65,7 +65,9 @@ class Length(click.ParamType):
         """Return the length [m]."""
         if isinstance(value, float):
             return value
-        return parse_length("--" + (param.name or "").replace("_", "-"), str(value))
+        return parse_length(
+            "--" + str(param and param.name).replace("_", "-"), str(value)
+        )
 
 
 LENGTH = Length()
@@ -138,9 +140,10 @@ def _shapes(width: float) -> dict[str, Callable[[], pf.ContactPatch]]:
     """Return the shapes that their width alone describes, by name."""
     makers = {}
     for name, make in SHAPES.items():
-        # None, in a shape of one's own.
-        first, *others = inspect.signature(make).parameters.values() or [None]
-        needed = any(each.default is each.empty for each in others)
+        # A shape of one's own may have no parameters.
+        parameters = list(inspect.signature(make).parameters.values())
+        needed = any(each.default is each.empty for each in parameters[1:])
+        first = parameters[0] if parameters else None
         if not needed and first and first.name in _PER_WIDTH:
             makers[name] = functools.partial(make, _PER_WIDTH[first.name] * width)
     return makers

@@ -57,7 +57,8 @@ def history_columns(solution: pf.Solution) -> dict[str, np.ndarray]:
     names = ("time", "x", "y", "theta", "vx", "vy", "omega")
     columns = {name: histories[name].values for name in names}
     for index, contact in enumerate(map(str, histories["contact"].values)):
-        own = dict(zip(names[4:], solution.contact_twist(contact).T, strict=True))
+        twist = solution.contact_twist(contact).T
+        own: dict[str, np.ndarray] = dict(zip(names[4:], twist, strict=True))
         for name in ("fx", "fy", "tau", "normal_force"):
             own[name] = histories[name].values[:, index]
         columns |= {f"{slug(contact)}.{name}": each for name, each in own.items()}

@@ -207,7 +207,7 @@ def _packed_anew(model: Any) -> PackedRollout:
 
 def bristles_of(model: DistributedModel) -> PackedRollout:
     """Return a `DistributedModel` at the twist of the face of its pad as compiled loops see it."""
-    cells = model.compiled.bristles
+    cells: Any = model.compiled.bristles
     at_loads = cells.at_loads
     shapes = at_loads if model.depends_on_load else at_loads(np.ones(1), False)
     return PackedRollout(

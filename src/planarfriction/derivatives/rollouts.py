@@ -364,7 +364,7 @@ def rollout_jvp(
         tangent = tangent._replace(normal_force=0.0)
     if faces.hangs(model, parameters):
         more = [
-            np.shape(each)[: max(np.ndim(each) - count, 0)]
+            np.shape(each)[: max(np.ndim(each) - count, 0)]  # pyright: ignore
             for each, count in zip((*tangent, heavier), (1, 2, 1, 1, 2), strict=True)
         ]
         path = faces.path_of(model, state, twist, normal_force, dt, given, more)

@@ -23,8 +23,8 @@ _STEP = Fixed(0)
 _SLOPES = Fixed(1)
 """Stands in place of the address of a patch's step with its slopes."""
 
-_TABLES = "radius", "stuck", "viscous", "compliance", "back", "lag"
-"""Arrays of `Patches` that are tables of the source, in their order: the first, of pads three, with faces all."""
+_TABLES = "radius", "stuck", "viscous", "pad", "compliance", "back", "lag"
+"""Arrays of `Patches` that are tables of the source, in their order: the first, of linear patches four, with faces all."""
 
 _GIVEN = "dt", "state", "new"
 """Fields of the struct in the precision of the library."""
@@ -81,11 +81,13 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
     """
     tables = {"lever_arm": np.full(patches, lever_of(model) or 1.0)}
     compiled = model.reduction.compiled
-    if pieces.pad:
-        stuck, viscous = compiled.held
+    stuck, viscous = compiled.held
+    linear = stuck.any()
+    if linear:
         tables |= {
             "stuck_stiffness": np.tile(stuck.ravel(), patches),
             "stuck_damping": np.tile(viscous.ravel(), patches),
+            "of_pad": np.full(patches, float(pieces.pad)),
         }
     if pieces.face:
         back = np.linalg.pinv(compiled.compliance, hermitian=True)
@@ -100,6 +102,7 @@ def body_of(model: Any, pieces: Pieces, precision: str, patches: int) -> dict[st
         "slope_patch",
         firsts=Array("firsts", (patches + 1,), "int", fixed=True),
         soft=Fixed(int(pieces.pad)),
+        linear=Fixed(int(linear)),
         **dict(zip(_TABLES, known, strict=False)),
     )
     own = search.patches

@@ -100,8 +100,8 @@ def _fields(record: np.dtype) -> list[str]:
     """Return the fields of a struct."""
     kinds = {
         field: ("double" if kind.base.kind == "f" else "int", kind)
-        for field, (kind, *_) in record.fields.items()
-    }  # pyright: ignore
+        for field, (kind, *_) in (record.fields or {}).items()
+    }
     return [
         f"{own} {field}{f'[{np.prod(kind.shape)}]' if kind.shape else ''};"
         for field, (own, kind) in kinds.items()
@@ -192,7 +192,7 @@ def export_c(
     """
     checked_name(name)
     validation.choice("precision", precision, PRECISIONS)
-    validation.count("patches", patches, 1, MOST_PATCHES)
+    patches = validation.count("patches", patches, 1, MOST_PATCHES)
     validation.instance("casadi", casadi, bool, "True or False")
     if (casadi or controller is not None) and precision != "double":
         raise InvalidValueError(

@@ -262,7 +262,14 @@ class _Problem:
 
         low, high = self.bounds
         x = np.clip(x, low + 1e-6, high - 1e-6)
-        fit = least_squares(misfit, x, slopes, self.bounds, xtol=1e-5, max_nfev=30)
+        fit = least_squares(
+            misfit,
+            x,
+            slopes,  # pyright: ignore[reportArgumentType]
+            self.bounds,
+            xtol=1e-5,
+            max_nfev=30,
+        )
         return fit.x, self._slopes(fit.x), self.wrenches(fit.x) - self.measured
 
     def _slopes(self, x: np.ndarray) -> np.ndarray:

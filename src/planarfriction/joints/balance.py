@@ -136,7 +136,8 @@ def refine(
     names = names_of(terms, late)
     # an asymmetric level and an offset of the torque are one number
     offset = start.get("torque_offset", start.get("asymmetry", 0.0))
-    known = {"torque_offset": offset, "asymmetry": offset, "delay": 0.0} | start
+    defaults = {"torque_offset": offset, "asymmetry": offset, "delay": 0.0}
+    known = {**defaults, **start}
     values = {name: known[name] for name in names}
     reversing = np.concatenate([each.reversing for each in rows])
     sizes = np.ones(2) if scatter is None else scatter

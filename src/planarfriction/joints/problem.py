@@ -119,7 +119,7 @@ def least(
     found = least_squares(
         lambda x: at(x.tobytes()).copy(),
         np.clip(x, *ends) if bounded else x,
-        lambda x: slopes(errors, by_name(x), names, at(x.tobytes())),
+        lambda x: slopes(errors, by_name(x), names, at(x.tobytes())),  # pyright: ignore[reportArgumentType]
         ends if bounded else (-np.inf, np.inf),
         **{"x_scale": "jac", "ftol": FINE, **settings},
     )
@@ -224,9 +224,9 @@ class JointFitProblem:
         drive = log.drive
         servo = (0.0, 0.0, 0.0)
         if log.voltage is None and drive is not None:
-            servo = drive.kp * drive.gain, drive.supply, drive.sag
+            servo = drive.kp * drive.gain, drive.supply, drive.sag  # pyright: ignore
         return PlantNumbers(
-            max(plant.inertia + plant.pendulum_inertia, LEAST_INERTIA),
+            max(plant.inertia + plant.pendulum_inertia, LEAST_INERTIA),  # pyright: ignore[reportOptionalOperand]
             plant.moment,
             plant.offset,
             values.get("torque_gain", self.torque_gain or 0.0),

@@ -147,7 +147,7 @@ def kernel_width(logs: Sequence[EvenLog]) -> float:
     width = max(
         1.5 * slowest, 3e-3, min(0.02 * speed / max(acceleration, 1e-300), WIDEST)
     )
-    power = np.mean([log.power for log in logs])
+    power = float(np.mean([log.power for log in logs]))
     while width < WIDEST:
         found = [derivatives(log, width) for log in logs]
         moved, bent = (
@@ -190,7 +190,7 @@ def scales(logs: Sequence[EvenLog], width: float) -> Scales:
     A Gaussian keeps the instant at which a steadily accelerated joint turns round, so the speed of slow motion may go
     through a wider kernel, whose noise is smaller.
     """
-    power = np.mean([log.power for log in logs])
+    power = float(np.mean([log.power for log in logs]))
     resolution = max(log.resolution for log in logs)
 
     def sure(width: float) -> float:

@@ -111,7 +111,7 @@ class FrictionModel(ByValue):
         """Return the state of a contact at rest with the `deflections` `[2, N]` [m] of its cells under a load > 0 [N].
 
         Those of a patch of discs are `[3, N]`. The wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`,
-        whichever state variables a model uses.
+        whichever state variables a model uses; the face of a pad is displaced by it.
 
         Raises InvalidValueError for deflections of another shape, a load that is not > 0, and a model that cannot start
         with a load.
@@ -405,6 +405,17 @@ def refuse_common(model: FrictionModel, by: str) -> None:
     if pad is not None and model.compiled.compliance is not None:
         rule = f"have no common compliance for {by}, which has none"
         raise InvalidValueError("pad", rule, type(pad).__name__)
+
+
+def hung(model: FrictionModel, bristles: np.ndarray) -> np.ndarray:
+    """Return the state of a model at rest with bristles `[d, N]` of its reduction, whose load displaces the face."""
+    few = model.reduction
+    common = model.compiled.compliance
+    if few.pad is None or common is None:
+        return bristles
+    pieces = few.pad.pieces(few.patch, few.law)
+    load = np.einsum("n,nda,dn->a", pieces, few.patch.levers(), bristles)
+    return np.append(bristles, common @ load)
 
 
 def lever_of(model: FrictionModel) -> float:

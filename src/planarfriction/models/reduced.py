@@ -18,7 +18,7 @@ from planarfriction.laws.base import is_rate_law, refuse_rate_law
 from planarfriction.models.base import (
     FrictionModel,
     ModelJacobians,
-    refuse_common,
+    hung,
 )
 from planarfriction.models.cell_loads import Cells, in_time
 from planarfriction.models.distributed import DistributedModel
@@ -134,14 +134,13 @@ class ReducedModel(FrictionModel):
         return changed
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
-        refuse_common(self, "a start under load")
         few = self.reduction
         if self.pad is None:
             stiff = self.patch.weights(load), few.patch.weights(load)
         else:
             pieces = few.pad.pieces(few.patch, self.law)  # pyright: ignore
             stiff = self.pad.pieces(self.patch, self.law), pieces
-        return _of_discs(few.patch, self.patch, deflections, *stiff)
+        return hung(self, _of_discs(few.patch, self.patch, deflections, *stiff))
 
 
 def _of_discs(

@@ -124,7 +124,8 @@ class Hold(GripController):
     ) -> None:
         from scipy.special import ndtri
 
-        if not 0.0 < validation.number("probability", probability) < 0.5:
+        probability = validation.number("probability", probability)
+        if not 0.0 < probability < 0.5:
             raise InvalidValueError("probability", "be between 0 and 0.5", probability)
         explore = validation.non_negative("explore", explore)
         super().__init__(

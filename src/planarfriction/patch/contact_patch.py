@@ -75,7 +75,7 @@ class ContactPatch(ByValue):
 
     positions: np.ndarray = checked(validation.array, (None, 2))
     """Positions of the cells (centroids of their parts inside the patch), shape `[N, 2]` [m]."""
-    areas: np.ndarray
+    areas: np.ndarray  # pyright: ignore[reportGeneralTypeIssues]
     """Areas of the cells inside the patch, shape `[N]` [m^2]."""
     pressure: Any = field(default_factory=Uniform)
     """Pressure law."""
@@ -677,6 +677,6 @@ class ContactPatch(ByValue):
             grid = Grid(**grid)
         given = {key: data.get(key) for key in ("positions", "areas", *options)}
         name = data.get("name", "patch")
-        patch = cls(**given, pressure=pressure, grid=grid, name=name)
+        patch = cls(**given, pressure=pressure, grid=grid, name=name)  # pyright: ignore[reportArgumentType]
         outline = outlines.outline_from_dict(data.get("outline"))
         return outlines.with_outline(patch, outline)

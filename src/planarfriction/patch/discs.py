@@ -123,7 +123,7 @@ def _few_discs(patch: ContactPatch, n: int) -> tuple[ContactPatch, Membership]:
     radii = np.concatenate([part.radii for part in parts]) / ratio[first]
     shared = SharedPressure(cells, members, parted, begins, radii)
     areas = shared.sums(cells.areas)
-    fields = {"radii": radii}
+    fields: dict[str, Any] = {"radii": radii}
     # One for all discs if they are of one kind.
     chosen = first if len(groups) > 1 else first[0]
     if cells.metric is not None:

@@ -35,11 +35,12 @@ def finer(patch: ContactPatch, parts: int, name: str = "parts") -> ContactPatch:
     times = len(inside)
     (width, height) = patch.cell_size or (0.0, 0.0)
     # What each cell has is repeated.
-    fields = {"radii": np.repeat(patch.radii / parts, times)}
+    fields: dict[str, Any] = {"radii": np.repeat(patch.radii / parts, times)}
     for name, axes in (("metric", 2), ("asymmetry", 1)):
         value = getattr(patch, name)
-        per_cell = value is not None and value.ndim > axes
-        fields[name] = np.repeat(value, times, axis=0) if per_cell else value
+        if value is not None and value.ndim > axes:
+            value = np.repeat(value, times, axis=0)
+        fields[name] = value
     positions = patch.positions[:, None] + inside * extent[:, None]
     areas = np.repeat(patch.areas / times, times)
     positions = positions.reshape(-1, 2)

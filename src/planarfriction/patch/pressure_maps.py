@@ -128,13 +128,14 @@ def read_maps(
         return values.ravel(), values.shape, name
     loads = validation.array("loads", loads, (None,))
     several = hasattr(pressure, "__len__") and not isinstance(pressure, (str, Path))
-    count = len(pressure) if several else 1
+    given: Any = pressure if several else [pressure]
+    count = len(given)
     if not several or count != len(loads):
         rule = f"have one map for each of {len(loads)} loads"
         raise InvalidValueError("pressure", rule, count)
-    maps = [_one_map(each, reading) for each in pressure]
+    maps = [_one_map(each, reading) for each in given]
     shape = maps[0][0].shape if maps else (0, 0)
-    for each, (values, _) in zip(pressure, maps, strict=True):
+    for each, (values, _) in zip(given, maps, strict=True):
         if values.shape != shape:
             rule = f"have the shape of the first, {list(shape)}"
             raise InvalidValueError(_what(each), rule, list(values.shape))

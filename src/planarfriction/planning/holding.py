@@ -209,7 +209,7 @@ def dynamic_holding_load(
         moved = np.array([data[name][-1] for name in ("x", "y", "theta")])
         dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(low))
         way = np.hypot(dx, dy) + model.patch.contact_radius(low) * abs(theta)
-        stiffer = softening(model, low).min()
+        stiffer = softening(model, np.array(low)).min()
         bends = law.numbers.mu_s / (law.numbers.sigma_0 * stiffer)
         return way > bends + SLIP
 

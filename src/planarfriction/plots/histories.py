@@ -95,7 +95,9 @@ def plot_histories(
         rule = f"name at least one of {', '.join(_PANELS)}"
         raise InvalidValueError("panels", rule, panels)
     if axes is not None:
-        drawn = list(np.ravel(np.asarray(axes, dtype=object)))
+        if isinstance(axes, np.ndarray) and axes.dtype == object:
+            axes = axes.ravel().tolist()
+        drawn = axes if isinstance(axes, list | tuple) else [axes]
         for each in drawn:
             style.check_axes("axes", each, size)
         if len(drawn) != len(chosen):
@@ -214,8 +216,13 @@ def _lines(runs: Mapping[str, xr.Dataset], name: str) -> list[_Line]:
     """Return one line of a panel for each run, or for each contact of each run."""
     lines = []
     for run, data in enumerate(runs.values()):
-        found = np.hypot(data["vx"], data["vy"]) if name == "speed" else data[name]
-        values = found.values.reshape(data.sizes["time"], -1)
+        speed = name == "speed"
+        found = (
+            np.hypot(data["vx"].values, data["vy"].values)
+            if speed
+            else data[name].values
+        )
+        values = found.reshape(data.sizes["time"], -1)
         lines += [
             _Line(run, contact, data["time"].values, each)
             for contact, each in enumerate(values.T)

@@ -118,7 +118,7 @@ def sections(surface: Any) -> list[np.ndarray]:
     found = []
     for i, j in PLANES:
         # Lines of the mesh on which the third component is 0, as places (column, row) between its points.
-        lines = contour_generator(z=points[..., 3 - i - j]).lines(0.0)
+        lines: Any = contour_generator(z=points[..., 3 - i - j]).lines(0.0)
         cut = np.concatenate([_between(points[..., [i, j]], line) for line in lines])
         cut = cut[np.argsort(np.arctan2(cut[:, 1], cut[:, 0]))]
         found.append(np.concatenate([cut, cut[:1]]))

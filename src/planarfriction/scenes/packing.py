@@ -308,9 +308,14 @@ class SegmentBatches:
     def _flat(self, states: list[np.ndarray]) -> np.ndarray:
         """Return states `[K, *state_shape]` of the contacts as the solver has them, `[K, n]`."""
         parts = []
-        for state, model in zip(states, self.models, strict=True):
-            some = state if model.cells is None else state[..., model.cells]
-            flat = some.reshape(len(some), -1)
+        every = zip(states, self.models, self._contacts.bristle, strict=True)
+        for state, model, each in every:
+            flat = state.reshape(len(state), -1)
+            if model.cells is not None:
+                shape = len(state), each, len(model.cells)
+                z, face = np.split(flat, [each * len(model.cells)], axis=1)
+                z = z.reshape(shape)[..., model.cells]
+                flat = np.hstack([z.reshape(len(state), -1), face])
             # Behind the bristles, the place of a pressure that follows the load.
             parts.append(np.pad(flat, ((0, 0), (0, model.states - flat.shape[1]))))
         return np.hstack(parts)
@@ -346,8 +351,9 @@ class SegmentBatches:
         for c, contact in enumerate(self._scene.contacts):
             between = self._between[c]
             if between is None:
+                model = old[c] if old else None
                 self.models.append(
-                    old[c] if old else packed_contact(contact, [None], None, outline)
+                    model or packed_contact(contact, [None], None, outline)
                 )
                 rows.append(np.zeros(len(pieces), np.int64))
                 continue

@@ -11,6 +11,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.geometry import twist_at
 from planarfriction.models.base import softening
+from planarfriction.pads import HalfSpace
 
 if TYPE_CHECKING:
     from planarfriction.models import DistributedModel
@@ -21,6 +22,9 @@ SLIPS = 0.5
 
 INCIPIENT = 0.1
 """Share of the load on cells that slip above which a contact slips partly [-]."""
+
+INCIPIENT_HALF_SPACE = 0.06
+"""The same of the pieces of a half-space [-]: without forces that concentrate where they stick, they slip later."""
 
 AT_REST = 1e-3
 """Share of the largest deflection: a cell that moves less than that between two frames counts as resting [-]."""
@@ -80,7 +84,8 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
     )
     radius = reach(contact.model.patch)
     least = contact.model.law.largest_deflection
-    partly = _stretches(time, slipping - INCIPIENT)
+    thick = isinstance(getattr(contact.model, "pad", None), HalfSpace)
+    partly = _stretches(time, slipping - (INCIPIENT_HALF_SPACE if thick else INCIPIENT))
     events = []
     for onset, end in _stretches(time, above):
         path, angle = (
@@ -112,7 +117,7 @@ def slip_shares(
     args = twists[loaded], loads[loaded]
     motion = model.rate(np.zeros_like(states[loaded]), *args)
     rate = model.rate(states[loaded], *args)
-    few = getattr(model, "reduction", None)
+    few: Any = getattr(model, "reduction", None)
     of_cells = isinstance(few, MODELS["distributed"])
     if of_cells:
         motion, _ = parted(few, motion)

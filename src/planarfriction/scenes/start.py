@@ -75,9 +75,9 @@ def _states(
 ) -> list[np.ndarray]:
     """Return the states `[K, *state_shape]` of each contact with deflections `[K, n, 3]` of the cells of all."""
     found = []
-    parts = np.split(deflections, np.cumsum(sizes)[:-1], axis=1)
+    parts = np.split(deflections, np.cumsum(sizes), axis=1)[:-1]
     for contact, part, load in zip(scene.contacts, parts, shaped, strict=True):
-        model = contact.model
+        model = contact.model.reduction
         states = [
             model.state_of(row.T[: model.patch.bristles], load)
             if load > 0.0
@@ -129,10 +129,13 @@ def _carried(body: Any, contact: Any) -> np.ndarray:
 
 
 class _BristleField(NamedTuple):
-    """The cells of all contacts."""
+    """The cells of all contacts, and behind them the springs by which faces of pads hang.
+
+    A motion `[m]` is that of the body `[3]`, then of the springs of each face.
+    """
 
     levers: np.ndarray
-    """Jacobian of the displacement of each cell by a small motion of the body, `[n, 3, 3]`."""
+    """Jacobian of the displacement of each cell by a small motion, `[n, 3, m]`."""
     stiffness: np.ndarray
     """`count f_N w_i sigma_0`, or that of the pieces of a pad, `[n]` [N/m]."""
     largest: np.ndarray
@@ -143,7 +146,7 @@ class _BristleField(NamedTuple):
     """True for pieces of a pad, whose stiffness does not grow with the load, bool `[n]`."""
 
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deflections `[n, 3]` after a small motion of the body, and slopes `[n, 3, 3]` by the stretch."""
+        """Return the deflections `[n, 3]` after a small motion, and slopes `[n, 3, 3]` by the stretch."""
         shift = self.levers @ motion - self.middle
         length = _lengths(shift)
         over = length > self.largest
@@ -155,11 +158,11 @@ class _BristleField(NamedTuple):
         return self.middle + share[:, None] * shift, slope
 
     def load(self, deflections: np.ndarray) -> np.ndarray:
-        """Return the load on the body `[3]` that deflections `[n, 3]` hold."""
+        """Return the load `[m]` on body and springs that deflections `[n, 3]` hold."""
         return np.einsum("n,nij,ni->j", self.stiffness, self.levers, deflections)
 
     def stiff(self, slope: np.ndarray) -> np.ndarray:
-        """Return the stiffness `[3, 3]` against the motion if bristles bend by `slope` `[n, 3, 3]` of a stretch."""
+        """Return the stiffness `[m, m]` against the motion if bristles bend by `slope` `[n, 3, 3]` of a stretch."""
         forces = self.stiffness[:, None, None] * (slope @ self.levers)
         return np.tensordot(self.levers, forces, axes=((0, 1), (0, 1)))
 
@@ -175,7 +178,8 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
 
     None is bent further than it can be, and of all bristles that carry the load these store the least energy: with
     `zhat(d)` the nearest to `B_i d` that a bristle can be, the motion d makes `int sum k_i zhat_i dB_i d - P.d` least.
-    That is the rule by which contacts share what statics leaves open.
+    That is the rule by which contacts share what statics leaves open. A face with the compliance `C = R R'` against its
+    back is displaced by `B_i (d - R s)`, with the energy `s.s/2` of springs s.
     """
     cells, sizes, pull = _held_by(scene, loads, shaped)
     bent = cells.bent(_least_energy(cells, pull))[0]
@@ -185,24 +189,48 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
 def _held_by(
     scene: Any, loads: np.ndarray, shaped: np.ndarray
 ) -> tuple[_BristleField, list[int], np.ndarray]:
-    """Return the cells of all contacts, the number of each contact's, and the load on the body that they hold."""
+    """Return the cells of all contacts, the number of each contact's, and the load that they hold."""
     for contact in scene.contacts:
         if not contact.model.law.holds_at_rest:
             raise InvalidValueError(
                 "start", "be 'rest' or 'sliding' with a law that creeps", scene.start
             )
+    soft = [each.model.compiled.compliance for each in scene.contacts]
+    faces = sum(each is not None for each in soft)
+    body, *springs = np.eye(3 + 3 * faces).reshape(1 + faces, 3, -1)
+    springs = np.reshape(springs, (faces, 3, 3 + 3 * faces))
+    free = iter(springs)
+    fields = []
+    counts = []
+    every = zip(scene.contacts, loads, shaped, soft, strict=True)
+    for contact, load, shape, common in every:
+        moved = contact_map(scene, contact) @ body
+        if common is not None:
+            size, axes = np.linalg.eigh(common)
+            moved -= axes * np.sqrt(np.maximum(size, 0.0)) @ next(free)
+            counts.append(float(contact.count))
+        fields.append(_cells_of(contact, load, shape, moved))
+    hung = _BristleField(
+        springs,
+        np.array(counts),
+        np.full(faces, np.finfo(float).max),
+        np.zeros((faces, 3)),
+        np.full(faces, True),
+    )
+    sizes = [len(each.stiffness) for each in fields]
+    whole = _BristleField(*map(np.concatenate, zip(*fields, hung, strict=True)))
     pull = pull_on(scene, scene.body, 0.0)
-    every = zip(scene.contacts, loads, shaped, strict=True)
-    fields = [_cells_of(scene, *each) for each in every]
-    whole = _BristleField(*map(np.concatenate, zip(*fields, strict=True)))
-    return whole, [len(each.stiffness) for each in fields], pull
+    return whole, sizes, np.append(pull, np.zeros(3 * faces))
 
 
-def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleField:
-    model = contact.model
+def _cells_of(
+    contact: Any, load: float, shaped: float, moved: np.ndarray
+) -> _BristleField:
+    """Return the cells of a contact, whose face follows motions by `moved` `[3, m]`."""
+    model = contact.model.reduction
     patch = model.patch
     law = model.law.numbers
-    levers = patch.levers() @ contact_map(scene, contact)
+    levers = patch.levers() @ moved
     # Points do not spin.
     levers = np.pad(levers, ((0, 0), (0, 3 - levers.shape[1]), (0, 0)))
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
@@ -221,7 +249,7 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
 
 
 def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:
-    """Return the motion `[3]` after which bristles carry a load `[3]`; raises where none does."""
+    """Return the motion `[m]` after which bristles carry a load `[m]`; raises where none does."""
     elastic = np.einsum("n,nia,nib->ab", cells.stiffness, cells.levers, cells.levers)
     # Stiffness of smaller loads has too few digits to divide by.
     carries = np.diagonal(elastic) > np.finfo(float).tiny
@@ -293,7 +321,7 @@ def _bent_to_the_end(
 
 def _held(cells: _BristleField, pull: np.ndarray, motion: np.ndarray) -> float | None:
     """Return a bound below 1 on the share of the load that friction holds, if a motion proves it, or None."""
-    shift = cells.levers @ motion
+    shift = cells.levers[..., :3] @ motion[:3]  # of faces like the body
     power = float(pull @ motion)
     most = (
         cells.stiffness

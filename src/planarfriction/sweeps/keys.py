@@ -67,8 +67,8 @@ def name_of(measure: Any, kept: bool) -> str:
 class Keys:
     """Keys of runs, whose models are shared: of equal ones every scene gets the first, with all that it has built."""
 
-    def __init__(self, measure: Any, kept: bool) -> None:
-        self._common = [LAYOUT, library_version(), name_of(measure, kept)]
+    def __init__(self, measure: Any, kept: bool, bristles: str = "none") -> None:
+        self._common = [LAYOUT, library_version(), name_of(measure, kept), bristles]
         self._kept = kept
         self._models: dict[str, Any] = {}
         """First models by their digests."""

@@ -42,13 +42,14 @@ class Record(NamedTuple):
     """Reason of a failure in one line, or nothing."""
     variables: dict[str, History]
     """Measured variables by name."""
-    end: float = 0.0
-    """Time at which the run was to end [s]."""
+    end: float | None = None
+    """Time at which a run whose result is a `Solution` was to end [s]."""
 
 
 def run(
     scene: Scene,
     measure: Callable[[Solution], Any] | None,
+    bristles: str = "none",
     stopped: Callable[[], bool] | None = None,
 ) -> Record:
     """Simulate a scene and measure it, in any thread or process; errors become part of the record."""
@@ -60,12 +61,15 @@ def run(
 
     where = ""
     try:
-        solution = simulate(scene, progress=check)
+        solution = simulate(scene, bristles=bristles, progress=check)
         where = "measure: "
-        found = solution.histories if measure is None else measure(solution)
-        return Record(solution.status, "", variables(found, measure), scene.t_end)
+        found = solution if measure is None else measure(solution)
+        if isinstance(found, Solution):
+            named = variables(found.histories)
+            return Record(solution.status, "", named, scene.t_end)
+        return Record(solution.status, "", variables(found, measure))
     except Exception as error:
-        return Record(FAILED, f"{where}{reason_of(error)}", {}, scene.t_end)
+        return Record(FAILED, f"{where}{reason_of(error)}", {})
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +78,7 @@ class Batch:
 
     scenes: list[Scene]
     measure: Callable[[Solution], Any] | None
+    bristles: str
     stopped: Callable[[], bool] | None = None
     """Return True if nobody waits for the results any longer."""
 
@@ -88,7 +93,7 @@ def run_all(batch: Batch) -> tuple[list[Record], float]:
     found = []
     with contextlib.suppress(Stopped):
         for scene in batch.scenes:
-            found.append(run(scene, batch.measure, batch.stopped))
+            found.append(run(scene, batch.measure, batch.bristles, batch.stopped))
             if monotonic() - begin > TURN:
                 break
     return found, monotonic() - begin
@@ -229,11 +234,8 @@ class Bookkeeper:
     by the digest of its content, so that any number of sweeps write to one folder, and damage is seen.
     """
 
-    def __init__(
-        self, grid: ValueGrid, timed: bool, path: str | Path | None = None
-    ) -> None:
+    def __init__(self, grid: ValueGrid, path: str | Path | None = None) -> None:
         self.grid = grid
-        self.timed = timed
         self.runs: dict[Index, tuple[str, Record]] = {}
         """Keys and records of the runs that have been done."""
         self.found = self.new = self.failed = self.damaged = 0
@@ -327,8 +329,9 @@ class Bookkeeper:
         done = sorted(index for index, (_, each) in self.runs.items() if each.variables)
         if not done:
             return {}
-        time = instants(self._ends) if self.timed else None
-        first = over(self.runs[done[0]][1], time)
+        first = self.runs[done[0]][1]
+        time = None if first.end is None else instants(self._ends)
+        first = over(first, time)
         check_names(self.grid, first)
         columns: dict[str, dict[Index, Any]] = {
             name: {} for name, each in first.items() if each.dims != (name,)
@@ -397,7 +400,7 @@ def over(record: Record, time: np.ndarray | None) -> dict[str, History]:
 
     A body that came to rest keeps its last values until its run would have ended.
     """
-    if time is None:
+    if time is None or record.end is None:
         return record.variables
     own = np.asarray(record.variables["time"].values)
     at = np.searchsorted(time, own - SAME_TIME)

@@ -25,6 +25,7 @@ from planarfriction._support import validation
 from planarfriction._support.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene, Solution
+from planarfriction.scenes.simulation import BRISTLES
 from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.records import (
     FAILED,
@@ -107,6 +108,7 @@ def sweep(
     *,
     out: str | Path | None = None,
     executor: Executor | None = None,
+    bristles: str = "none",
     measure: Callable[[Solution], Any] | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> xr.Dataset:
@@ -132,11 +134,14 @@ def sweep(
         Folder that keeps the runs in files; None to keep nothing.
     executor
         Any `concurrent.futures.Executor`; by default threads, one for each processor.
+    bristles
+        "all" records the state of each contact too, as `simulate` does.
     measure
         Function of a Solution that returns what the dataset should contain: a number, a mapping from names to numbers,
-        texts or arrays, or an xarray object; with `out`, a function that is defined with a name. By default everything
-        in `Solution.data`, at all instants that any of the runs records: NaN where a run has no value, and its last
-        values after its body has come to rest.
+        texts or arrays, an xarray object, or a Solution, such as `tactile.read` adds fields to; with `out`, a function
+        that is defined with a name. By default the Solution as it is. Of a Solution, the dataset has all `data`, at all
+        instants that any of the runs records: NaN where a run has no value, and its last values after its body has come
+        to rest.
     progress
         Called with a `Progress` from time to time; `print` is enough.
 
@@ -155,7 +160,7 @@ def sweep(
         validation.instance(
             "executor", executor, Executor, "a concurrent.futures.Executor, or None"
         )
-    sweeping = Sweeping(make_scene, values, out, measure, progress)
+    sweeping = Sweeping(make_scene, values, out, bristles, measure, progress)
     if isinstance(executor, ProcessPoolExecutor):
         try:
             pickle.dumps(measure)
@@ -182,6 +187,7 @@ def finished_runs(
     values: Mapping[str, Any],
     *,
     out: str | Path,
+    bristles: str = "none",
     measure: Callable[[Solution], Any] | None = None,
 ) -> xr.Dataset:
     """Return the dataset of the runs that are in the folder of a `sweep` by now; `status` is "missing" for the others.
@@ -190,7 +196,7 @@ def finished_runs(
 
     Raises InvalidValueError for an argument that breaks its rule, and FileError for a folder that cannot be written.
     """
-    sweeping = Sweeping(make_scene, values, out, measure, None)
+    sweeping = Sweeping(make_scene, values, out, bristles, measure, None)
     for _ in sweeping.jobs():
         pass
     return sweeping.book.dataset()
@@ -200,7 +206,13 @@ class Sweeping:
     """Sweep in progress: hands out the runs and gives their results to the bookkeeper."""
 
     def __init__(
-        self, make_scene: Any, values: Any, out: Any, measure: Any, report: Any
+        self,
+        make_scene: Any,
+        values: Any,
+        out: Any,
+        bristles: Any,
+        measure: Any,
+        report: Any,
     ) -> None:
         """Check the arguments of a sweep, and prepare it."""
         self.grid = grid = grid_of(values)
@@ -228,7 +240,8 @@ class Sweeping:
                 raise InvalidValueError(
                     name, f"be a function of a {of}, or None", given
                 )
-        self._keys = Keys(measure, kept=out is not None)
+        self._bristles = validation.choice("bristles", bristles, BRISTLES)
+        self._keys = Keys(measure, out is not None, self._bristles)
         self._measure = measure
         self._report = report
         if out is not None and not str(validation.path("out", out)).isprintable():
@@ -241,7 +254,7 @@ class Sweeping:
                 "be a folder (the dataset becomes a zarr store by its own method: data.to_zarr(path, zarr_format=2))",
                 str(out),
             )
-        self.book = Bookkeeper(grid, measure is None, out)
+        self.book = Bookkeeper(grid, out)
         self._ended = ""
         self._size = 1
         self._begin = self._reported = time.monotonic()
@@ -290,9 +303,8 @@ class Sweeping:
                 if batch:
                     try:
                         scenes = [scene for *_, scene in batch]
-                        future = executor.submit(
-                            run_all, Batch(scenes, self._measure, stopped)
-                        )
+                        given = self._measure, self._bristles, stopped
+                        future = executor.submit(run_all, Batch(scenes, *given))
                     except RuntimeError as error:  # broken, or shut down
                         raise SweepError(_ENDED.format(reason_of(error))) from None
                     pending[future] = batch

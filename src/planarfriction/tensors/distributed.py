@@ -73,7 +73,7 @@ def _bristle(xp, name: str, law: Any, shape: Cells, z, u, load, *dt):
     # The source of discs names components.
     vector = Vector if kind.element.size == 2 else split
     if kind.leans:
-        law = Leaning(law, Vector(shape.levers[-2:]))
+        law = Leaning(law, Vector(shape.levers[-2:]))  # pyright: ignore[reportArgumentType]
     elif kind.pad:
         law = Elastic(law, shape.stiff, shape.weights * load)
     found = xp.over(getattr(kind.element, name))(law, vector(z), vector(u), *dt)

@@ -54,9 +54,13 @@ def shape_of(
 ) -> PublishedShape:
     """Return the shape of a patch at the load of `surface`, and with None the published table's."""
     when = "keep" if surface is not None else "rebuild"
-    return models.ReducedModelPublished(
-        patch, law, surface, on_load_change=when
-    ).shapes.reference  # pyright: ignore
+    model = models.ReducedModelPublished(
+        patch,
+        law,
+        surface,  # pyright: ignore[reportArgumentType]
+        on_load_change=when,
+    )
+    return model.shapes.reference
 
 
 def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:

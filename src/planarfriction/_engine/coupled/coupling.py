@@ -79,6 +79,9 @@ ROUNDING = 1e-13
 NOISE = 1e-14
 """Difference of a twist from that which wrenches cause, in the sum of what they add, that is their rounding."""
 
+LIGHTNESS = 1e-3
+"""Speed [m/s] for which the whole load of a patch counts if it is wrong: a millionth of it is the usual tolerance."""
+
 PRECISION = 1e-9
 """Error of a twist, in the largest speed that goes into it, with which a step has converged."""
 
@@ -122,7 +125,7 @@ def _host(patches: Patches, p: ContactSolve) -> None:
 def _misfit(patches: Patches, p: ContactSolve) -> float:
     """Return the difference of the twists and loads from those that the models' wrenches there cause [m/s].
 
-    A load counts as the speed that all of it would cause as friction.
+    A load counts as the speed that all of it would cause as friction, and where it causes hardly any, by its share.
     """
     n = 3 * patches.count
     w = p.change
@@ -134,6 +137,10 @@ def _misfit(patches: Patches, p: ContactSolve) -> float:
         missing = (
             xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
         )
+        if missing != 0.0:
+            share = abs(missing) / (p.load[k] + abs(missing))
+            finite = finite and xp.is_finite(share)
+            largest = xp.maximum(largest, LIGHTNESS * share)
         for i in range(3 * k, 3 * k + 3):
             gap = abs(_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
             if i == 3 * k + 2:
@@ -317,17 +324,35 @@ def _largest_speed(patches: Patches, p: ContactSolve) -> float:
 
 
 @kernel
-def _start(patches: Patches, p: ContactSolve, tolerance: float) -> tuple[float, bool]:
-    """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
+def _start(
+    patches: Patches, p: ContactSolve, tolerance: float, careful: bool
+) -> tuple[float, bool]:
+    """Step at the best of the twists that the wrenches cause, of rest, and of those that the bristles' wrenches cause.
+
+    The bristles' wrenches, as they are at rest, stand in for a guess. Return the misfit, and True for rest.
+    """
+    n = 3 * patches.count
     _host(patches, p)
     step_all(patches, p)
     misfit = _misfit(patches, p)
     if misfit > NEAR * tolerance:
-        clear(p.twist, 3 * patches.count)
+        clear(p.twist, n)
         step_all(patches, p)
         at_rest = _misfit(patches, p)
         if at_rest <= misfit:
             return at_rest, True
+        guessed = careful
+        for i in range(n):
+            guessed = guessed or p.wrench[i] != 0.0
+        if not guessed:
+            for i in range(n):
+                p.wrench[i] = p.load[i // 3] * p.unit[i]
+            _host(patches, p)
+            step_all(patches, p)
+            moving = _misfit(patches, p)
+            if moving < misfit:
+                return moving, False
+            clear(p.wrench, n)
         _host(patches, p)
         step_all(patches, p)
     return misfit, False
@@ -378,12 +403,13 @@ def restrain(patches: Patches, p: ContactSolve) -> bool:
 
 @kernel
 def _stick(patches: Patches, p: ContactSolve) -> None:
-    """Write the slopes of pads that stick all over."""
+    """Write the slopes of patches that stick all over; the stiffness of a pad does not grow with its load."""
     for k in range(patches.count):
+        per = p.dt[0]
+        if patches.pad[k] != 0:
+            per = p.dt[0] / p.load[k] if p.load[k] > 0.0 else 0.0
         for i in range(9 * k, 9 * k + 9):
-            elastic = p.dt[0] * patches.stuck[i]
-            per = 1.0 / p.load[k] if p.load[k] > 0.0 else 0.0
-            p.unit_slopes[i] = -per * elastic - patches.viscous[i]
+            p.unit_slopes[i] = -per * patches.stuck[i] - patches.viscous[i]
 
 
 @kernel
@@ -391,10 +417,10 @@ def _search(
     patches: Patches, p: ContactSolve, tolerance: float, most: int, careful: bool
 ) -> tuple[float, bool]:
     """Write the twists and loads of the least misfit; return that, and True if states and wrenches are those there."""
-    misfit, rest = _start(patches, p, tolerance)
+    misfit, rest = _start(patches, p, tolerance, careful)
     best = math.inf
     known = False
-    if patches.soft > 0:
+    if patches.linear > 0:
         known = rest and not careful
         if known:
             _stick(patches, p)
@@ -415,8 +441,7 @@ def _search(
         _go(patches, p, keep_loads, rest, careful)
         rest = False
         misfit = _misfit(patches, p)
-        if patches.soft > 0:
-            known = misfit <= SHARP * best and not careful
+        known = patches.soft > 0 and misfit <= SHARP * best and not careful
     if not misfit <= best:
         _copy(patches, p.best_twist, p.best_load, p.twist, p.load)
     return best, misfit <= best

@@ -188,10 +188,12 @@ class Patches(NamedTuple):
     """1 of pads, whose bristles see their loads; 0 of others, [k]."""
     soft: int
     """1 if all of them are pads, else 0."""
+    linear: int
+    """1 if the slopes of all patches that stick are known, else 0."""
     stuck: Doubles
-    """Stiffnesses of the bristles of pads while all of them stick, [k, 9]; 0 of others."""
+    """Stiffnesses of the bristles while all of them stick, of pads, and per unit load of others, [k, 9]."""
     viscous: Doubles
-    """Viscous friction of these per unit load, [k, 9]."""
+    """Damping of these per unit load, [k, 9]."""
     bristle: Integers
     """Components of the bristles of each patch, [k]."""
     compliance: Doubles

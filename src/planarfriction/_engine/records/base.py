@@ -93,7 +93,10 @@ class CompiledModel:
 
     @property
     def held(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness of the bristles of a pad that sticks, and viscous friction per unit load, `[3, 3]` each."""
+        """Stiffness of bristles that all stick, of a pad, or per unit load, and damping per unit load, `[3, 3]` each.
+
+        Zeros if they are not known.
+        """
         return np.zeros((3, 3)), np.zeros((3, 3))
 
     rollouts: Any = None

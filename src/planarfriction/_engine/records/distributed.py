@@ -66,13 +66,16 @@ class CompiledDistributed(CompiledModel):
     @property
     def held(self) -> tuple[np.ndarray, np.ndarray]:
         """See `CompiledModel`."""
-        if self.stiff is None:
+        if self.stiff is None and self.depends_on_load:
             return super().held
         law = self.law.numbers
         levers = self.patch.levers()
         shares = self.patch.areas / self.patch.areas.sum()
+        if self.stiff is None:
+            shares = self.patch.weights()
         by = "n,nda,ndb->ab"
-        stuck = np.einsum(by, law.sigma_0 * self.stiff, levers, levers)
+        stiff = shares if self.stiff is None else self.stiff
+        stuck = np.einsum(by, law.sigma_0 * stiff, levers, levers)
         damps = law.sigma_1 + law.sigma_2
         return stuck, damps * np.einsum(by, shares, levers, levers)
 

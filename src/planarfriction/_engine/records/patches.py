@@ -73,6 +73,7 @@ def packed_patches(
         radius=np.array(levers),
         pad=np.array([each.of_pad for each in models], np.int64),
         soft=int(all(each.of_pad for each in models)),
+        linear=int(all(each.held[0].any() for each in models)),
         stuck=np.ravel([each.held[0] for each in models]),
         viscous=np.ravel([each.held[1] for each in models]),
         bristle=np.array([each.components for each in models], np.int64),

@@ -11,6 +11,7 @@ import numpy as np
 from planarfriction._engine.cells import cells
 from planarfriction._engine.cells.general_cells import MATRICES
 from planarfriction._engine.protocol import ModelFunctions, StepFunctions
+from planarfriction._engine.records.base import CompiledModel
 from planarfriction._engine.records.distributed import CompiledDistributed
 from planarfriction.errors import InvalidValueError
 
@@ -39,6 +40,8 @@ class CompiledRateCells(CompiledDistributed):
     evaluate = _finite(CompiledDistributed.evaluate)
     step = _finite(CompiledDistributed.step)
     step_jacobians = _finite(CompiledDistributed.step_jacobians)
+
+    held = CompiledModel.held
 
     def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
         self._lever = cells.LEVERS if self.patch.anisotropic else cells.POSITIONS

@@ -160,11 +160,11 @@ class Shadow:
             else list(placing.onto_plane(site.tolist(), middle, normal))
         )
         origin = turned.T @ (place - site)
-        across = (
+        first, second, third = (
             _across(each.tolist(), normal)
             for each in (turned[:, 0], turned[:, 1], turned @ before)
         )
-        *x, c, s = placing.x_axis(*across, normal)
+        *x, c, s = placing.x_axis(first, second, third, normal)
         y = _cross(normal, x)
         self._axes[p] = np.array([place, x, y])
         away = list(map(operator.sub, middle, place))
@@ -189,7 +189,10 @@ class Shadow:
             self._others[p],
             self._world,
         )
-        spatial = self.plant.CalcJacobianSpatialVelocity(self._begin, *measured)
+        spatial = self.plant.CalcJacobianSpatialVelocity(
+            self._begin,
+            *measured,  # pyright: ignore[reportCallIssue]
+        )
         seen = np.array(
             [[0.0, 0.0, 0.0, *x], [0.0, 0.0, 0.0, *y], [*normal, 0.0, 0.0, 0.0]]
         )
@@ -205,10 +208,11 @@ class Shadow:
             ((c, -s), (s, c)),
         )
 
-    def pressed(self, p: int) -> tuple[np.ndarray, np.ndarray]:
+    def pressed(self, p: int) -> np.ndarray:
         """Return loads and pressed shares of the cells of a patch `[2, N]` under its contact surfaces in this step."""
         place, *axes = self._axes[p]
         cells = self._placed[p].surface
+        assert cells is not None
         found = np.zeros((2, cells.shape[1]))
         results = self._contacts()
         for i, owner, _ in self._surfaces:
@@ -253,8 +257,15 @@ class Shadow:
         bend = 0.5 * (away + own_back - other_back)
         both = (own + other)[:3]
         apart = float(normal @ away[3:])
-        given = (each.tolist() for each in (over, away[:3], both, normal))
-        bend[3:] += placing.bend(*given, apart, 1.0, 1.0)
+        bend[3:] += placing.bend(
+            over.tolist(),
+            away[:3].tolist(),
+            both.tolist(),
+            normal.tolist(),
+            apart,
+            1.0,
+            1.0,
+        )
         return seen @ bend / self.dt
 
     def _place(self, frame: Any, place: Sequence[float]) -> Any:

@@ -145,13 +145,16 @@ class Friction:
             if (numbers[name] != own).any()
         }
         self.parameters: dict[str, jax.Array] = changed
-        columns = (
-            np.array([getattr(each, name) for each in placed])
+        columns = {
+            name: np.array([getattr(each, name) for each in placed])
             for name in responses.PatchPlaces._fields[:8]
-        )
+        }
         reach = np.array([placing.reach_of(patch.model.patch) for patch in patches])
         places = responses.PatchPlaces(
-            *columns, reach, radius, surface_velocities(m, placed)
+            **columns,
+            reach=reach,
+            radius=radius,
+            surface=surface_velocities(m, placed),
         )
         self._fixed = _Fixed(
             placed,

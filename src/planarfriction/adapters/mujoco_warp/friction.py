@@ -180,7 +180,7 @@ class Friction:
         self._steps += 1
         if (
             self._steps & (self._steps - 1) == 0
-            and not self._memory.device.is_capturing
+            and not self._memory.device.is_capturing  # pyright: ignore[reportOptionalMemberAccess]
         ):
             self._warn()
 

@@ -77,9 +77,8 @@ def closed_drift(slope: float) -> float:
         return float(e[0] * pull[1] - e[1] * pull[0])
 
     first = np.linalg.solve(m, down)
-    return float(
-        brentq(turning, 0.0, 1.2 * np.arctan2(first[0], -first[1]), xtol=1e-14)
-    )  # pyright: ignore[reportArgumentType]
+    far = 1.2 * np.arctan2(first[0], -first[1])
+    return float(brentq(turning, 0.0, far, xtol=1e-14))  # pyright: ignore[reportArgumentType]
 
 
 def _slid(slope: float, model: Any) -> float:
