@@ -442,7 +442,7 @@ def _draw_rungs(axes: Any, errors: Callable[[str], tuple[list, list]]) -> None:
         _bar(axes, at[0], values, looks.REDUCED)
         medians.append(at)
         if model in BESIDE:
-            words = f"{words},\nthe default" if model == "reduced" else words
+            words = f"{words},\ndefault" if model == "reduced" else words
             _name(axes, words, at, BESIDE[model], looks.REDUCED)
         if model == "reduced":
             axes.plot(*at, "o", ms=8, color=looks.REDUCED, mec="black", zorder=5)
@@ -510,7 +510,7 @@ def _name(
         va=heights[int(np.sign(offset[1]))],
         color=colour,
         fontsize=7,
-        linespacing=0.95,
+        linespacing=1.15,
         zorder=9,
     )
     name.set_path_effects(list(HALO))
