@@ -165,7 +165,7 @@ def test_a_face_bends_alike_wherever_its_frame_lies():
 @pytest.mark.parametrize("cells, mean", [(None, 0.04), (64, 0.06), (24, 0.13)])
 @pytest.mark.parametrize("name", ["circle, Hertz", "square, uniform"])
 def test_the_face_of_a_half_space_bends_with_any_number_of_discs(name, cells, mean):
-    """The table of docs/pads.md."""
+    """The table of docs/pad-evidence.md."""
     dome = lambda x, y: max(1.0 - 1e4 * (x * x + y * y), 0.0) ** 0.5
     patch = pf.ContactPatch.rectangle(0.02, cells=16)
     if name == "circle, Hertz":

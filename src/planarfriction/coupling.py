@@ -190,7 +190,7 @@ class CoupledPatches(ByValue):
         the interpreter's lock. `tolerance` is that of the twists [m/s], with spins multiplied by the size of the patch;
         1e-9 of the largest speed that goes into a twist is enough, too, since rounding may allow no more.
         What does not converge in 50 iterations is solved again without the guess, by steps that each lower the energy.
-        If that fails too, the wrenches of the best result are scaled down and its bristles let go, as far as they would
+        If that fails too, wrenches of the best result are scaled down and its bristles relaxed, as far as they would
         do more work on the host than the bristles give. With `iterations` there is one attempt, and its best result as
         it is.
 

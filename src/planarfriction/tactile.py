@@ -1,4 +1,4 @@
-"""Fields over a contact, as a tactile sensor under it would measure them (docs/pads.md, "Read the contact").
+"""Fields over a contact, as a tactile sensor under it would measure them (docs/tactile.md).
 
 `forces`, `slip_ratio` and `displacement` take models of NumPy, PyTorch or JAX, any batch axes first, and are
 differentiable in the latter two. A field has one value for each cell of a `DistributedModel` or disc of a

@@ -288,7 +288,7 @@ def test_the_ladder_draws_every_family_that_was_run(result):
     driven, hand = figure.axes
     for axes in (driven, hand):
         words = {text.get_text().split(",")[0] for text in axes.texts}
-        assert {"1 disc", "4", "8", "24", "published"} <= words
+        assert {"1 disc", "4", "8", "24", "3 states"} <= words
         first, last = axes.dataLim.intervalx
         left, right = axes.get_xlim()
         # An axis of times without an empty half.

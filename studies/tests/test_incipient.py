@@ -13,7 +13,7 @@ def pull(most, duration, count=1):
 
 
 def test_a_slow_pull_slips_partly_where_the_closed_form_says():
-    """On a half-space of pieces, the share u^3 of the load slips at `Q/(mu f_N) = 3 u^2 - 2 u^3` (docs/pads.md)."""
+    """On a half-space of pieces, the share u^3 of the load slips at `Q/(mu f_N) = 3 u^2 - 2 u^3` (docs/tactile.md)."""
     reserve, slow = 2.0, pull(1.0, 0.9)
     found = incipient.trial(MODEL, slow, reserve, "incipient slip", raises=False)
     force = (incipient.WEIGHT + slow.at(found.alarm[0])[0]) / (

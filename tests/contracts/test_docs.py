@@ -293,7 +293,6 @@ EXPLANATION = (
     "physics",
     "discs",
     "exact-surfaces",
-    "pads",
     "solver",
     "embedding",
 )

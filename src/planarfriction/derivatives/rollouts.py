@@ -130,7 +130,7 @@ def rollout(
     loads: Any = None,
     cover: Any = None,
 ) -> Rollout[np.ndarray]:
-    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
+    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each constant for `dt` [s].
 
     Each step is a `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
     one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` (see

@@ -331,7 +331,7 @@ SETTLED = 0.02
 def stretches(fit: Fit, u: Uncertainty) -> np.ndarray:
     """Compute factors >= 1 on the standard errors, `[F]`.
 
-    An estimate is held at two standard errors to either side while all else is fitted. Where the cost rises by less
+    An estimate is fixed at two standard errors to either side while all else is fitted. Where the cost rises by less
     than the 2 that a parabola would have there, it is held further away (Venzon and Moolgavkar 1988).
     """
     spread = covariance_of(fit, np.concatenate([u.jacobian, u.pull]), ~fit.at_bound)

@@ -46,7 +46,7 @@ CENTRE = [PARAMETERS.index("centre_x"), PARAMETERS.index("centre_y")]
 class PublishedSimulator:
     """Wrenches of `ReducedModelPublished`, whose vector of parameters (`derivatives.PARAMETERS`) varies, from rest.
 
-    Twists `[N, 3]` and loads `[N]` are held for `dt` each; wrenches `[N, 3]` and their derivatives `[N, 3, P]` with
+    Twists `[N, 3]` and loads `[N]` are constant for `dt` each; wrenches `[N, 3]` and their derivatives `[N, 3, P]` with
     respect to the parameters `names` are those at the ends of the steps.
     """
 

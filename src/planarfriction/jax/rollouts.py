@@ -48,7 +48,7 @@ def rollout(
     parameters: Any = None,
     method: str | None = None,
 ) -> Rollout[jax.Array]:
-    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
+    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each constant for `dt` [s].
 
     `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
     `parameters`, a record like `model.parameters` or an array `[P]` in the same order, replaces the model's own.

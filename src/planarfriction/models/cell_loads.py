@@ -6,7 +6,7 @@ stiffness k_f of cell f and its pressed share c_f (`cover`),
 
     K_i = sum_f k_f c_f,     z_i <- z_i sum_f k_f min(c_f, c_f before)/K_i.
 
-The energy `K_i z_i^2/2` can only fall in this, so that no pressure, however it changes, makes energy (docs/pads.md).
+The energy `K_i z_i^2/2` can only fall in this, however the pressure changes (docs/physics.md, "Elastic pads").
 """
 
 from __future__ import annotations

@@ -368,7 +368,7 @@ class ContactPatch(ByValue):
         """Return the errors of `refined(refined)` against the continuous patch: of force, torque and breakaway.
 
         Steady sliding is compared with `LimitSurfaceExact` (of the outline, or of cells three times as fine where a law
-        gives the pressure) while the patch turns beside the middles of cells near the centre of pressure, where a sum
+        gives the pressure) while the patch rotates about points off the centres of inner cells, where a sum
         over cells is worst, and breakaway in 200 directions of the load. If cells are points, `as_discs` has the errors
         of `discs()`. Points without size stand for themselves: 0. Raises InvalidValueError without a load that is
         needed, and for a friction metric per cell.

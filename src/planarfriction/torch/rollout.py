@@ -30,7 +30,7 @@ def rollout(
     parameters: Tensor | None = None,
     method: str | None = None,
 ) -> Rollout[Tensor]:
-    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
+    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each constant for `dt` [s].
 
     `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
     Gradients reach the parameters of the model, `state`, `twist`, `normal_force` and `parameters`.

@@ -1,7 +1,7 @@
 """The bristle of a piece of a pad, whose stiffness K [N/m] is its own and does not grow with its load N [N].
 
 With `s = K/sigma_0` [N], the load at which the law alone would be as stiff, and `l = s/N`, the piece bends by z where a
-bristle of the law bends by `y = l z` (docs/pads.md):
+bristle of the law bends by `y = l z` (docs/physics.md, "Elastic pads"):
 
     z' = u - k(y) y,     t = -(sigma_0 y + (sigma_1 lambda + sigma_2) u) per unit load,     lambda = z'.u/|u|^2
 

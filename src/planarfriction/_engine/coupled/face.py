@@ -1,4 +1,4 @@
-"""Faces of pads that hang on their backs by a compliance common to all pieces (docs/pads.md).
+"""Faces of pads that hang on their backs by a compliance common to all pieces (docs/physics.md, "Elastic pads").
 
 The face of a pad, whose twist `V_f` its bristles see, is displaced by b against the back, whose twist V the host knows.
 With the compliance C and the lag T of the material, `b' = V - V_f` and `W = -(b + T b')/C`, and at the end of a step

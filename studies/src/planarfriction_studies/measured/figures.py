@@ -202,7 +202,7 @@ def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
                 )
         way.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
         way.set_adjustable("datalim")
-        turn.set(xlabel="time [s]", ylabel="turned [\N{DEGREE SIGN}]")
+        turn.set(xlabel="time [s]", ylabel="rotation [\N{DEGREE SIGN}]")
         way.set_title(case.name, loc="left")
         if i:
             way.set_ylabel("")

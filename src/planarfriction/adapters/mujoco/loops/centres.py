@@ -2,7 +2,7 @@
 
 The centre of the contact forces is known once these are, with the friction of the last step. The patch then moves
 there, by as much as its bodies move on each other: forces on faces at rest jump about from step to step, as MuJoCo
-finds other points or gives them other shares, and a patch that followed them would let go bit by bit what it holds.
+finds other points or gives them other shares, and a patch that followed them would gradually release what it holds.
 """
 
 from __future__ import annotations

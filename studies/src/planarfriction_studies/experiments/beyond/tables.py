@@ -361,7 +361,7 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
 
 
 RUNGS = {name: str(count) for count, name in NAMES.items()}
-RUNGS |= {"1 discs": "1 disc", ALL: "a disc\na cell"}
+RUNGS |= {"1 discs": "1 disc", ALL: "one disc\nper cell"}
 """Model of the ladder -> words beside its marker."""
 
 BESIDE = {
@@ -375,9 +375,9 @@ BESIDE = {
 """Model -> offset of its words from its marker [points]; the others have none."""
 
 KINDS_OF_RUN = (
-    ("driven, ", "third quartile", 100.0, "error of the force [% of the load]",
-     "moved with a given velocity"),
-    ("load 2", "end", 1e3, "error of the final place [mm]", "slips in the hand"),
+    ("driven, ", "third quartile", 100.0, "force error [% of the normal force]",
+     "prescribed velocity"),
+    ("load 2", "end", 1e3, "error of the final position [mm]", "in-hand slip"),
 )  # fmt: skip
 """Part of the name of the cases, the error that is shown, its unit, its axis and the title of the panel."""
 
@@ -442,7 +442,7 @@ def _draw_rungs(axes: Any, errors: Callable[[str], tuple[list, list]]) -> None:
         _bar(axes, at[0], values, looks.REDUCED)
         medians.append(at)
         if model in BESIDE:
-            words = f"{words},\nthe default" if model == "reduced" else words
+            words = f"{words},\ndefault" if model == "reduced" else words
             _name(axes, words, at, BESIDE[model], looks.REDUCED)
         if model == "reduced":
             axes.plot(*at, "o", ms=8, color=looks.REDUCED, mec="black", zorder=5)
@@ -457,7 +457,7 @@ def _draw_rungs(axes: Any, errors: Callable[[str], tuple[list, list]]) -> None:
         rising = max(values) > 2.0 * at[1]  # where its bar is
         _name(
             axes,
-            "published",
+            "3 states",
             at,
             (-6, 0) if rising else (0, 6),
             LETTERS[looks.PUBLISHED],
@@ -486,7 +486,7 @@ def _draw_shift(axes: Any, shift: float) -> None:
     """Draw how far a change of friction moves the end."""
     axes.axhline(shift, color="black", lw=0.8, ls=":")
     place = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "top"}
-    words = axes.annotate("0.1 % of friction moves it as far", (0.99, shift), (0, -2),
+    words = axes.annotate("effect of 0.1 % of friction", (0.99, shift), (0, -2),
                           textcoords="offset points", fontsize=7, **place)  # fmt: skip
     words.set_path_effects(list(HALO))
 
@@ -510,7 +510,7 @@ def _name(
         va=heights[int(np.sign(offset[1]))],
         color=colour,
         fontsize=7,
-        linespacing=0.95,
+        linespacing=1.15,
         zorder=9,
     )
     name.set_path_effects(list(HALO))
