@@ -24,7 +24,7 @@ _SLOPES = Fixed(1)
 """Stands in place of the address of a patch's step with its slopes."""
 
 _TABLES = "radius", "stuck", "viscous", "pad", "compliance", "back", "lag"
-"""Arrays of `Patches` that are tables of the source, in their order: the first, of linear patches four, with faces all."""
+"""Arrays of `Patches` that are tables of the source: the first, with known slopes four, with faces all."""
 
 _GIVEN = "dt", "state", "new"
 """Fields of the struct in the precision of the library."""

@@ -95,9 +95,9 @@ def plot_histories(
         rule = f"name at least one of {', '.join(_PANELS)}"
         raise InvalidValueError("panels", rule, panels)
     if axes is not None:
+        drawn: Any = axes if isinstance(axes, list | tuple) else [axes]
         if isinstance(axes, np.ndarray) and axes.dtype == object:
-            axes = axes.ravel().tolist()
-        drawn = axes if isinstance(axes, list | tuple) else [axes]
+            drawn = axes.ravel().tolist()
         for each in drawn:
             style.check_axes("axes", each, size)
         if len(drawn) != len(chosen):
