@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction.derivatives import Rollout
+from planarfriction.errors import InvalidValueError
 from planarfriction.jax import adjoint
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.jax.namespace import xp
@@ -79,7 +80,12 @@ def rollout(
         jnp.broadcast_to(twist, (*shape, 3)),
         jnp.broadcast_to(load.astype(twist.dtype), shape),
     )
-    if method == "adjoint" or (method is None and jax.default_backend() == "cpu"):
+    hangs = model.compliance is not None
+    if method == "adjoint" and hangs:
+        rule = "be 'eager' for a pad with a common compliance"
+        raise InvalidValueError("method", rule, repr(method))
+    compiled = method is None and not hangs and jax.default_backend() == "cpu"
+    if method == "adjoint" or compiled:
         return Rollout(
             *adjoint.rollout(model, state, twist, load, dt, strict=method == "adjoint")
         )

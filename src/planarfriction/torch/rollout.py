@@ -77,6 +77,8 @@ def _obstacle(
         return "for tensors that are not on the processor"
     if tensors[-1].requires_grad:
         return "for a gradient to dt"
+    if model.compliance is not None:
+        return "for a pad with a common compliance"
     if any(buffer.requires_grad for buffer in buffers):
         return "for a gradient to the numbers of the patch"
     return "inside torch.compile" if torch.compiler.is_compiling() else ""
