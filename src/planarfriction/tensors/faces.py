@@ -141,7 +141,7 @@ def _search(xp: Any, at: Face) -> tuple[Any, Any]:
         along = metric * change
         square = xp.dot(along, change, -1)
         along = xp.where(square > 0.0, along / xp.where(square > 0.0, square, 1.0), 0.0)
-        slopes = slopes - xp.moveaxis(lack, -1, 0)[..., None] * along
+        slopes = slopes - xp.stack([lack[..., i : i + 1] * along for i in range(3)], 0)
         change = xp.where(least > enough, _solved(xp, slopes, lack), 0.0)
         return (least <= enough).all(), (face + change, slopes, change, best, least)
 
