@@ -58,7 +58,8 @@ def rollout(
     `"adjoint"`, the much faster compiled rollout with forward and reverse derivatives (on the CPU, float64 inside,
     first derivatives with respect to the parameters, weights of cells, `state`, `twist` and `normal_force`). None uses
     the adjoint if JAX's default device is the CPU, and JAX operations for whatever the adjoint cannot do: higher
-    derivatives, and those with respect to `dt` and other numbers of the patch.
+    derivatives, and those with respect to `dt` and other numbers of the patch. Pads with a common compliance are always
+    eager, with derivatives up to the second.
 
     Inside `jit`, a contact whose input is NaN or exceeds 1e50 gets NaN in its wrenches, its state and its gradients.
 
