@@ -122,7 +122,7 @@ def _repeat(body: Any, state: Any, times: int) -> Any:
 
 def _slopes(function: Any, x: Tensor, units: Tensor) -> Tensor:
     """Return `Namespace.slopes` backwards, as dual numbers cannot be nested."""
-    _, pull = torch.func.vjp(function, x.expand(units.shape))
+    pull = torch.func.vjp(function, x.expand(units.shape))[1]
     return pull(units)[0]
 
 
