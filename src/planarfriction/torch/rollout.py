@@ -37,7 +37,7 @@ def rollout(
 
     `method` is `"adjoint"`, the compiled rollout with its discrete adjoint (on the CPU, first derivatives), or
     `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order, also with respect to
-    `dt`; on a pad with a common compliance, which is always eager, up to the second); None uses the adjoint if possible.
+    `dt`; on a pad with a common compliance, which is always eager, up to the second); None uses the adjoint if it can.
 
     Raises `InvalidValueError` as a step does (see `TensorModel`), and for a method that is not possible.
     """
