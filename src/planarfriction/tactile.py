@@ -318,7 +318,7 @@ def _bristles(model: Any, state: Any) -> tuple[Any, Any]:
     """Return the namespace of a model and its bristles `[..., d, N]`, without a face behind them."""
     if isinstance(model, CellsModel):
         z = shaped("state", model._number("state", state), model.state_shape)
-        return model.xp, z
+        return model.xp, model.parted(z)[0]
     few = _cells_of(model)
     z, *_ = few._inputs(state, np.zeros(3), 0.0)
     return NUMPY, parted(few, z)[0]

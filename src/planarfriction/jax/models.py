@@ -36,15 +36,15 @@ class DistributedModel(FrictionPytree, CellsModel):
     """The distributed model (`planarfriction.DistributedModel`) as a pytree, for small patches.
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
-    positions, the digits of these that single precision leaves out, the stiffness of a `pad`, and weights. A patch
-    whose shape depends on the load keeps that of `normal_force` [N]; the stiffness of `Pad.at_load` follows the
-    weights.
+    positions, the digits of these that single precision leaves out, the stiffness of a `pad` and its common compliance,
+    behind which `sigma_1` counts as 0, and weights. A patch whose shape depends on the load keeps that of
+    `normal_force` [N]; the stiffness of `Pad.at_load` follows the weights.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
 
-    leaves = ("parameters", "positions", "remainder", "stiffness", "weights")
-    fixed = ("elasto_plastic", "kind", "of_law")
+    leaves = ("parameters", "positions", "remainder", "stiffness", "compliance", "weights")  # fmt: skip
+    fixed = ("elasto_plastic", "kind", "of_law", "lag")
     parameters: LawParameters
 
     def __init__(
@@ -60,7 +60,11 @@ class DistributedModel(FrictionPytree, CellsModel):
         cells = distributed.cells_of(model, normal_force, jnp.result_type(float))
         self.parameters = record_of(LawParameters, law.numbers._asdict())
         self.positions, self.weights, self.remainder = map(jnp.asarray, cells[:3])
-        self.stiffness = None if pad is None else jnp.asarray(cells.stiff)
+        self.stiffness, self.compliance = (
+            None if each is None else jnp.asarray(each)
+            for each in (cells.stiff, cells.compliance)
+        )
+        self.lag = 0.0 if pad is None else pad.lag
         self.kind = cells.kind
         self.of_law = pad is None or pad.springs_of_law
 

@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction.derivatives import Rollout
+from planarfriction.errors import InvalidValueError
 from planarfriction.jax import adjoint
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.jax.namespace import xp
@@ -57,7 +58,8 @@ def rollout(
     `"adjoint"`, the much faster compiled rollout with forward and reverse derivatives (on the CPU, float64 inside,
     first derivatives with respect to the parameters, weights of cells, `state`, `twist` and `normal_force`). None uses
     the adjoint if JAX's default device is the CPU, and JAX operations for whatever the adjoint cannot do: higher
-    derivatives, and those with respect to `dt` and other numbers of the patch.
+    derivatives, and those with respect to `dt` and other numbers of the patch. Pads with a common compliance are always
+    eager, with derivatives up to the second.
 
     Inside `jit`, a contact whose input is NaN or exceeds 1e50 gets NaN in its wrenches, its state and its gradients.
 
@@ -79,7 +81,12 @@ def rollout(
         jnp.broadcast_to(twist, (*shape, 3)),
         jnp.broadcast_to(load.astype(twist.dtype), shape),
     )
-    if method == "adjoint" or (method is None and jax.default_backend() == "cpu"):
+    hangs = model.compliance is not None
+    if method == "adjoint" and hangs:
+        rule = "be 'eager' for a pad with a common compliance"
+        raise InvalidValueError("method", rule, repr(method))
+    compiled = method is None and not hangs and jax.default_backend() == "cpu"
+    if method == "adjoint" or compiled:
         return Rollout(
             *adjoint.rollout(model, state, twist, load, dt, strict=method == "adjoint")
         )

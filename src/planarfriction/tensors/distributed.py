@@ -32,6 +32,8 @@ class Cells(NamedTuple):
     """`elastic.Elastic.stiff` [N] of the pieces of a pad; None without one."""
     kind: Any = None
     """Key of `cell_loops.KINDS`."""
+    compliance: Any = None
+    """Common compliance of these pieces `[3, 3]` [m/N, rad/(N m)]; None without one."""
 
 
 def cells_of(
@@ -50,7 +52,9 @@ def cells_of(
     stiff = pad and pad.pieces(model.patch, model.law)
     if isinstance(pad, AtLoad):
         stiff = np.array(pad.normal_force)
-    return Cells(levers, model.patch.weights(normal_force), remainder, stiff, kind)
+    common = pad and pad.compliance(model.patch)
+    weights = model.patch.weights(normal_force)
+    return Cells(levers, weights, remainder, stiff, kind, common)
 
 
 def positions_of(xp, levers):

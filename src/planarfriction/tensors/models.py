@@ -10,10 +10,11 @@ from planarfriction import models
 from planarfriction._support import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
-from planarfriction.models.base import refuse_common
 from planarfriction.pads import Pad
 from planarfriction.patch import ContactPatch
-from planarfriction.tensors import distributed, published
+from planarfriction.tensors import distributed, faces, published
+from planarfriction.tensors.faces import Face
+from planarfriction.tensors.pressure import Pressed
 from planarfriction.tensors.steps import TensorModel
 
 
@@ -29,6 +30,10 @@ class CellsModel(TensorModel):
     """Digits of the positions that the number type of `positions` has no room for (see `tensors.distributed.Cells`)."""
     stiffness: Any
     """Stiffness of the pieces of a pad `[N]` [N/m]; of `Pad.at_load` its load [N]; None without a pad."""
+    compliance: Any
+    """Common compliance of the pieces of a pad `[3, 3]`, or None; with one, the face is behind the bristles."""
+    lag: float
+    """Time in which that follows [s]."""
     kind: tuple[int, bool, str]
     """Key of `cell_loops.KINDS`."""
     of_law: bool
@@ -36,8 +41,47 @@ class CellsModel(TensorModel):
 
     @property
     def state_shape(self) -> tuple[int, ...]:
-        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs."""
-        return self.kind[0], self.positions.shape[1]
+        """Shape of the state of one contact, `(2, N)` of points, `(3, N)` of discs; flat with a face behind."""
+        count = self.positions.shape[1]
+        if self.compliance is None:
+            return self.kind[0], count
+        return (self.kind[0] * count + 3,)
+
+    def parted(self, state: Any) -> tuple[Any, Any]:
+        """Return the bristles of a state `[..., d, N]`, and the displacement of the face behind them `[..., 3]`."""
+        if self.compliance is None:
+            return state, None
+        z = state[..., :-3]
+        return z.reshape(*z.shape[:-1], self.kind[0], -1), state[..., -3:]
+
+    def step_pressed(
+        self, pressed: Pressed, state: Any, twist: Any, load: Any, dt: Any
+    ) -> tuple[Any, Any]:
+        """See `TensorModel.step_pressed`."""
+        if self.compliance is None:
+            return super().step_pressed(pressed, state, twist, load, dt)
+        xp = self.xp
+        given = pressed.contact.law.sigma_0, state, twist
+        at = self._face(pressed, xp.widened(state), xp.widened(twist), load, dt)
+        new, wrench = faces.step(xp, at)
+        return xp.narrowed(new, *given), xp.narrowed(wrench, *given)
+
+    def evaluate_pressed(
+        self, pressed: Pressed, state: Any, twist: Any, load: Any
+    ) -> tuple[Any, Any]:
+        """See `TensorModel.evaluate_pressed`."""
+        if self.compliance is None:
+            return super().evaluate_pressed(pressed, state, twist, load)
+        at = self._face(pressed, state, twist, load, 0.0 * load)
+        return faces.evaluate(self.xp, at)
+
+    def _face(self, pressed: Pressed, state: Any, twist: Any, load: Any, dt: Any) -> Face:  # fmt: skip
+        """Return the face, whose lag damps in place of the bristles."""
+        law, shape = pressed.contact
+        law = law._replace(sigma_1=0.0)
+        dt = dt[..., None]
+        at = *self.parted(state), twist, load[..., None], dt, dt + self.lag
+        return Face(law, shape, self.compliance, *at)
 
     def weighted(self, patch: ContactPatch) -> ContactPatch:
         """Return the `patch` of the model's cells, or its discs if there are fewer, with the present weights.
@@ -75,6 +119,7 @@ class PublishedModel(TensorModel):
     root: Any
     """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
     stiffness = None
+    compliance = None
     """No pad."""
 
     def _shape(self, values: Mapping[str, Any]) -> published.PublishedNumbers:
@@ -94,7 +139,6 @@ def reference_of(
     """
     TensorModel.refuse(patch, law, name)
     model = models.DistributedModel(patch, law, pad=pad)
-    refuse_common(model, name)
     if cells is None:
         return model
     return models.ReducedModel(patch, law, cells=cells, pad=pad).reduction

@@ -31,6 +31,7 @@ _SAME = (
         "full_like",
     ),
     *("stack", "concatenate", "moveaxis", "broadcast_to", "broadcast_shapes"),
+    "linalg",
 )
 """Functions that PyTorch and JAX have with the same name and the same leading arguments."""
 
@@ -45,6 +46,10 @@ class Namespace:
       InvalidValueError outside the range of `validation.within_range`.
     - `pressing(u, v, share, x, y, narrow)`: the cells at (u, v) with shares of a load that press where it is at (x, y),
       bool `[..., N]`, by the rule of `cells.moment_pressure` in its scaled coordinates; without derivatives
+    - `until(body, start, most)`: the last state of `done, state = body(state)`, which runs until `done` or `most` times
+    - `repeat(body, state, times)`: the last result of `state, result = body(state)`
+    - `slopes(function, x, units)`: the derivatives of a function of vectors `[..., 3]`, each of a component of its
+      value, `[3, ..., 3]`; `units` are unit vectors in the same order
     - `to_numpy(value)`, where anything but an array of the library stays; `from_numpy(array, like)`, a copy with the
       number type and the device of `like`
     - `in_double(function, *arrays)`, the result of a function of arrays computed in double precision, in their own

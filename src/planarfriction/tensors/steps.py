@@ -94,6 +94,8 @@ class TensorModel:
     equations: ClassVar[ModuleType]
     """Module of the model's `drive`, `evaluate`, `advance` and `wrench`."""
     elasto_plastic: bool
+    compliance: Any
+    """Common compliance of a pad `[3, 3]`, or None."""
 
     @staticmethod
     def refuse(patch: ContactPatch, law: FrictionLaw, name: str) -> None:
@@ -172,6 +174,16 @@ class TensorModel:
         )
         return new, pressed.pull(self.xp, wrench)
 
+    def evaluate_pressed(
+        self, pressed: Pressed, state: Any, twist: Any, load: Any
+    ) -> tuple[Any, Any]:
+        """Return rate and wrench of the model that `pressed` has returned, with inputs as arrays."""
+        seen = pressed.seen(self.xp, twist)
+        rate, wrench = evaluate(
+            self.xp, self.equations, pressed.contact, state, seen, load
+        )
+        return rate, pressed.pull(self.xp, wrench)
+
     def _values(self, parameters: Any) -> dict[str, Any]:
         """Return physical values by name, from `parameters` or, if None, the model's own."""
         raise NotImplementedError
@@ -218,13 +230,10 @@ class TensorModel:
     def _evaluated(
         self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any
     ) -> tuple[Any, Any]:
-        (z, v, load), pressed = self._inputs_pressed(
+        inputs, pressed = self._inputs_pressed(
             state, twist, normal_force, parameters, moments
         )
-        rate, wrench = evaluate(
-            self.xp, self.equations, pressed.contact, z, pressed.seen(self.xp, v), load
-        )
-        return rate, pressed.pull(self.xp, wrench)
+        return self.evaluate_pressed(pressed, *inputs)
 
     def _inputs_pressed(
         self, state: Any, twist: Any, normal_force: Any, parameters: Any, moments: Any

@@ -14,6 +14,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import steps
+from planarfriction.tensors.pressure import Pressed
 from planarfriction.tensors.steps import LAW, TensorModel
 from planarfriction.torch.namespace import xp
 from planarfriction.torch.parameters import PhysicalParameters
@@ -146,6 +147,8 @@ class FrictionModule(TensorModel, nn.Module):
         Only the bristles go step by step; their drives and the wrenches are computed for all steps at once. Inputs are
         tensors that have been checked.
         """
+        if self.compliance is not None:
+            return self._faced(state, twist, normal_force, dt, parameters)
         equations = self.equations
         vector = self._vector(parameters)
         of_step, contact = (
@@ -166,6 +169,17 @@ class FrictionModule(TensorModel, nn.Module):
         )
         given = vector, state, twist
         return xp.narrowed(equations.narrow(z), *given), xp.narrowed(wrenches, *given)
+
+    def _faced(
+        self, state: Tensor, twist: Tensor, normal_force: Tensor, dt: Tensor, parameters: Tensor | None
+    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        """Return `rollout` of a pad whose face each step looks for."""
+        pressed = Pressed(self._contact_at(parameters), None)
+        wrenches = []
+        for v, load in zip(twist.unbind(-2), normal_force.unbind(-1), strict=True):
+            state, wrench = self.step_pressed(pressed, state, v, load, dt)
+            wrenches.append(wrench)
+        return state, torch.stack(wrenches, -2)
 
     # ------------------------------------------------------------------ inputs
 

@@ -31,7 +31,8 @@ class DistributedModel(FrictionModule, CellsModel):
     `trainable` names the parameters of the law that are `nn.Parameter`s. With `"weights"` the pressure is trainable
     too: the weights `w_i` of the cells are the softmax of a raw parameter, so that they stay positive and add up to 1.
     If the shape of the patch depends on the load, the shape at `normal_force` [N] is kept. The stiffness of a `pad` is
-    a buffer; that of `Pad.at_load` follows the weights, which are not trainable with other pads.
+    a buffer; that of `Pad.at_load` follows the weights, which are not trainable with other pads. Behind a common
+    compliance, `sigma_1` counts as 0.
 
     Raises InvalidValueError for a parameter that breaks its rule.
 
@@ -41,6 +42,7 @@ class DistributedModel(FrictionModule, CellsModel):
     positions: Tensor
     remainder: Tensor
     stiffness: Tensor | None
+    compliance: Tensor | None
 
     def __init__(
         self,
@@ -65,6 +67,11 @@ class DistributedModel(FrictionModule, CellsModel):
         if stiff is not None:
             stiff = torch.tensor(stiff, **kind)
         self.register_buffer("stiffness", stiff)
+        common = cells.compliance
+        if common is not None:
+            common = torch.tensor(common, **kind)
+        self.register_buffer("compliance", common)
+        self.lag = 0.0 if pad is None else pad.lag
         numbers = law.numbers._asdict()
         chosen = tuple(trainable)
         if "weights" in chosen and not self.of_law:

@@ -105,6 +105,34 @@ def _in_double(function: Any, *arrays: Tensor) -> Tensor:
     return _narrowed(function(*map(_widened, arrays)), *arrays)
 
 
+def _until(body: Any, state: Any, most: int) -> Any:
+    for _ in range(most):
+        done, state = body(state)
+        if not torch.compiler.is_compiling() and _holds(done):
+            break
+    return state
+
+
+def _repeat(body: Any, state: Any, times: int) -> Any:
+    result = None
+    for _ in range(times):
+        state, result = body(state)
+    return result
+
+
+def _slopes(function: Any, x: Tensor, units: Tensor) -> Tensor:
+    """Return `Namespace.slopes` backwards, as dual numbers cannot be nested."""
+    pull = torch.func.vjp(function, x.expand(units.shape))[1]
+    return pull(units)[0]
+
+
+def _holds(condition: Tensor) -> bool:
+    try:
+        return bool(condition)
+    except RuntimeError:  # inside vmap
+        return False
+
+
 class _Twins:
     """Functions over tensors by the names of `_name_of`: `torch.compile` calls what it finds in a place."""
 
@@ -130,6 +158,9 @@ xp = Namespace(
     real=_real,
     extremes=_extremes,
     pressing=_Pressing.apply,
+    until=_until,
+    repeat=_repeat,
+    slopes=_slopes,
     to_numpy=lambda value: (
         value.detach().cpu().numpy() if isinstance(value, Tensor) else value
     ),

@@ -37,7 +37,7 @@ def rollout(
 
     `method` is `"adjoint"`, the compiled rollout with its discrete adjoint (on the CPU, first derivatives), or
     `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order, also with respect to
-    `dt`); None uses the adjoint if possible.
+    `dt`; on a pad with a common compliance, which is always eager, up to the second); None uses the adjoint if it can.
 
     Raises `InvalidValueError` as a step does (see `TensorModel`), and for a method that is not possible.
     """
@@ -77,6 +77,8 @@ def _obstacle(
         return "for tensors that are not on the processor"
     if tensors[-1].requires_grad:
         return "for a gradient to dt"
+    if model.compliance is not None:
+        return "for a pad with a common compliance"
     if any(buffer.requires_grad for buffer in buffers):
         return "for a gradient to the numbers of the patch"
     return "inside torch.compile" if torch.compiler.is_compiling() else ""

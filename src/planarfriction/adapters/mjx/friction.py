@@ -37,7 +37,7 @@ from planarfriction.formulas import LIGHTEST
 from planarfriction.jax import DistributedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.jax.namespace import xp
-from planarfriction.models.base import lever_of
+from planarfriction.models.base import lever_of, refuse_common
 from planarfriction.tensors.pressure import twist_at, wrench_from
 from planarfriction.tensors.steps import LAW
 
@@ -575,6 +575,7 @@ def _in_jax(model: models.FrictionModel) -> FrictionPytree:
     if isinstance(model, models.ReducedModelPublished):
         return ReducedModelPublished(model.patch, model.law, model.surface)
     if isinstance(model, models.DistributedModel):
+        refuse_common(model, "MJX")
         return DistributedModel(model.patch, model.law, pad=model.pad)
     raise InvalidValueError(
         "model", "be one that planarfriction.jax has", type(model).__name__
