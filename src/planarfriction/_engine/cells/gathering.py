@@ -143,10 +143,9 @@ def gather(
     """Call `bear` for B contacts; all arrays are flat, those of numbers that do not change empty."""
     own = read_bearing(bearing)
     n = own.bristles
-    (loads, earlier, cover, before) = given
     for b in range(load.shape[0]):
         i = b * own.count
         load[b] = bear(
-            own, at(pointer(loads), i), at(pointer(earlier), i), at(pointer(cover), i), at(pointer(before), i), known,
-            at(pointer(weights), b * n), at(pointer(numbers), b * own.rows * n), at(pointer(kept), b * n),
+            own, at(pointer(given[0]), i), at(pointer(given[1]), i), at(pointer(given[2]), i), at(pointer(given[3]), i),
+            known, at(pointer(weights), b * n), at(pointer(numbers), b * own.rows * n), at(pointer(kept), b * n),
         )  # fmt: skip

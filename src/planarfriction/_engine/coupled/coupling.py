@@ -138,9 +138,9 @@ def _misfit(patches: Patches, p: ContactSolve) -> float:
             xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
         )
         if missing != 0.0:
-            share = abs(missing) / (p.load[k] + abs(missing))
-            finite = finite and xp.is_finite(share)
-            largest = xp.maximum(largest, LIGHTNESS * share)
+            wrong = LIGHTNESS * abs(missing) / (p.load[k] + abs(missing))
+            finite = finite and xp.is_finite(wrong)
+            largest = xp.maximum(largest, wrong)
         for i in range(3 * k, 3 * k + 3):
             gap = abs(_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
             if i == 3 * k + 2:
