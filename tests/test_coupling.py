@@ -333,6 +333,34 @@ def test_a_load_that_follows_the_wrench_does_so_whatever_the_twist_does(response
 # ---------------------------------------------------------------------- in time
 
 
+MODELS_THAT_STICK = {
+    "cells": pf.DistributedModel(DISC, LAW),
+    "metric": pf.DistributedModel(
+        DISC.with_friction_metric([[1.0, 0.2], [0.2, 1.5]]), LAW
+    ),
+    "discs": pf.ReducedModel(DISC, LAW),
+    "pad": pf.DistributedModel(DISC, LAW, pad=pf.Pad.at_load(2.0)),
+}
+
+
+@pytest.mark.parametrize("model", MODELS_THAT_STICK.values(), ids=MODELS_THAT_STICK)
+def test_one_newton_step_solves_what_sticks_or_slides_steadily(model):
+    """Bristles that stick are springs and dampers; those that slide keep the wrench that they have."""
+    patches = CoupledPatches([model])
+    response = np.diag([1e-2, 1e-2, 50.0])
+    push, none = [[1e-5, 2e-5, 1e-3]], np.zeros((1, 3))
+    step = patches.step(patches.rest(), HostStep(push, [3.0], none, response), 1e-3)
+    assert step.iterations <= 1
+    state, twist, counts = patches.rest(), np.array([0.5, 0.0, 30.0]), []
+    for _ in range(6):
+        host = HostStep([twist], [3.0], none, 0.1 * response)
+        step = patches.step(state, host, 1e-3)
+        state, twist = step.state, step.twist[0]
+        counts.append(step.iterations)
+    assert twist[0] > 0.1
+    assert max(counts[1:]) <= 1
+
+
 FEET = np.array([[0.05, 0.03], [0.05, -0.03], [-0.05, 0.03], [-0.05, -0.03]])
 
 

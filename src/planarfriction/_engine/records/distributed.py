@@ -71,7 +71,7 @@ class CompiledDistributed(CompiledModel):
         law = self.law.numbers
         levers = self.patch.levers()
         shares = self.patch.areas / self.patch.areas.sum()
-        if self.stiff is None:
+        if not self.depends_on_load:
             shares = self.patch.weights()
         by = "n,nda,ndb->ab"
         stiff = shares if self.stiff is None else self.stiff
