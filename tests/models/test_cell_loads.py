@@ -145,6 +145,20 @@ def test_what_lifts_takes_its_force_along_and_comes_back_unstressed():
     assert wrench[0] == pytest.approx(-0.05)
 
 
+@pytest.mark.parametrize("name", ["cells", "discs", "discs of a layer"])
+def test_a_contact_whose_cells_all_lift_forgets_its_state(name):
+    model = MODELS[name]
+    state, twist, loads = drawn(model, 1, np.random.default_rng(3))
+    gone = np.zeros_like(loads[0])
+    given = (loads[0], gone) if model.pad else gone
+    new, wrench = model.step(state[0], twist[0], None, 1e-3, loads=given)
+    assert (new == 0.0).all()
+    assert (wrench == 0.0).all()
+    slopes = model.step_jacobians(state[0], twist[0], None, 1e-3, loads=given)
+    assert (slopes.state_state == 0.0).all()
+    assert (slopes.wrench_twist == 0.0).all()
+
+
 @pytest.mark.parametrize("steps", [30, pytest.param(5000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", [each for each in MODELS if "layer" in each])
 def test_no_pressure_makes_energy(name, steps):
