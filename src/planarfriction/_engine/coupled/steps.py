@@ -165,7 +165,7 @@ class Borne(NamedTuple):
     numbers: Doubles
     """Numbers of the bristles `[rows, n]`."""
     kept: Doubles
-    """What is kept of deflections [n]; empty without a pad."""
+    """Shares of the deflections that are kept [n]; empty without a pad."""
     state: Doubles
     """State that the pressure leaves, [S]."""
 
