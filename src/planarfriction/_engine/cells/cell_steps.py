@@ -36,7 +36,7 @@ from planarfriction._engine.codegen.vectors import (
     put_all,
     three,
 )
-from planarfriction._engine.compiler import entry, kernel
+from planarfriction._engine.compiler import entry, kernel, wide_entry
 from planarfriction._engine.compiler.memory import Doubles, Place, at
 from planarfriction._engine.protocol import (
     SLOPES,
@@ -244,11 +244,11 @@ def steps_of(kind: CellKind, read: Any) -> StepFunctions:
     slopes = {"advance": step_slope_passes(kind).run, "none": (0.0,) * SLOPES}
     return StepFunctions(
         bind(step, f"{kind.name}_step", entry, **model, **wrench),
-        bind(step, f"{kind.name}_slopes", entry, **model, **slopes),
+        bind(step, f"{kind.name}_slopes", wide_entry, **model, **slopes),
         bind(
             jacobian,
             f"{kind.name}_jacobian",
-            entry,
+            wide_entry,
             **model,
             advance=jacobian_passes(kind).run,
             size=kind.element.size,

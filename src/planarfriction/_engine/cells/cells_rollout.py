@@ -36,7 +36,7 @@ from planarfriction._engine.codegen.vectors import (
     three,
     times,
 )
-from planarfriction._engine.compiler import jit, kernel
+from planarfriction._engine.compiler import jit, kernel, wide_jit
 from planarfriction._engine.compiler.calls import pointer
 from planarfriction._engine.compiler.memory import Doubles, at
 from planarfriction.formulas import LawNumbers
@@ -400,6 +400,7 @@ def _entry(
 def entry_of(loop: Any, kind: BlockFunctions, name: str, numbers: int = BLOCK) -> Any:
     """Return the entry point of a loop for a kind of cells, whose blocks have so many numbers; it takes the inputs and
     the arguments between these and the scratch memory."""
-    return bind(
-        _entry, f"{name}_{loop.__name__}", jit, loop=loop, kind=kind, numbers=numbers
-    )
+    # The rollout divides and takes roots most of the time, which longer vectors do not hasten.
+    decorator = jit if loop is rollout else wide_jit
+    arguments = {"loop": loop, "kind": kind, "numbers": numbers}
+    return bind(_entry, f"{name}_{loop.__name__}", decorator, **arguments)

@@ -27,6 +27,9 @@ Sequential: Any = part(
 )
 """The same for entry points whose loops are short: no vector instructions, no unrolling."""
 
+Wide: Any = part("planarfriction._engine.compiler.entries", "Wide", Compiler)
+"""The same for entry points whose time goes into loops over cells with long bodies: the longest vectors."""
+
 kept: Any = part(
     "planarfriction._engine.compiler.machine_code",
     "kept",
@@ -96,6 +99,9 @@ def jit(function: Any, compiler: Any = Entry) -> Any:
 sequential_jit: Any = functools.partial(jit, compiler=Sequential)
 """Compile an entry point as `jit` does, in a third of the time: for one that has no loop over cells of its own."""
 
+wide_jit: Any = functools.partial(jit, compiler=Wide)
+"""Compile an entry point as `jit` does, with the longest vectors: for loops over cells with long bodies."""
+
 
 # Counting references to arrays is atomic: in a step of the reduced model it costs four times the physics. Inner
 # functions allocate nothing and keep no array, so they need no counting; they are called from compiled code only.
@@ -117,6 +123,9 @@ def entry(function: Any, compiler: Any = Entry) -> Any:
 
 sequential_entry: Any = functools.partial(entry, compiler=Sequential)
 """Compile a function as `entry` does, in a third of the time: for one that has no loop over cells of its own."""
+
+wide_entry: Any = functools.partial(entry, compiler=Wide)
+"""Compile a function as `entry` does, with the longest vectors: for loops over cells with long bodies."""
 
 
 def callback(function: Any) -> Any:

@@ -6,11 +6,12 @@ it. Inner functions here count none, so that one pass does.
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import llvmlite.binding as llvm
 from numba.core import typed_passes
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 
@@ -23,7 +24,23 @@ need(
     "_optimize_final_module",
     "_finalize_final_module",
 )
+need(JITCPUCodegen, "_customize_tm_options")
 need(llvm, "create_pipeline_tuning_options", "create_pass_builder")
+
+
+@functools.cache
+def _with_whole_registers(codegen: Any) -> Any:
+    """Return the processor as LLVM sees it, with all of its vector registers in use.
+
+    LLVM takes half of each on Intel processors, of which the first with AVX-512 lower their clock for whole ones.
+    """
+    if "+avx512fp16" not in codegen._tm_features.split(","):
+        return codegen._tm
+    options = {"opt": 3}
+    codegen._customize_tm_options(options)
+    options["features"] += ",-prefer-256-bit"
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    return target.create_target_machine(**options)
 
 
 class _Whole(JITCodeLibrary):
@@ -31,6 +48,10 @@ class _Whole(JITCodeLibrary):
 
     loops = True
     """True for loops that are worth vector instructions; without, the code is made in a third of the time."""
+
+    def processor(self) -> Any:
+        """Return the processor for which the code is optimised."""
+        return self._codegen._tm
 
     def _optimize_functions(self, ll_module: Any) -> None:
         ll_module.data_layout = self._codegen._data_layout
@@ -51,11 +72,17 @@ class _Whole(JITCodeLibrary):
         options.slp_vectorization = False
         options.loop_unrolling = self.loops
         options.inlining_threshold = 275 if self.loops else 225
-        builder = llvm.create_pass_builder(self._codegen._tm, options)
+        builder = llvm.create_pass_builder(self.processor(), options)
         passes = builder.getModulePassManager()
         # Entry points that Python calls do count references to arrays.
         passes.add_refprune_pass()
         passes.run(self._final_module, builder)
+
+
+class _Wide(_Whole):
+    def processor(self) -> Any:
+        """Return the processor with all of its vector registers in use."""
+        return _with_whole_registers(self._codegen)
 
 
 class _Short(_Whole):
@@ -73,6 +100,12 @@ class _Lowering(typed_passes.NativeLowering):
         )
         state.library.enable_object_caching()
         return super().run_pass(state)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _WideLowering(_Lowering):
+    _name = "lowering of entry points with long loops"
+    library = _Wide
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -96,6 +129,12 @@ class Entry(CompilerBase):
             passes.add_pass(self.lowering if lowering else each, words)
         passes.finalize()
         return [passes]
+
+
+class Wide(Entry):
+    """Compiler of entry points whose time goes into loops over cells with long bodies."""
+
+    lowering = _WideLowering
 
 
 class Sequential(Entry):
