@@ -23,6 +23,7 @@ _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
 
 _FLOAT = np.dtype(float)
+_NONE = np.empty(0)
 
 LIGHTEST = 1e-9
 """Load [N] whose shape stands for the shape of a load that fades in, for the slope at no load."""
@@ -50,7 +51,9 @@ class RolloutInputs(NamedTuple):
 
     def of_all(self, values: np.ndarray) -> np.ndarray:
         """Return values of each contact `[B, ...]` as `[*batch, ...]`."""
-        return values.reshape(*self.batch, *values.shape[1:])
+        return (
+            values.reshape(*self.batch, *values.shape[1:]) if self.batch else values[0]
+        )
 
     def compiled(self, slopes: bool = False) -> Inputs:
         """Return the inputs as compiled loops take them, with the `slopes` of the weights of cells by the load."""
@@ -255,9 +258,9 @@ def rows_of(
     name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]
 ) -> np.ndarray:
     """Return `value` `[..., *inner]` as `[B, *inner]`, or as one row where the contacts share it."""
-    value = validation.finite_numbers(name, value)
-    if _is_plain(value, inner):
+    if _is_plain(value, inner) and ready(in_order)(value.ravel(), _NONE, _NONE, _NONE):
         return value[None]
+    value = validation.finite_numbers(name, value)
     if value.size != np.prod(inner) or value.shape[value.ndim - len(inner) :] != inner:
         try:
             value = np.broadcast_to(value, (*batch, *inner))

@@ -27,7 +27,7 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
 from planarfriction.laws.base import is_rate_law
 from planarfriction.models import DistributedModel, ReducedModelPublished
-from planarfriction.models.base import refuse_common
+from planarfriction.models.base import FrictionModel, refuse_common
 from planarfriction.models.reduced_published import axes_of
 
 PARAMETERS = (
@@ -158,6 +158,14 @@ def _family(model: Any) -> RolloutFunctions:
         else type(model).__name__
     )
     raise InvalidValueError("model", "be one that has compiled rollouts", kind)
+
+
+def made_before(model: Any) -> Any:
+    """Return what `pack` made of a model before, or the model itself."""
+    if not isinstance(model, FrictionModel):
+        return model
+    compiled = model.reduction.__dict__.get("compiled")
+    return getattr(compiled, "rollouts", None) or model
 
 
 def is_compiled(model: Any) -> bool:

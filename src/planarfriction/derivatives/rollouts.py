@@ -32,6 +32,7 @@ from planarfriction.derivatives.inputs import (
 from planarfriction.derivatives.parameters import (
     PackedRollout,
     is_compiled,
+    made_before,
     pack,
     parameter_names,
 )
@@ -151,6 +152,8 @@ def rollout(
             "model", f"be a friction model ({MODELS.classes()})", type(model).__name__
         )
     given = given_loads(model, twist, normal_force, loads, cover)
+    if given is None:
+        model = made_before(model)
     if faces.hangs(model, parameters) or (
         parameters is None
         and isinstance(model, FrictionModel)
@@ -178,6 +181,8 @@ def rollout_states(
     Raises InvalidValueError as `rollout` does.
     """
     given = given_loads(model, twist, normal_force, loads, cover)
+    if given is None:
+        model = made_before(model)
     if faces.hangs(model, parameters):
         path = faces.path_of(model, state, twist, normal_force, dt, given)
         return RolloutStates(path.state, path.wrenches, path.states)
@@ -215,6 +220,8 @@ def rollout_vjp(
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled rollout.
     """
     given = given_loads(model, twist, normal_force, loads, cover)
+    if given is None:
+        model = made_before(model)
     if faces.hangs(model, parameters):
         path = faces.path_of(model, state, twist, normal_force, dt, given)
         *found, by_disc = faces.vjp(path, wrenches_bar, state_bar, gradient)
@@ -268,13 +275,14 @@ def gradient(
         count,
         lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars),
     )
-    vector = parameters if parameters is not None else packed.rows[..., family.columns]
-    start = np.empty(inner) if state is None else state
+    own_vector = *packed.rows.shape[:-1], len(family.columns)
+    vector = own_vector if parameters is None else np.shape(parameters)
+    start = inner if state is None else np.shape(state)
     found = RolloutVJP(
-        sum_to(np.shape(start), inputs.shaped(z_bar)),
+        sum_to(start, inputs.shaped(z_bar)),
         sum_to(np.shape(twist), inputs.of_all(turned(bars.twist))),
         sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
-        sum_to(np.shape(vector), inputs.of_all(rows_bar[:, family.columns])),
+        sum_to(vector, inputs.of_all(rows_bar[:, family.columns])),
     )
     return found, inputs.of_all(by_disc)
 
