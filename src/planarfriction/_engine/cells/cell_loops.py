@@ -45,9 +45,16 @@ class Element(NamedTuple):
     step_slopes: tuple[int, int] = 4, 8
 
 
+_OF_DISCS: dict[str, Any] = {
+    "forward": (17, 0),
+    "backward": (1, 0),
+    "step_slopes": (1, 0),
+}
+"""Divisions for discs: passes hide the divisions of a step, derivatives have enough sums and products between them."""
+
 POINT = Element("points", 2, points.evaluate, points.step, slopes=(2, 0))
 DISC = Element(
-    "discs", 3, discs.evaluate, discs.step, forward=(17, 0), rate=(8, 0), slopes=(1, 2)
+    "discs", 3, discs.evaluate, discs.step, rate=(8, 0), slopes=(1, 2), **_OF_DISCS
 )
 LEANING_POINT = Element(
     "leaning points",
@@ -60,13 +67,13 @@ LEANING_DISC = Element(
     3,
     asymmetric_cells.evaluate_disc,
     asymmetric_cells.step_disc,
-    forward=(17, 0),
+    **_OF_DISCS,
 )
 """Elements whose law is a `Leaning`; the asymmetry stands behind the numbers of the lever."""
 
 PAD_POINT = Element("points of a pad", 2, elastic.evaluate, elastic.step)
 PAD_DISC = Element(
-    "discs of a pad", 3, elastic.evaluate_disc, elastic.step_disc, forward=(17, 0)
+    "discs of a pad", 3, elastic.evaluate_disc, elastic.step_disc, **_OF_DISCS
 )
 """Elements whose law is an `Elastic`; `Elastic.stiff` stands behind the numbers of the lever."""
 
