@@ -427,7 +427,7 @@ def test_discs_grow_and_move_with_their_patch():
 @pytest.mark.parametrize("cost", [1.0, 0.999 * BEATEN, 1.001 * BEATEN])
 @pytest.mark.parametrize("near", [True, False])
 def test_bristles_that_lost_in_discs_are_not_fitted_in_cells(cost, near):
-    """Only if the best fit, of any model, explains the data; bristles that were not tried have nothing to begin from."""
+    """Only if the best fit, of any model, explains the data; untried bristles have nothing to begin from."""
 
     def fit(law, cost, own_radius=False):
         kind = SimpleNamespace(own_radius=own_radius)
