@@ -16,7 +16,7 @@ from planarfriction.identify.parameters import (
     soft_finger_moments,
 )
 from planarfriction.identify.simulators import SIMULATORS
-from planarfriction.identify.uncertainty import covariance
+from planarfriction.identify.uncertainty import NEAR, covariance
 from planarfriction.identify.verdicts import speed_gap
 from planarfriction.identify.wrenches import BEATEN, _like
 from tests.support.identification_logs import (
@@ -443,3 +443,15 @@ def test_bristles_that_lost_in_discs_are_not_fitted_in_cells(cost, near):
     candidates = [published, plain, discs]
     assert _like(discs.fit.problem, candidates) == (discs.fit, False)
     assert _like(fit("c", 1.0).fit.problem, candidates) == (None, False)
+
+
+def test_cells_begin_where_discs_ended_far_from_the_data_too(log):
+    """A strip of 30 x 3 mm is no disc: no model explains the log, and only discs are searched from two starts."""
+    texts = []
+    strip = pf.ContactPatch.rectangle(0.03, 0.003, cells=9)
+    options = {"elasto_plastic": 0.9, "starts": 1, "progress": texts.append}
+    found = identify(noisy(log, 0), strip, model="auto", **options)
+    assert min(each.reduced_chi2 for each in found.scores) > NEAR
+    for model, starts in (("reduced", "of 2"), ("distributed", "of 1")):
+        searches = [each for each in texts if each.startswith(f"{model}: start")]
+        assert starts in searches[0]
