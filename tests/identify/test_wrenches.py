@@ -16,7 +16,7 @@ from planarfriction.identify.parameters import (
     soft_finger_moments,
 )
 from planarfriction.identify.simulators import SIMULATORS
-from planarfriction.identify.uncertainty import covariance
+from planarfriction.identify.uncertainty import NEAR, covariance
 from planarfriction.identify.verdicts import speed_gap
 from planarfriction.identify.wrenches import BEATEN, _like
 from tests.support.identification_logs import (
@@ -427,7 +427,7 @@ def test_discs_grow_and_move_with_their_patch():
 @pytest.mark.parametrize("cost", [1.0, 0.999 * BEATEN, 1.001 * BEATEN])
 @pytest.mark.parametrize("near", [True, False])
 def test_bristles_that_lost_in_discs_are_not_fitted_in_cells(cost, near):
-    """Only if the better ones explain the data; bristles that were not tried have nothing to begin from."""
+    """Only if the best fit, of any model, explains the data; untried bristles have nothing to begin from."""
 
     def fit(law, cost, own_radius=False):
         kind = SimpleNamespace(own_radius=own_radius)
@@ -436,8 +436,22 @@ def test_bristles_that_lost_in_discs_are_not_fitted_in_cells(cost, near):
             fit=SimpleNamespace(problem=problem, cost=cost, near=near)
         )
 
-    plain, better, elsewhere = fit("a", cost), fit("b", 1.0), fit("a", 0.1, True)
-    candidates = [elsewhere, plain, better]
-    for each, loses in ((plain, near and cost > BEATEN), (better, False)):
-        assert _like(each.fit.problem, candidates) == (each.fit, loses)
+    plain, discs, published = fit("a", cost), fit("b", 1.0), fit("b", 1.0, True)
+    for best in (discs, published):
+        loses = near and cost > BEATEN
+        assert _like(plain.fit.problem, [plain, best]) == (plain.fit, loses)
+    candidates = [published, plain, discs]
+    assert _like(discs.fit.problem, candidates) == (discs.fit, False)
     assert _like(fit("c", 1.0).fit.problem, candidates) == (None, False)
+
+
+def test_cells_begin_where_discs_ended_far_from_the_data_too(log):
+    """A strip of 30 x 3 mm is no disc: no model explains the log, and only discs are searched from two starts."""
+    texts = []
+    strip = pf.ContactPatch.rectangle(0.03, 0.003, cells=9)
+    options = {"elasto_plastic": 0.9, "starts": 1, "progress": texts.append}
+    found = identify(noisy(log, 0), strip, model="auto", **options)
+    assert min(each.reduced_chi2 for each in found.scores) > NEAR
+    for model, starts in (("reduced", "of 2"), ("distributed", "of 1")):
+        searches = [each for each in texts if each.startswith(f"{model}: start")]
+        assert starts in searches[0]

@@ -84,8 +84,8 @@ EXPLAINED = 1.2
 data: the quickest model may be wrong."""
 
 BEATEN = 1.1
-"""Ratio of the costs of two kinds of bristles in one model of cells above which the worse kind is not fitted with the
-next such model, if the better one leaves hardly more than noise."""
+"""Ratio of the costs of a model of cells and of the best fit above which the next such model is not fitted with the
+same bristles, if the best fit leaves hardly more than noise."""
 
 USUAL_BRISTLES = ElastoPlastic(0.9)
 """Bristles that "auto" compares with plain ones."""
@@ -201,7 +201,7 @@ def identify_lugre(
                     guesses = guess_starts(problem, given, noise)
                     fit = multistart(problem, guesses, noise)
                     _report_first(fit)
-                elif like is not None and like.near:
+                elif like is not None:
                     fit = multistart(problem, [like.values], noise)
                 else:
                     fit = warm_start(problem, lead or leads[0], guesses, noise)
@@ -232,7 +232,7 @@ def _report_first(fit: Fit) -> None:
 def _like(
     problem: LogProblem, candidates: Sequence[Candidate]
 ) -> tuple[Fit | None, bool]:
-    """Return the fit of another model of cells or discs with the bristles of a problem, and True if others beat these.
+    """Return the fit of another model of cells or discs with the bristles of a problem, and True if a fit beats it.
 
     Such models differ by a few hundredths of the friction: their fits end beside each other.
     """
@@ -240,7 +240,7 @@ def _like(
     bristles = problem.law, problem.pad
     for fit in fits:
         if (fit.problem.law, fit.problem.pad) == bristles:
-            best = min(fits, key=lambda each: each.cost)
+            best = min((each.fit for each in candidates), key=lambda each: each.cost)
             return fit, best.near and fit.cost > BEATEN * best.cost
     return None, False
 

@@ -306,7 +306,7 @@ TRIES = 16
 NEAR = 1e-3
 """Share of the goal by which a profile to start from may miss it."""
 
-GAIN = 1e-3
+GAIN = 2e-3
 """Share of the cost that a further step must save."""
 
 MOST_KNOTS = 200

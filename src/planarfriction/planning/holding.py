@@ -205,8 +205,8 @@ def dynamic_holding_load(
         scene = Scene(
             body, contact, end, force=load, save_every=end, start="equilibrium"
         )
-        data = simulate(scene).data
-        moved = np.array([data[name][-1] for name in ("x", "y", "theta")])
+        histories = simulate(scene).histories
+        moved = np.array([histories[name].values[-1] for name in ("x", "y", "theta")])
         dx, dy, theta = twist_at(moved, model.patch.centre_of_pressure(low))
         way = np.hypot(dx, dy) + model.patch.contact_radius(low) * abs(theta)
         stiffer = softening(model, np.array(low)).min()
