@@ -38,6 +38,8 @@ MIRRORS = {
     "_engine/cells": "_engine/test_cell_blocks.py _engine/test_discs.py models/test_batches.py models/test_rates.py"
     " models/test_anisotropic.py models/test_pressure_follows.py models/test_pads.py test_golden.py"
     " derivatives/test_rollouts*.py scenes/test_edge.py models/test_cell_loads.py scenes/test_pads.py",
+    "_engine/cells/moment_pressure.py": "patch/test_tilt.py models/test_pressure_follows.py"
+    " tensors/test_pressure_follows.py models/test_cell_loads.py scenes/test_pressure_follows.py",
     "_engine/published": "_engine/test_steps.py models/test_rates.py models/test_batches.py test_golden.py"
     " limit_surface/test_closed_forms.py derivatives/test_rollouts_of_every_model.py",
     "_engine/body": "solvers/test_structured.py test_golden.py derivatives/test_scene.py scenes derivatives",
