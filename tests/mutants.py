@@ -37,7 +37,8 @@ MIRRORS = {
     " models/test_pads.py models/test_energy.py laws test_golden.py",
     "_engine/cells": "_engine/test_cell_blocks.py _engine/test_discs.py models/test_batches.py models/test_rates.py"
     " models/test_anisotropic.py models/test_pressure_follows.py models/test_pads.py test_golden.py"
-    " derivatives/test_rollouts*.py scenes/test_edge.py models/test_cell_loads.py scenes/test_pads.py",
+    " derivatives/test_rollouts*.py scenes/test_edge.py scenes/test_pressure_follows.py models/test_cell_loads.py"
+    " scenes/test_pads.py",
     "_engine/cells/moment_pressure.py": "patch/test_tilt.py models/test_pressure_follows.py"
     " tensors/test_pressure_follows.py models/test_cell_loads.py scenes/test_pressure_follows.py",
     "_engine/published": "_engine/test_steps.py models/test_rates.py models/test_batches.py test_golden.py"
