@@ -1,7 +1,7 @@
 """Mutants: `python -m tests.mutants SEED COUNT [core|rest|PATTERN]` changes lines of the library and runs their tests.
 
 Each mutant has one operator, sign or number changed in a copy of the package, drawn by the seed among all that there
-are; the tests that mirror its module run until one fails. A line that no test sees is told at the end.
+are; the tests that mirror its module run until one fails. One that no test sees is told as NOT SEEN.
 """
 
 from __future__ import annotations
