@@ -153,7 +153,7 @@ def tests_of(name: str) -> list[str]:
 
 
 def judged(copy: Path, tests: list[str]) -> str:
-    """Return what tests say of the package of a folder: seen, not seen, or no answer within the limit of time."""
+    """Return what tests say of the package of a folder: seen by one of them, not seen, or no answer in time."""
     folders = [copy, ROOT / "studies" / "src", ROOT]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, folders))}
     command = [
@@ -172,7 +172,10 @@ def judged(copy: Path, tests: list[str]) -> str:
         )
     except subprocess.TimeoutExpired:
         return "no answer"
-    return "seen" if done.returncode else "NOT SEEN"
+    if not done.returncode:
+        return "NOT SEEN"
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout.decode(), re.MULTILINE)
+    return f"seen by {failed[1] if failed else f'exit {done.returncode}'}"
 
 
 def main(seed: int, count: int, part: str = "") -> None:
@@ -202,7 +205,7 @@ def main(seed: int, count: int, part: str = "") -> None:
                 source[:begin] + new.encode() + source[end:]
             )
             words = judged(Path(folder), tests_of(name))
-        seen += words == "seen"
+        seen += words.startswith("seen")
         print(
             f"{words}: {name}:{line}: {told}: {source[begin:end].decode()} -> {new}",
             flush=True,
