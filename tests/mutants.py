@@ -52,6 +52,8 @@ MIRRORS = {
     "_engine": "_engine test_golden.py models derivatives limit_surface patch test_coupling.py",
     "models": "models test_golden.py derivatives",
     "coupling.py": "test_coupling*.py models/test_pressure_follows.py models/test_cell_loads.py",
+    "formulas.py": "test_formulas.py _engine/test_discs.py _support/test_validation.py models/test_rates.py"
+    " models/test_extremes.py test_golden.py",
     "sliding_body.py": "test_sliding_body*.py models/test_cell_loads.py",
     "pads.py": "models/test_pads*.py models/test_pad_discs.py scenes/test_pads.py",
     "half_space.py": "models/test_pads*.py test_tactile.py",
