@@ -46,6 +46,8 @@ MIRRORS = {
     "_engine/body": "solvers/test_structured.py test_golden.py derivatives/test_scene.py scenes derivatives",
     "_engine/coupled": "test_coupling*.py test_sliding_body*.py models/test_pads.py models/test_cell_loads.py"
     " models/test_pressure_follows.py scenes/test_pads.py",
+    "_engine/coupled/placing.py": "adapters/test_turning.py adapters/test_mujoco_centres.py"
+    " adapters/test_mujoco_wheels.py adapters/test_drake_turning.py adapters/test_mujoco_warp_turning.py",
     "_engine/records": "models/test_batches.py models/test_state_types.py models/test_steps.py test_golden.py models"
     " scenes/test_edge.py scenes/test_pads.py",
     "_engine/compiler": "_engine/compiler",
