@@ -74,6 +74,25 @@ def test_what_does_not_converge_does_no_work_that_bristles_do_not_give():
     assert lost >= 1 and wrong >= 50
 
 
+def test_wrenches_that_would_do_more_work_are_scaled_to_do_the_least():
+    """The work of `s W` on the host, `s W.V_0 + s^2 W.A W`, is least at s = 1 where its slope is 0 there."""
+    patches = _patches()
+    least = 0
+    for height in (1.0, 10.0):
+        for _, host, _, step in _runs(patches, height, 6):
+            lost = ~step.converged
+            a = host.twist_response[lost]
+            w, before, twist = (
+                each[lost].reshape(-1, 12)
+                for each in (step.wrench, host.wrench, host.twist)
+            )
+            begin = (w * (twist - np.einsum("eij,ej->ei", a, before))).sum(axis=1)
+            bends = np.einsum("ei,eij,ej->e", w, a, w)
+            least += (abs(begin + 2.0 * bends) < 1e-9 * abs(begin)).sum()
+    # Others stay as they are, or let their bristles go.
+    assert least >= 2
+
+
 @pytest.mark.parametrize(
     ("growth", "speed"),
     [(0.5, 1e-3), (0.5, 1.0), (2.0, 1e-3), (10.0, 1e-3), (10.0, 1.0)],

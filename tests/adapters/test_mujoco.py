@@ -19,6 +19,7 @@ from planarfriction.adapters.mujoco import (  # noqa: E402
     PatchContact,
     prepare,
 )
+from planarfriction.adapters.mujoco.library import _SHARED  # noqa: E402
 from planarfriction.adapters.mujoco.loops import step  # noqa: E402
 from planarfriction_studies.bench import mujoco_scenes  # noqa: E402
 from tests.support.mujoco_misfit import misfit, step_checked, twists_and_loads  # noqa: E402
@@ -246,6 +247,23 @@ def test_other_models_are_left_alone_and_copies_are_not():
         for _ in range(200):
             mujoco.mj_step(same, other)
     assert np.hypot(*friction.wrenches(other)[:, :2].T).sum() > 1.0
+
+
+def test_copies_are_known_by_arrays_of_the_bytes_that_these_have():
+    """A byte more would be read from the array behind it, which copies need not share."""
+    m = mujoco.MjModel.from_xml_string("""
+        <mujoco>
+          <worldbody>
+            <geom name="a" size="1"/>
+            <body><freejoint/><geom name="b" size="1"/><site/></body>
+          </worldbody>
+          <contact><pair geom1="a" geom2="b"/></contact>
+          <custom><numeric name="c" data="1"/></custom>
+        </mujoco>""")
+    for name, (count, size) in _SHARED.items():
+        entries = getattr(m, count)
+        assert entries > 0
+        assert len(bytes(getattr(m, name))) == entries * size, name
 
 
 @pytest.mark.filterwarnings("ignore:the time of these data went on:UserWarning")

@@ -91,6 +91,14 @@ def test_outlines_hold_the_area_of_the_patch(name):
     assert area == pytest.approx(patch.areas.sum(), rel=0.05)
 
 
+def test_an_outline_is_off_by_less_than_a_hundredth_of_the_patch():
+    """The chords of a disc lie furthest from its rim in their middle."""
+    (rim,) = outlines(pf.ContactPatch.disc(radius=0.02))
+    middles = 0.5 * (rim[1:] + rim[:-1])
+    assert np.linalg.norm(rim, axis=1) == pytest.approx(0.02, rel=1e-6)
+    assert np.linalg.norm(middles, axis=1).min() > 0.99 * 0.02
+
+
 def test_a_full_scene_is_refused():
     scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), maxgeom=5)
     with refused("scene must have room for more geoms"):

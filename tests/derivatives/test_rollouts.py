@@ -319,9 +319,18 @@ def test_a_bristle_brought_back_to_full_deflection_slides_along_the_cap():
 # ---------------------------------------------------------------------- batches
 
 
-def test_one_load_for_each_contact_and_rest():
-    model = model_of("ellipsoid")
-    _, twists, _ = drive(model)
+def face_model():
+    """Return a model on a pad with a common compliance, whose face has a state and a rollout of its own."""
+    law = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_1=0.0, v_s=2e-2, elasto_plastic=0.9)
+    return pf.ReducedModel(PATCH, law, pad=pf.Pad.measured(4e3, 0.4))
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: model_of("ellipsoid"), face_model], ids=["ellipsoid", "face"]
+)
+def test_one_load_for_each_contact_and_rest(make):
+    model = make()
+    _, twists, _ = drive(model_of("ellipsoid"))
     each = derivatives.rollout(model, None, twists, [[1.0], [2.0]], DT)
     assert each.wrenches.shape == (2, T, 3)
     # Contacts abreast go through vector code, which rounds differently.
@@ -331,7 +340,10 @@ def test_one_load_for_each_contact_and_rest():
     gradient = derivatives.rollout_vjp(
         model, None, twists, [[1.0], [2.0]], DT, np.ones((T, 3))
     )
-    assert gradient.state.shape == (3,) and gradient.normal_force.shape == (2, 1)
+    assert gradient.state.shape == model.state_shape
+    assert gradient.normal_force.shape == (2, 1)
+    alone = derivatives.rollout_vjp(model, None, twists, 2.0, DT, np.ones((T, 3)))
+    assert gradient.normal_force[1] == pytest.approx(alone.normal_force, rel=1e-10)
 
 
 def test_changes_broadcast_with_contacts():
@@ -484,9 +496,7 @@ def test_what_else_is_refused():
 
 
 def test_a_face_without_load_forgets_and_takes_no_numbers():
-    pad = pf.Pad.measured(4e3, 0.4)
-    law = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_1=0.0, v_s=2e-2, elasto_plastic=0.9)
-    model = pf.ReducedModel(PATCH, law, pad=pad)
+    model = face_model()
     _, twists, loads = drive(model_of("ellipsoid"))
     state, _ = model.step(model.rest(), 0.01 * twists[0], 3.0, DT)
     loads[2] = 0.0

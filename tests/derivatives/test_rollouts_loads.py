@@ -86,3 +86,25 @@ def test_without_load_the_slope_is_the_wrench_per_newton_of_a_small_one():
     assert not found.twist.any() and not found.normal_force[:4].any()
     alone = derivatives.rollout_vjp(model, before, twists[4:5], 0.0, DT, bar[4:5])
     assert float(alone.normal_force) == pytest.approx(small, rel=1e-9)
+
+
+@pytest.mark.parametrize("loads", [(1.1, 2.1, 3.1), (2.1, 3.1, 1.1), (3.1, 1.1, 2.1)])
+def test_a_rollout_can_begin_and_end_at_any_of_its_loads(loads):
+    """The first and the last step are those of rollouts of one step, whose only load is theirs."""
+    model = pf.DistributedModel(TIP, ELASTIC)
+    state, twists = drive(model, 3)
+    path = derivatives.rollout_states(model, state, twists[:3], loads, DT)
+    first = derivatives.rollout(model, state, twists[:1], loads[0], DT)
+    assert path.wrenches[0] == pytest.approx(first.wrenches[0], rel=1e-12)
+
+    forward = derivatives.rollout_jacobian(model, state, twists[:3], loads, DT)
+    alone = derivatives.rollout_jacobian(model, state, twists[:1], loads[0], DT)
+    assert forward.d_wrenches[0] == pytest.approx(alone.d_wrenches[0], rel=1e-12)
+
+    bar = np.zeros((3, 3))
+    bar[2] = 1.0 / SIZES
+    found = derivatives.rollout_vjp(model, state, twists[:3], loads, DT, bar)
+    last = derivatives.rollout_vjp(
+        model, path.states[2], twists[2:3], loads[2], DT, bar[2:]
+    )
+    assert found.twist[2] == pytest.approx(last.twist[0], rel=1e-12)

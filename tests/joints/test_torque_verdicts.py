@@ -75,7 +75,7 @@ REFUSED = {
     "a joint that stands": (lambda: logs(lambda t, q, torque: (t, 0.0 * q, torque)), Plant(), "must move"),
     "a torque far too late": (
         lambda: logs(lambda t, q, torque: (t, q, np.roll(torque, 250))), Plant(),
-        "torque of the logs must",
+        "torque of the logs must be less than 40 ms late",
     ),
 }  # fmt: skip
 

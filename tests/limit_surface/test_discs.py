@@ -21,7 +21,20 @@ GRAINS = FEW.with_friction_metric(
 MIXED = dataclasses.replace(
     FEW, radii=np.where(np.arange(FEW.cells) % 2, FEW.radii, 0.0)
 )
-PATCHES = {"one": ONE, "few": FEW, "grain": GRAIN, "grains": GRAINS, "mixed": MIXED}
+FOUR = pf.ContactPatch(
+    R * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]), np.full(4, 1e-4), radii=[R] * 4
+).with_friction_metric(
+    np.array([pf.friction_metric(0.0, *each) for each in ((1.5, 0.7), (0.7, 1.5))] * 2)
+)
+"""Alike about both axes on the whole, and not above and below one: a force along it, without any torque, turns them."""
+PATCHES = {
+    "one": ONE,
+    "few": FEW,
+    "grain": GRAIN,
+    "grains": GRAINS,
+    "mixed": MIXED,
+    "four": FOUR,
+}
 SCALE = np.array([1.0, 1.0, 1.0 / R])
 """Scales of twists; wrenches over it are of the order of 1."""
 
@@ -114,7 +127,9 @@ def test_wrenches_are_gradients_and_jacobians_their_slopes(name):
 
 @pytest.mark.parametrize("name", PATCHES)
 def test_twist_of_a_wrench(name):
-    wrenches = np.random.default_rng(6).normal(size=(100, 3)) * [1.0, 1.0, R]
+    wrenches = np.random.default_rng(6).normal(size=(100, 3))
+    wrenches[:6] = np.concatenate([np.eye(3), -np.eye(3)])
+    wrenches *= [1.0, 1.0, R]
     patch = PATCHES[name]
     x, y = patch.centre_of_pressure()
     wrenches[:, 2] += x * wrenches[:, 1] - y * wrenches[:, 0]

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
+from planarfriction._engine.compiler import jit
 from planarfriction.errors import SolverError
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.limit_surface.loops.cell_twists import cell_twists
+from planarfriction.limit_surface.loops.twists import table_at
 from planarfriction.patch import PUBLISHED_PATCHES
 from tests.support.refusals import refused
 
@@ -138,6 +140,24 @@ def test_no_other_twist_resists_the_wrench_with_less_dissipation(kind, name):
     assert (
         (-asked @ others.T).max(axis=1) <= power * (1 + 1e-9)
     ).all()  # of the rounding off of kinks
+
+
+@jit
+def _table_at(table, v):
+    return table_at(table, (0.1, 0.0, 0.0), (v[0], v[1], v[2]), np.empty(9))
+
+
+def test_newton_steps_take_the_slopes_of_the_wrench():
+    """Slopes that are wrong lead to the same twist, in many more steps."""
+    table = pf.LimitSurfaceTable(PATCHES["map"])._table
+    v = np.array([0.7, -1.1, 0.4])
+    _, (xx, xy, xs, yy, ys, ss) = _table_at(table, v)
+    wanted = [
+        np.subtract(_table_at(table, v + d)[0], _table_at(table, v - d)[0]) / 2e-6
+        for d in 1e-6 * np.eye(3)
+    ]
+    found = np.array([[xx, xy, xs], [xy, yy, ys], [xs, ys, ss]])
+    assert found == pytest.approx(np.array(wanted), abs=1e-7)
 
 
 def test_a_cell_that_rests_bears_no_more_than_its_friction():

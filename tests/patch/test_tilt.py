@@ -1,5 +1,7 @@
 """Pressure that follows the moments of the load: closed forms on a rectangle, edges, hulls, continuity."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import shapely
@@ -108,6 +110,18 @@ def test_a_line_tilts_along_itself_and_a_point_does_not():
     np.testing.assert_allclose(centre(line, weights), (0.002, 0.0), atol=1e-9)
     point = pf.ContactPatch.points([(0.01, 0.02)])
     np.testing.assert_array_equal(follow(point, (0.5, 0.5)), [1.0])
+
+
+@pytest.mark.parametrize(
+    "patch", [RECTANGLE, pf.ContactPatch.line(0.02, direction="y")]
+)
+def test_a_patch_beside_its_origin_presses_as_one_at_it(patch):
+    aside = np.array([0.3, -0.2])
+    moved = dataclasses.replace(patch, positions=patch.positions + aside)
+    asked = np.array([[0.0, 0.003], [0.03, 0.009], [-0.2, 0.1]])
+    np.testing.assert_allclose(
+        follow(moved, aside + asked), follow(patch, asked), atol=1e-7
+    )
 
 
 def test_batches_broadcast_and_are_those_of_each():

@@ -150,15 +150,19 @@ def test_a_body_that_would_tip_slides_on_the_edge_of_its_patch():
     np.testing.assert_allclose(data.fx[2:], -data.normal_force[2:], rtol=1e-4)
 
 
-def test_the_frame_of_the_contact_does_not_matter():
+@pytest.mark.parametrize(
+    ("beside", "moved"),
+    [((0.012, 0.005), (0.02, -0.03)), ((0.004, 0.002), (0.002, -0.001))],
+    ids=["cells lift", "all press"],
+)
+def test_the_frame_of_the_contact_does_not_matter(beside, moved):
     """A patch in a frame that is turned and elsewhere, of cells that lie where they did: the same motion."""
     cos = np.cos(0.7)
     sin = np.sin(0.7)
     turn = np.array([[cos, -sin], [sin, cos]])
-    moved = np.array([0.02, -0.03])
     twist = (0.4, 0.2, 3.0)
     model = MODELS["cells"]
-    scene = slide(model, twist, 0.05, beside=(0.012, 0.005))
+    scene = slide(model, twist, 0.05, beside=beside)
     patch = pf.ContactPatch(
         (FACE.positions - moved) @ turn, FACE.areas, FACE.weights() / FACE.areas
     )

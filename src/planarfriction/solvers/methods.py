@@ -29,7 +29,7 @@ RODAS3 = Method(
     e=np.array([0.0, 0.0, 0.0, 1.0]),
     alpha=np.array([0.0, 0.0, 1.0, 1.0]),
     time_gamma=np.array([0.5, 1.5, 0.0, 0.0]),
-    dense=np.array([[0.0, 0.0, -1.0, -1.0]]),
+    dense=np.array([[3.0, -1.0, 0.0, 0.0]]),
     order=3.0,
 )
 """Order 3(2), four stages, three right-hand sides. Source: Sandu et al. 1997, Atmospheric Environment 31."""
