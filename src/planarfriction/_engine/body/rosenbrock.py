@@ -350,8 +350,7 @@ def attempt(run: Place, piece: int, since: float, step: float, fresh: int) -> No
     statistics = run.progress.statistics
     fresh = fresh == 1
     if fresh:
-        call(system.rates, (run.system, piece, since, y, run.stages.start_rate))
-        call(system.linearise, (run.system, piece, y))
+        call(system.linearise, (run.system, piece, since, y, run.stages.start_rate))
         _time_slope(system, piece, y, run.stages.time_slope)
         if _drifts(system, piece):
             _drift(run, system, piece, since, step)
