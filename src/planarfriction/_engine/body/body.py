@@ -344,7 +344,10 @@ def _rates(
         inputs = _seen_from(work, c, place, at(body, 3), a, seen)
         states = record_of(system, piece, c), at(y, first), work.twist, at(dy, first), w
         if keep:
-            call(functions_of(system, c).linearise, (*states, linearisation_of(system, c)))
+            call(
+                functions_of(system, c).linearise,
+                (*states, linearisation_of(system, c)),
+            )
             contact_map_slopes(mount, a, seen, w, g, h)
             if exists(system.motion.mover):
                 # Elsewhere, the other side has another velocity.

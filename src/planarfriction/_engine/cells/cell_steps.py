@@ -36,17 +36,16 @@ from planarfriction._engine.codegen.vectors import (
     put_all,
     three,
 )
-from planarfriction._engine.compiler import entry, kernel
+from planarfriction._engine.compiler import entry, kernel, wide_entry
 from planarfriction._engine.compiler.memory import Doubles, Place, at
 from planarfriction._engine.protocol import (
     SLOPES,
     ModelFunctions,
     StepFunctions,
-    functions_of,
 )
 
 RESULTS = LANES * (4 * DISC.size**2 + DISC.size)
-"""Numbers of the results of a block of cells: derivatives of rates and tractions, and rates, or bristles, row by row."""
+"""Numbers of the results of a block of cells, row by row: derivatives of rates and tractions, and rates or bristles."""
 
 BLOCK = RESULTS + LANES * 12
 """Numbers of a block of cells: results, and copies of up to eight numbers, of the bristle and of the weight."""
@@ -231,15 +230,16 @@ def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
 
 def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
     """Return the functions of the solver for contacts of a kind of cells whose records `read` reads."""
-    loops = {
-        "slope": slope_passes(kind).run,
-        "rate": rate_passes(kind).run,
-    }
-    return functions_of(
-        kind.name,
-        (evaluate, linearise, *general_cells.FUNCTIONS),
-        **_model_of(kind, read),
-        **loops,
+    model = _model_of(kind, read)
+    rate = rate_passes(kind).run
+    slope = slope_passes(kind).run
+    return ModelFunctions(
+        bind(evaluate, f"{kind.name}_evaluate", wide_entry, **model, rate=rate),
+        bind(linearise, f"{kind.name}_linearise", wide_entry, **model, slope=slope),
+        *(
+            bind(each, f"{kind.name}_{each.__name__}", entry, **model)
+            for each in general_cells.FUNCTIONS
+        ),
     )
 
 

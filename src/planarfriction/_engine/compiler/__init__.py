@@ -27,6 +27,9 @@ Sequential: Any = part(
 )
 """The same for entry points whose loops are short: no vector instructions, no unrolling."""
 
+Wide: Any = part("planarfriction._engine.compiler.entries", "Wide", Compiler)
+"""The same for entry points whose loops take vectors of 512 bits."""
+
 kept: Any = part(
     "planarfriction._engine.compiler.machine_code",
     "kept",
@@ -113,6 +116,10 @@ def entry(function: Any, compiler: Any = Entry) -> Any:
     """Compile a function that compiled code calls by its address (see `compiler.calls`), and keep it on disk."""
     compiled = njit(pipeline_class=compiler, **_INNER, **_OPTIONS)
     return kept(compiled(function), SOURCES)
+
+
+wide_entry: Any = functools.partial(entry, compiler=Wide)
+"""Compile a function as `entry` does, with vectors of 512 bits: for one whose loops over cells have no remainder."""
 
 
 sequential_entry: Any = functools.partial(entry, compiler=Sequential)

@@ -58,6 +58,14 @@ class _Whole(JITCodeLibrary):
         passes.run(self._final_module, builder)
 
 
+class _Wide(_Whole):
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Add code whose loops take vectors of 512 bits where the processor has them; LLVM prefers 256."""
+        for function in ir_module.functions:
+            set.add(function.attributes, '"prefer-vector-width"="512"')
+        super().add_ir_module(ir_module)
+
+
 class _Short(_Whole):
     loops = False
 
@@ -73,6 +81,12 @@ class _Lowering(typed_passes.NativeLowering):
         )
         state.library.enable_object_caching()
         return super().run_pass(state)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _WideLowering(_Lowering):
+    _name = "lowering of entry points with wide vectors"
+    library = _Wide
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -96,6 +110,12 @@ class Entry(CompilerBase):
             passes.add_pass(self.lowering if lowering else each, words)
         passes.finalize()
         return [passes]
+
+
+class Wide(Entry):
+    """Compiler of entry points whose loops over cells are long and have no remainder."""
+
+    lowering = _WideLowering
 
 
 class Sequential(Entry):
