@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from planarfriction import formulas
 from planarfriction._engine.bristles.bristle_step import capped
-from planarfriction._engine.bristles.law import traction
+from planarfriction._engine.bristles.law import inverse_deflection, traction
 from planarfriction._engine.codegen.ratios import ratio
 from planarfriction._engine.codegen.vectors import Vector, dot, norm
 from planarfriction._engine.compiler import compiled_math as xp
@@ -88,28 +88,21 @@ def _drive(law: LawNumbers, u: Vector, slid: tuple) -> _Drive:
     """Return the motion of a disc from its velocity and its `sliding`."""
     c_t, c_s, across, speed, pull = slid
     across = across * xp.where(law.elasto_plastic > 0.0, 1.0, formulas.PLAIN_ACROSS)
-    both = c_t * c_s
+    both = 1.0 / (c_t * c_s)
     size = _moving(norm(pull))
-    moves = size > 0.0
-    safe = xp.where(moves, size, 1.0)
-    friction = formulas.stribeck(xp, speed, law)
-    # One division does for three.
-    per = 1.0 / (both * friction * safe)
-    per_size = xp.where(moves, both * friction * per, 0.0)
-    per_both = friction * safe * per
-    n_s = pull[2] * per_size
+    n_s = ratio(pull[2], size)
     return _Drive(
         u,
-        (1.0 - across) * c_s * per_both,
-        c_t * per_both,
-        across * (1.0 - n_s * n_s) * (c_s * per_both),
+        (1.0 - across) * c_s * both,
+        c_t * both,
+        across * (1.0 - n_s * n_s) * (c_s * both),
         across,
-        across * per_size,
+        ratio(across, size),
         speed,
-        law.sigma_0 * (both * safe * per),
-        xp.where(moves, speed * per_size, 1.0),
+        inverse_deflection(law, speed),
+        xp.where(size > 0.0, ratio(speed, size), 1.0),
         ratio(u[2], _moving(norm(u))),
-        (pull[0] * per_size, pull[1] * per_size, n_s),
+        (ratio(pull[0], size), ratio(pull[1], size), n_s),
     )
 
 
