@@ -412,7 +412,7 @@ def _solve(calls, contact, z, v, shift, r, dv, lin, stiffness, wrench, change):
     own = addresses_at(calls)
     z = doubles(z)
     lin = doubles(lin)
-    call(own.linearise, (contact, z, doubles(v), lin))
+    call(own.linearise, (contact, z, doubles(v), doubles(change), doubles(wrench), lin))
     call(own.factor, (contact, z, shift, lin, doubles(stiffness)))
     call(own.eliminate, (contact, z, shift, doubles(r), lin, doubles(wrench)))
     call(own.back_substitute, (contact, z, doubles(r), doubles(dv), lin, doubles(change)))  # fmt: skip

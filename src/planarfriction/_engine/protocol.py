@@ -66,7 +66,7 @@ class ModelFunctions(NamedTuple):
     evaluate: Any
     """`(contact, z, V, z', W)`: write z' and W; behind V is what `Seen` holds."""
     linearise: Any
-    """`(contact, z, V, lin)`: write the derivatives of f into the workspace `lin` of the contact; V as above."""
+    """`(contact, z, V, z', W, lin)`: evaluate, and write the derivatives of f into the workspace `lin`; V as above."""
     factor: Any
     """`(contact, z, shift, lin, S)`: prepare D in `lin`, write S [3, 3] = dW/dV with z eliminated.
 

@@ -26,7 +26,6 @@ RODAS3 = Method(
     a=_lower((0.0,), (2.0, 0.0), (2.0, 0.0, 1.0)),
     c=_lower((4.0,), (1.0, -1.0), (1.0, -1.0, -8.0 / 3.0)),
     m=np.array([2.0, 0.0, 1.0, 1.0]),
-    e=np.array([0.0, 0.0, 0.0, 1.0]),
     alpha=np.array([0.0, 0.0, 1.0, 1.0]),
     time_gamma=np.array([0.5, 1.5, 0.0, 0.0]),
     dense=np.array([[3.0, -1.0, 0.0, 0.0]]),
@@ -63,7 +62,6 @@ RODAS4 = Method(
         ),
     ),
     m=np.array([*_RODAS4_LAST, 1.0, 1.0]),
-    e=np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
     alpha=np.array([0.0, 0.386, 0.21, 0.63, 1.0, 1.0]),
     time_gamma=np.array([0.25, -0.1043, 0.1035, -0.0362, 0.0, 0.0]),
     dense=np.array(

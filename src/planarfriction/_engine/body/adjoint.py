@@ -356,8 +356,7 @@ def jump(
     w = read_workspace(workspace)
     y = w.state
     o = system.bristles
-    call(system.rates, (address, piece, since, y, w.rate))
-    call(system.linearise, (address, piece, y))
+    call(system.linearise, (address, piece, since, y, w.rate))
     for c in range(system.size):
         load = load_of(system, piece, since, c)
         seed = seeds[c, 0], seeds[c, 1], seeds[c, 2]

@@ -320,27 +320,43 @@ def _seen_from(
     return seen
 
 
-@entry
-def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> None:
-    """Write the right-hand side `dy` at `since` seconds into a piece, and wrenches per unit load into the workspace."""
-    system = read(address)
+@kernel
+def _rates(
+    system: SystemRecord, piece: int, since: float, y: Doubles, dy: Doubles, keep: bool
+) -> None:
+    """Write `rates`; keep the linearisation of every contact if asked for."""
     work = system.work
     body = at(y, system.bristles)
     out = at(dy, system.bristles)
-    a = system.work.stiffness
     force = at(system.motion.force, 6 * piece)
     total = plus(three(force), since, three(at(force, 3)))
     total = plus(total, 1.0, spring_wrench(system, piece, since, body))
     for c in range(system.size):
         first = system.contacts.state[c]
         w = at(work.wrench, 3 * c)
+        mount = system.contacts.mount[c]
         place, seen = place_at(system, piece, since, c, body)
-        contact_map(system.contacts.mount[c], place, at(body, 3), a)
+        (a, g, h) = maps_of(system, c)
+        a = a if keep else work.stiffness
+        contact_map(mount, place, at(body, 3), a)
         load = load_of(system, piece, since, c)
         work.load[c] = xp.maximum(load, NO_LOAD * system.contacts.stiff[c])
         inputs = _seen_from(work, c, place, at(body, 3), a, seen)
-        states = at(y, first), work.twist, at(dy, first), w
-        call(functions_of(system, c).evaluate, (record_of(system, piece, c), *states))
+        states = record_of(system, piece, c), at(y, first), work.twist, at(dy, first), w
+        if keep:
+            call(
+                functions_of(system, c).linearise,
+                (*states, linearisation_of(system, c)),
+            )
+            contact_map_slopes(mount, a, seen, w, g, h)
+            if exists(system.motion.mover):
+                # Elsewhere, the other side has another velocity.
+                omega = work.frame[8 * c + 7]
+                for i in range(3):
+                    g[3 * i] -= omega * a[3 * i + 1]
+                    g[3 * i + 1] += omega * a[3 * i]
+        else:
+            call(functions_of(system, c).evaluate, states)
         work.covered[c] = inputs.covered[0]
         total = plus(total, total_load(system, piece, since, c), applied_back(a, w))
     for i in range(3):
@@ -363,31 +379,17 @@ def _turned(system: SystemRecord, body: Doubles, u: Vector) -> Vector:
 
 
 @entry
-def linearise(address: Place, piece: int, y: Doubles) -> None:
-    """Linearise every contact about `y`, whose `rates` were evaluated last."""
-    system = read(address)
-    work = system.work
-    moves = exists(system.motion.mover)
-    for c in range(system.size):
-        mount = system.contacts.mount[c]
-        (a, g, h) = maps_of(system, c)
-        seen = seen_by(system, c, y)
-        place = at(work.frame, 8 * c) if moves else at(system.contacts.place, 4 * c)
-        contact_map(mount, place, at(y, system.bristles + 3), a)
-        contact_map_slopes(mount, a, seen, at(work.wrench, 3 * c), g, h)
-        if moves:
-            # Elsewhere, the other side has another velocity.
-            omega = work.frame[8 * c + 7]
-            for i in range(3):
-                g[3 * i] -= omega * a[3 * i + 1]
-                g[3 * i + 1] += omega * a[3 * i]
-        _seen_from(work, c, place, at(y, system.bristles + 3), a, seen)
-        states = (
-            at(y, system.contacts.state[c]),
-            work.twist,
-            linearisation_of(system, c),
-        )
-        call(functions_of(system, c).linearise, (record_of(system, piece, c), *states))
+def rates(address: Place, piece: int, since: float, y: Doubles, dy: Doubles) -> None:
+    """Write the right-hand side `dy` at `since` seconds into a piece, and wrenches per unit load into the workspace."""
+    _rates(read(address), piece, since, y, dy, False)
+
+
+@entry
+def linearise(
+    address: Place, piece: int, since: float, y: Doubles, dy: Doubles
+) -> None:
+    """Write what `rates` does, and linearise every contact about `y`."""
+    _rates(read(address), piece, since, y, dy, True)
 
 
 @entry

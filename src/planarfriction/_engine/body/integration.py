@@ -6,13 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.codegen.vectors import copy
 from planarfriction._engine.compiler import entry, kernel
 from planarfriction._engine.compiler.calls import call
 from planarfriction._engine.compiler.memory import Doubles, Integers, at, reader
 
 
 class Method(NamedTuple):
-    """A Rosenbrock method in transformed coefficients (Hairer and Wanner, Solving ODEs II, section IV.7)."""
+    """A stiffly accurate Rosenbrock method in transformed coefficients (Hairer and Wanner, Solving ODEs II, IV.7).
+
+    The solution is the argument of the last stage plus that stage, which is the error estimate.
+    """
 
     gamma: float
     a: Doubles
@@ -20,9 +24,7 @@ class Method(NamedTuple):
     c: Doubles
     """Stage couplings `sum c_ij k_j / h`, [s, s]."""
     m: Doubles
-    """Solution `y + sum m_j k_j`, [s]."""
-    e: Doubles
-    """Error estimate `sum e_j k_j`, [s]."""
+    """Solution `y + sum m_j k_j`: the last row of `a`, and 1, [s]."""
     alpha: Doubles
     """Stage times, [s]."""
     time_gamma: Doubles
@@ -81,9 +83,7 @@ class Stages(NamedTuple):
     new: Doubles
     """Solution at the end of the step, [n]."""
     error: Doubles
-    """Error estimate of the solution, [n]."""
-    zero: Doubles
-    """Zeros, [n]."""
+    """Error of the continuous extension, [n]."""
     drift: Doubles
     """`df/dt` where something that a contact touches moves, [n]."""
     time_slope: Doubles
@@ -104,14 +104,19 @@ def combine(
     out: Doubles,
 ) -> None:
     """Write `out = base + sum coefficients_j stages_j` over the first `count` stages [count, n], two at a time."""
-    if count % 2 == 1:
+    if count == 0:
+        copy(base, out, n)
+    elif count % 2 == 1:
         a = coefficients[0]
         for i in range(n):
             out[i] = base[i] + a * stages[i]
     else:
+        a = coefficients[0]
+        b = coefficients[1]
+        second = at(stages, n)
         for i in range(n):
-            out[i] = base[i]
-    for j in range(count % 2, count, 2):
+            out[i] = base[i] + a * stages[i] + b * second[i]
+    for j in range(2 - count % 2, count, 2):
         a = coefficients[j]
         b = coefficients[j + 1]
         first = at(stages, j * n)

@@ -140,8 +140,7 @@ def hold(
     system = read(address)
     piece = path.piece[k]
     interpolate(path, k, since, w.state)
-    call(system.rates, (address, piece, since, w.state, w.rate))
-    call(system.linearise, (address, piece, w.state))
+    call(system.linearise, (address, piece, since, w.state, w.rate))
     call(system.factor, (address, piece, since, w.state, shift))
 
 

@@ -129,14 +129,13 @@ _RESOLUTION = 1e-15
 
 
 @kernel
-def _error(run: RunRecord, system: SystemRecord) -> float:
-    """Return the largest error of the body's components and of each contact's bristles (mean), per tolerance.
+def _error(run: RunRecord, system: SystemRecord, error: Doubles) -> float:
+    """Return the largest of errors of the body's components and of each contact's bristles (mean), per tolerance.
 
     Infinite where anything is not finite.
     """
     y = run.progress.y
     new = run.stages.new
-    error = run.stages.error
     atol = run.atol
     rtol = run.rtol
     largest = 0.0
@@ -240,7 +239,7 @@ def forget_unloaded(system: SystemRecord, piece: int, y: Doubles) -> None:
 def _step(
     run: RunRecord, system: SystemRecord, piece: int, since: float, step: float
 ) -> None:
-    """Go through the stages of one step from `y`: solution into `new`, its error estimate into `error`."""
+    """Go through the stages of one step from `y`: solution into `new`; its error estimate is the last stage."""
     n = run.states
     s = run.stage_count
     method = run.method
@@ -278,8 +277,9 @@ def _step(
             for p in range(3):
                 right[n - 6 + p] += slope * work.time_slope[p]
         call(system.solve, (run.system, piece, since, y, shift, right, at(k, i * n)))
-    call(run.combine, (method.m, k, s, n, y, work.new))
-    call(run.combine, (method.e, k, s, n, work.zero, work.error))
+    last = s - 1
+    whole = at(method.m, last)
+    call(run.combine, (whole, at(k, last * n), 1, n, work.argument, work.new))
 
 
 @kernel
@@ -336,7 +336,7 @@ def _missed_inside(
             system.solve,
             (run.system, piece, since, run.progress.y, shift, work.right, work.error),
         )
-        largest = xp.maximum(largest, _error(run, system) / _DOUBT)
+        largest = xp.maximum(largest, _error(run, system, work.error) / _DOUBT)
     run.progress.statistics[EVALUATIONS] += looks
     return largest
 
@@ -350,15 +350,15 @@ def attempt(run: Place, piece: int, since: float, step: float, fresh: int) -> No
     statistics = run.progress.statistics
     fresh = fresh == 1
     if fresh:
-        call(system.rates, (run.system, piece, since, y, run.stages.start_rate))
-        call(system.linearise, (run.system, piece, y))
+        call(system.linearise, (run.system, piece, since, y, run.stages.start_rate))
         _time_slope(system, piece, y, run.stages.time_slope)
         if _drifts(system, piece):
             _drift(run, system, piece, since, step)
         statistics[JACOBIANS] += 1
     _step(run, system, piece, since, step)
     statistics[EVALUATIONS] += run.stage_count if fresh else run.stage_count - 1
-    error = _error(run, system)
+    last = (run.stage_count - 1) * run.states
+    error = _error(run, system, at(run.stages.k, last))
     if error <= 1.0:
         error = xp.maximum(error, _missed_inside(run, system, piece, since, step))
     run.stages.verdict[0] = error

@@ -399,8 +399,7 @@ def wrench_slopes(
     slope = pointer(slope)
     rate = pointer(scratch)
     rows = arrays_at(ROWS, system.work.rows)
-    call(system.rates, (address, piece, since, y, rate))
-    call(system.linearise, (address, piece, y))
+    call(system.linearise, (address, piece, since, y, rate))
     for c in range(system.size):
         load = load_of(system, piece, since, c)
         (a, g, _) = maps_of(system, c)

@@ -388,9 +388,9 @@ def rate_passes(kind: CellKind) -> Passes:
 
 
 def slope_passes(kind: CellKind) -> Passes:
-    """Write the derivatives of the rates of cells in `CellRows` by state and velocity.
+    """Write the derivatives of the rates of cells in `CellRows` by state and velocity, their rates, and their wrench.
 
-    Those of tractions too, unless the bristle is linear.
+    The derivatives of tractions too, unless the bristle is linear.
     """
     element = kind.element
     written = derive(element.evaluate, ("z", "u"), kind.lengths)
@@ -401,7 +401,7 @@ def slope_passes(kind: CellKind) -> Passes:
 
     def slopes(trace: Trace) -> Any:
         s = _Symbols(trace, kind)
-        _, tape = twin(written.forth)(s.law, s.z, s.u)
+        (zdot, traction), tape = twin(written.forth)(s.law, s.z, s.u)
         rows = [
             twin(written.back)(tape, (unit[: element.size], unit[element.size :]))
             for unit in units
@@ -410,12 +410,15 @@ def slope_passes(kind: CellKind) -> Passes:
             rows[first : first + element.size]
             for first in range(0, count, element.size)
         ]
-        return tuple(
+        matrices = tuple(
             tuple(row[which] for row in half) for half in halves for which in range(2)
         )
+        borne = tuple(s.weight * each for each in traction)
+        return matrices, zdot, twin(kind.lever.wrench)(s.cell, borne)
 
     # Of a block: that lies apart.
-    stores = [f"block.out[{m * LANES} + i]" for m in range(2 * count * element.size)]
+    rows = (2 * count + 1) * element.size
+    stores = [f"block.out[{m * LANES} + i]" for m in range(rows)]
     return passes(
         f"slopes of {element.name}",
         traced(slopes),

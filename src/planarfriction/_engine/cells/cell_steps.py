@@ -42,11 +42,10 @@ from planarfriction._engine.protocol import (
     SLOPES,
     ModelFunctions,
     StepFunctions,
-    functions_of,
 )
 
-RESULTS = LANES * 4 * DISC.size**2
-"""Numbers of the results of a block of cells: derivatives of rates and tractions, or rates or bristles, row by row."""
+RESULTS = LANES * (4 * DISC.size**2 + DISC.size)
+"""Numbers of the results of a block of cells, row by row: derivatives of rates and tractions, and rates or bristles."""
 
 BLOCK = RESULTS + LANES * 12
 """Numbers of a block of cells: results, and copies of up to eight numbers, of the bristle and of the weight."""
@@ -151,23 +150,29 @@ def evaluate(
 
 
 def linearise(
-    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any, slope: Any, pad: bool,
-    read: Any,
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, lin: Doubles, *, bristle: Any, cell_rows: Any,
+    slope: Any, pad: bool, read: Any,
 ) -> None:  # fmt: skip
-    """Write A and F of each cell, and C and E unless tractions are linear (see `general_cells`)."""
+    """Evaluate, and write A and F of each cell, and C and E unless tractions are linear (see `general_cells`)."""
     record = read(contact)
     twist = three(v)
+    total = (0.0, 0.0, 0.0)
+    square = bristle.size * bristle.size
+    slopes = 2 * square if bristle.linear else 4 * square
     shared = (0.0, v[3] if pad else 0.0)
     block = scratch(BLOCK)
     n = record.count
     (_, lanes) = divided(record.count)
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block, block)
-        slope(record.law, twist, shared, rows, count)
-        square = bristle.size * bristle.size
-        for m in range(2 * square if bristle.linear else 4 * square):
+        total = plus(total, 1.0, slope(record.law, twist, shared, rows, count))
+        some = min(lanes, n - first)
+        for m in range(slopes):
             row = m if m < 2 * square else m + square  # behind the inverse
-            copy(at(block, m * LANES), at(lin, row * n + first), min(lanes, n - first))
+            copy(at(block, m * LANES), at(lin, row * n + first), some)
+        for m in range(bristle.size):
+            copy(at(block, (slopes + m) * LANES), at(zdot, m * n + first), some)
+    put(w, total)
 
 
 def step(
@@ -225,15 +230,16 @@ def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
 
 def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
     """Return the functions of the solver for contacts of a kind of cells whose records `read` reads."""
-    loops = {
-        "slope": slope_passes(kind).run,
-        "rate": rate_passes(kind).run,
-    }
-    return functions_of(
-        kind.name,
-        (evaluate, linearise, *general_cells.FUNCTIONS),
-        **_model_of(kind, read),
-        **loops,
+    model = _model_of(kind, read)
+    rate = rate_passes(kind).run
+    slope = slope_passes(kind).run
+    return ModelFunctions(
+        bind(evaluate, f"{kind.name}_evaluate", wide_entry, **model, rate=rate),
+        bind(linearise, f"{kind.name}_linearise", wide_entry, **model, slope=slope),
+        *(
+            bind(each, f"{kind.name}_{each.__name__}", entry, **model)
+            for each in general_cells.FUNCTIONS
+        ),
     )
 
 

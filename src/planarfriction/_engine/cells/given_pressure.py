@@ -170,6 +170,18 @@ def _follow(given: GivenPressure, z: Doubles, w: Doubles, zdot: Doubles) -> None
     put_all(at(zdot, given.states), times(-1.0 / given.lag, right))
 
 
+@kernel
+def _keep(
+    given: GivenPressure, z: Doubles, zdot: Doubles, w: Doubles, follows: bool
+) -> None:
+    """Complete the rates of the cells, and keep what the slopes by the inputs start from."""
+    copy(w, given.wrench, 3)
+    if follows:
+        _follow(given, z, w, zdot)
+    else:
+        copy(zdot, given.rate, given.states if given.acts[0] > 0.0 else 0)
+
+
 def evaluate(
     contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, *, read: Any, place: Any, press: Any,
     follows: bool,
@@ -181,26 +193,23 @@ def evaluate(
     given.acts[0] = 1.0 if acts else 0.0
     cells = given.trial.record if acts else given.whole
     call(given.calls.evaluate, (cells, z, v, zdot, w))
-    copy(w, given.wrench, 3)
-    if follows:
-        _follow(given, z, w, zdot)
-    else:
-        copy(zdot, given.rate, given.states if acts else 0)
+    _keep(given, z, zdot, w, follows)
 
 
 def linearise(
-    contact: Place, z: Doubles, v: Doubles, lin: Doubles, *, read: Any, place: Any, press: Any, follows: bool,
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, lin: Doubles, *, read: Any, place: Any,
+    press: Any, follows: bool,
 ) -> None:  # fmt: skip
-    """Hold the cells where the contact was evaluated last, linearise them, and write the slopes by the inputs."""
+    """Evaluate and linearise the cells, which are held there, and write the slopes by the inputs."""
     record = read(contact)
     given = record.given
     m = arrays_at(_PLACES, lin)
     s = place(record, z, v)
-    acts = given.acts[0] > 0.0
+    acts = press(record, s, v, given.held)
+    given.acts[0] = 1.0 if acts else 0.0
     m.acts[0] = given.acts[0]
-    copy(given.trial.weights, given.held.weights, given.count)
-    copy(given.trial.cells, given.held.cells, given.numbers * given.count)
-    call(given.calls.linearise, (_held(given, m), z, v, at(lin, OWN)))
+    call(given.calls.linearise, (_held(given, m), z, v, zdot, w, at(lin, OWN)))
+    _keep(given, z, zdot, w, follows)
     for j in range((2 if follows else 3) if acts else 0):
         by = NUDGE * (given.radius if j < 2 else 1.0)
         press(record, _moved(s, j, by), v, given.trial)

@@ -125,12 +125,15 @@ def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) 
     put(at(zdot, own.states), plus(three(v), -1.0, three(own.seen)))
 
 
-def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
-    """Linearise the cells at the twist of the face."""
+def linearise(
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, lin: Doubles
+) -> None:
+    """Evaluate, and linearise the cells at the twist of the face."""
     own = read(contact)
     _see(own, z, v)
     arrays_at(_PLACES, lin).load[0] = arrays_at(SEEN, v).load[0]
-    call(own.calls.linearise, (contact, z, own.seen, at(lin, OWN)))
+    call(own.calls.linearise, (contact, z, own.seen, zdot, w, at(lin, OWN)))
+    put(at(zdot, own.states), plus(three(v), -1.0, three(own.seen)))
 
 
 def factor(

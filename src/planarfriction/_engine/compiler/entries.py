@@ -6,12 +6,11 @@ it. Inner functions here count none, so that one pass does.
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import llvmlite.binding as llvm
 from numba.core import typed_passes
-from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 
@@ -21,26 +20,11 @@ from planarfriction._engine.compiler.numba_compat import need
 need(
     JITCodeLibrary,
     "_optimize_functions",
+    "add_ir_module",
     "_optimize_final_module",
     "_finalize_final_module",
 )
-need(JITCPUCodegen, "_customize_tm_options")
 need(llvm, "create_pipeline_tuning_options", "create_pass_builder")
-
-
-@functools.cache
-def _with_whole_registers(codegen: Any) -> Any:
-    """Return the processor as LLVM sees it, with all of its vector registers in use.
-
-    LLVM takes half of each on Intel processors, of which the first with AVX-512 lower their clock for whole ones.
-    """
-    if "+avx512fp16" not in codegen._tm_features.split(","):
-        return codegen._tm
-    options = {"opt": 3}
-    codegen._customize_tm_options(options)
-    options["features"] += ",-prefer-256-bit"
-    target = llvm.Target.from_triple(llvm.get_process_triple())
-    return target.create_target_machine(**options)
 
 
 class _Whole(JITCodeLibrary):
@@ -48,10 +32,6 @@ class _Whole(JITCodeLibrary):
 
     loops = True
     """True for loops that are worth vector instructions; without, the code is made in a third of the time."""
-
-    def processor(self) -> Any:
-        """Return the processor for which the code is optimised."""
-        return self._codegen._tm
 
     def _optimize_functions(self, ll_module: Any) -> None:
         ll_module.data_layout = self._codegen._data_layout
@@ -72,7 +52,7 @@ class _Whole(JITCodeLibrary):
         options.slp_vectorization = False
         options.loop_unrolling = self.loops
         options.inlining_threshold = 275 if self.loops else 225
-        builder = llvm.create_pass_builder(self.processor(), options)
+        builder = llvm.create_pass_builder(self._codegen._tm, options)
         passes = builder.getModulePassManager()
         # Entry points that Python calls do count references to arrays.
         passes.add_refprune_pass()
@@ -80,9 +60,18 @@ class _Whole(JITCodeLibrary):
 
 
 class _Wide(_Whole):
-    def processor(self) -> Any:
-        """Return the processor with all of its vector registers in use."""
-        return _with_whole_registers(self._codegen)
+    """Code whose loops use whole vector registers.
+
+    LLVM uses half of those of Intel processors, since the first with 512 bits lower their clock for whole ones. Later
+    ones, which know half precision, do not.
+    """
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Add code with the width of its vectors."""
+        if "+avx512fp16" in self._codegen._tm_features.split(","):
+            for function in ir_module.functions:
+                set.add(function.attributes, '"prefer-vector-width"="512"')
+        super().add_ir_module(ir_module)
 
 
 class _Short(_Whole):

@@ -333,6 +333,8 @@ def linearise_many(
     records: np.ndarray,
     state: np.ndarray,
     twist: np.ndarray,
+    rate: np.ndarray,
+    wrench: np.ndarray,
     lin: np.ndarray,
 ) -> None:
     """Call `ModelFunctions.linearise` of B contacts into `lin` [B, workspace]; the rest as in `rates_many`."""
@@ -340,7 +342,7 @@ def linearise_many(
         record = at(
             pointer(records), b * records.shape[1] if records.shape[0] > 1 else 0
         )
-        call(function, (record, state[b], twist[b], lin[b]))
+        call(function, (record, state[b], twist[b], rate[b], wrench[b], lin[b]))
 
 
 UNFIT = (TypeError, ValueError, NumbaError)

@@ -202,17 +202,34 @@ def _rate(record: PublishedContact, z: Vector, twist: Vector) -> Vector:
 @kernel
 def _slopes(
     record: PublishedContact, z: Vector, twist: Vector, m: LinearPublished
-) -> None:
+) -> Vector:
+    """Write the derivatives of the scaled rate, and return it; u grows with the twist, so it is `du/dV_S V_S`."""
     (x, y, s) = twist
     j = m.sliding
     sliding_jacobian(record.kind, record.data, 0, record.size, x, y, s, norm(twist), j)
-    k, tape = _forth(record.law, z, applied(j, twist), twist)
+    u = applied(j, twist)
+    k, tape = _forth(record.law, z, u, twist)
     by_z, by_u, by_twist = _back(tape, 1.0)
     by_twist = plus(by_twist, 1.0, applied_back(j, by_u))
     for i in range(3):
         for p in range(3):
             m.by_z[3 * i + p] = (-k if i == p else 0.0) - z[i] * by_z[p]
             m.by_twist[3 * i + p] = j[3 * i + p] - z[i] * by_twist[p]
+    return plus(u, -k, z)
+
+
+@kernel
+def _write(
+    record: PublishedContact,
+    z: Vector,
+    v: Vector,
+    rate: Vector,
+    zdot: Doubles,
+    w: Doubles,
+) -> None:
+    """Write the rate of a scaled bristle, and the wrench of the contact."""
+    put(zdot, _raw(record, rate))
+    put(w, _wrench(record, traction(record.law, z, rate, _viscous(record, v))))
 
 
 # ---------------------------------------------------------------------- functions of the solver
@@ -224,21 +241,19 @@ def evaluate(contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles) 
     record = read(contact)
     v = three(v)
     z = _scaled(record, three(z))
-    rate = _rate(record, z, _seen(record, v))
-    put(zdot, _raw(record, rate))
-    put(w, _wrench(record, traction(record.law, z, rate, _viscous(record, v))))
+    _write(record, z, v, _rate(record, z, _seen(record, v)), zdot, w)
 
 
 @entry
-def linearise(contact: Place, z: Doubles, v: Doubles, lin: Doubles) -> None:
-    """Write `f_z` and `f_V`."""
+def linearise(
+    contact: Place, z: Doubles, v: Doubles, zdot: Doubles, w: Doubles, lin: Doubles
+) -> None:
+    """Write `z'`, the wrench, `f_z` and `f_V`."""
     record = read(contact)
-    _slopes(
-        record,
-        _scaled(record, three(z)),
-        _seen(record, three(v)),
-        arrays_at(_LINEAR, lin),
-    )
+    v = three(v)
+    z = _scaled(record, three(z))
+    rate = _slopes(record, z, _seen(record, v), arrays_at(_LINEAR, lin))
+    _write(record, z, v, rate, zdot, w)
 
 
 @entry

@@ -84,10 +84,11 @@ def rates(
 def linearised(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
     """Return linearisations `[B, workspace]`; the kernels of each kind of model describe the numbers."""
     lin = np.empty((len(twist), packed.workspace))
+    rate = np.empty((len(twist), packed.states))
+    wrench = np.empty((len(twist), 3))
     function = address_of(packed.functions.linearise)
-    linearise_many(
-        function, packed.records, state.reshape(len(twist), packed.states), twist, lin
-    )
+    rows = state.reshape(rate.shape), twist, rate, wrench, lin
+    linearise_many(function, packed.records, *rows)
     return lin
 
 
