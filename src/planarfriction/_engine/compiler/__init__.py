@@ -122,7 +122,7 @@ def entry(function: Any, compiler: Any = Entry) -> Any:
 
 
 wide_entry: Any = functools.partial(entry, compiler=Wide)
-"""Compile a function as `entry` does, with vectors of 512 bits: for one whose loops over cells have no remainder."""
+"""Compile a function as `entry` does, with the longest vectors: for loops with long bodies and no remainder."""
 
 
 sequential_entry: Any = functools.partial(entry, compiler=Sequential)
