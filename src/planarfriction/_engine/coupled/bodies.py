@@ -54,8 +54,6 @@ class RigidPatches(NamedTuple):
     """Problem without inputs."""
     per_mass: Doubles
     """Inverses of mass, mass and inertia, [3]."""
-    to_patches: Doubles
-    """Rows that give the twists of the patches from that of the body, in its axes, [3k, 3]."""
 
 
 _read = reader(RigidPatches)
@@ -90,13 +88,14 @@ def _step(
     copy(body.blank, problem, patches.row.unit)  # all that is no scratch
     p = arrays_at(patches.row, problem)
     p.dt[0] = given[DT]
+    put(p.mobility, (rx, ry, rw))
     x = c * vx + s * vy
     y = c * vy - s * vx
     for i in range(n):
-        row = at(body.to_patches, 3 * i)
+        row = at(patches.rows, 3 * i)
         p.free_twist[i] = row[0] * x + row[1] * y + row[2] * omega
         for j in range(n):
-            other = at(body.to_patches, 3 * j)
+            other = at(patches.rows, 3 * j)
             p.response[n * i + j] = (
                 row[0] * rx * other[0] + row[1] * ry * other[1] + row[2] * rw * other[2]
             )
@@ -110,7 +109,7 @@ def _step(
     fy = 0.0
     tau = 0.0
     for i in range(n):
-        row = at(body.to_patches, 3 * i)
+        row = at(patches.rows, 3 * i)
         fx += p.wrench[i] * row[0]
         fy += p.wrench[i] * row[1]
         tau += p.wrench[i] * row[2]

@@ -153,31 +153,82 @@ def _misfit(patches: Patches, p: ContactSolve) -> float:
 
 
 @kernel
-def _write_rows(patches: Patches, p: ContactSolve, k: int, keep_loads: bool) -> None:
-    """Write the rows of patch k in the system of the Newton step, whose right-hand side is `change`."""
+def _follows(
+    patches: Patches, p: ContactSolve, k: int, keep_loads: bool
+) -> tuple[float, float]:
+    """Return what the load of patch k lacks of that which the wrenches cause, and 1 if it moves with them, else 0."""
     n = 3 * patches.count
-    a = p.response
-    gap = p.gap
-    slopes = at(p.slopes, 9 * k)
     load = p.load[k]
     lacks = _applied(p.load_response, k, n, p.wrench, p.load_0[k]) - load
-    follows = 0.0 if keep_loads or (load == 0.0 and lacks < 0.0) else 1.0
+    return lacks, 0.0 if keep_loads or (load == 0.0 and lacks < 0.0) else 1.0
+
+
+@kernel
+def _write_residual(
+    patches: Patches, p: ContactSolve, k: int, keep_loads: bool
+) -> None:
+    """Write the right-hand side of the Newton step for patch k into `change`."""
+    gap = at(p.gap, 3 * k)
+    load = p.load[k]
+    lacks, follows = _follows(patches, p, k, keep_loads)
     for i in range(3):
         one = 3 * k + i
-        x = slopes[3 * i]
-        y = slopes[3 * i + 1]
-        s = slopes[3 * i + 2]
+        slopes = at(p.slopes, 3 * one)
         p.change[one] = (load + follows * lacks) * p.unit[one] - p.wrench[one]
         p.change[one] += follows * lacks * (p.unit_loaded[one] - p.unit[one])
-        p.change[one] += x * gap[3 * k] + y * gap[3 * k + 1] + s * gap[3 * k + 2]
+        p.change[one] += slopes[0] * gap[0] + slopes[1] * gap[1] + slopes[2] * gap[2]
+
+
+@kernel
+def _write_rows(patches: Patches, p: ContactSolve, k: int, keep_loads: bool) -> None:
+    """Write the rows of patch k in the system of the Newton step."""
+    n = 3 * patches.count
+    a = at(p.response, 3 * n * k)
+    _, follows = _follows(patches, p, k, keep_loads)
+    for i in range(3):
+        one = 3 * k + i
+        slopes = at(p.slopes, 3 * one)
         for j in range(n):
-            caused = (
-                x * a[n * 3 * k + j]
-                + y * a[n * (3 * k + 1) + j]
-                + s * a[n * (3 * k + 2) + j]
-            )
+            caused = slopes[0] * a[j] + slopes[1] * a[n + j] + slopes[2] * a[2 * n + j]
             loaded = follows * p.unit_loaded[one] * p.load_response[n * k + j]
             p.matrix[n * one + j] = (1.0 if j == one else 0.0) - caused - loaded
+
+
+@kernel
+def _solved_on_body(patches: Patches, p: ContactSolve) -> float:
+    """Solve the Newton step of patches on a rigid body; return the sign of the determinant of its system.
+
+    With the rows T of the patches and the mobility R of the body `A = T R T'`, so that `dW = s + P T R q` and
+    `(I - T' P T R) q = T' s`, three equations for the wrench `q = T' dW` on the body.
+    """
+    q = p.turned
+    m = p.matrix
+    clear(q, 3)
+    clear(m, 9)
+    for i in range(3 * patches.count):
+        slopes = at(p.slopes, 3 * i)
+        row = at(patches.rows, 3 * i)
+        others = at(patches.rows, 9 * (i // 3))
+        for j in range(3):
+            caused = (
+                slopes[0] * others[j]
+                + slopes[1] * others[3 + j]
+                + slopes[2] * others[6 + j]
+            )
+            for r in range(3):
+                m[3 * r + j] -= row[r] * caused * p.mobility[j]
+            q[j] += row[j] * p.change[i]
+    for j in range(3):
+        m[4 * j] += 1.0
+    sign = solved(m, q, 3)
+    for j in range(3):
+        q[j] *= p.mobility[j]
+    for i in range(3 * patches.count):
+        slopes = at(p.slopes, 3 * i)
+        others = at(patches.rows, 9 * (i // 3))
+        for j in range(3):
+            p.change[i] += slopes[j] * _applied(others, j, 3, q, 0.0)
+    return sign
 
 
 @kernel
@@ -200,8 +251,13 @@ def _newton(patches: Patches, p: ContactSolve, keep_loads: bool, falling: bool) 
             slopes[i] = p.load[k] * p.unit_slopes[9 * k + i]
         if falling:
             leave_out_rising(slopes, at(p.scale, 3 * k), p.turned, at(p.turned, 9))
-        _write_rows(patches, p, k, keep_loads)
-    sign = solved(p.matrix, p.change, n)
+        _write_residual(patches, p, k, keep_loads)
+    if patches.rigid > 0:
+        sign = _solved_on_body(patches, p)
+    else:
+        for k in range(patches.count):
+            _write_rows(patches, p, k, keep_loads)
+        sign = solved(p.matrix, p.change, n)
     downhill = _downhill(patches, p)
     return sign > 0.0 and downhill > 0.0
 

@@ -27,6 +27,8 @@ class ContactSolve(NamedTuple):
     """1 if what does not converge is tried again, and restrained if that fails too, else 0, [1]."""
     response: Doubles
     """A, [3k, 3k]."""
+    mobility: Doubles
+    """Velocities that the body under patches which are `rigid` gains by a unit wrench, [3]."""
     load_response: Doubles
     """B, [k, 3k]."""
     free_twist: Doubles
@@ -130,6 +132,7 @@ def layout(
     shapes |= dict.fromkeys(
         ("dt", "tolerance", "most", "again", "iterations", "residual", "converged"), 1
     )
+    shapes["mobility"] = 3
     shapes |= dict.fromkeys(
         ("free_load", "load", "load_0", "best_load", "kept_load"), k
     )
@@ -202,6 +205,10 @@ class Patches(NamedTuple):
     """Stiffnesses of the common parts of pads, inverse to these, [k, 9]."""
     lag: Doubles
     """Lags [s] of these, [k]; 0 where the face is the back."""
+    rigid: int
+    """1 of patches on one rigid body, whose loads are given, else 0."""
+    rows: Doubles
+    """Rows that give the twists of these from that of the body, in its axes, [3k, 3]."""
     followers: Followers
     row: Offsets
 

@@ -80,6 +80,8 @@ def packed_patches(
         compliance=np.ravel(soft),
         back=np.ravel([np.linalg.pinv(each, hermitian=True) for each in soft]),
         lag=np.array([each.lag for each in models]),
+        rigid=0,
+        rows=np.zeros((0, 3)),
         followers=followers,
         row=rows.offsets,
     )
@@ -119,8 +121,11 @@ def packed_body(
     """
     ready(step_bodies)
     to_patches = np.ascontiguousarray(to_patches)
-    of_patches: Any = packed.patches.words
-    body = StructBuffer(RigidPatches(of_patches, blank, per_mass, to_patches))
+    patches = packed.patches.record
+    # A face moves against its body.
+    rigid = int(not any(patches.lag))
+    on_body: Any = StructBuffer(patches._replace(rigid=rigid, rows=to_patches))
+    body = StructBuffer(RigidPatches(on_body.words, blank, per_mass))
     return PackedBody(
         words=body.words,
         states=packed.patches.record.states,
@@ -128,5 +133,5 @@ def packed_body(
         records=packed.records,
         fixed=not packed.following,
         alone=alone,
-        kept=(body, packed),
+        kept=(body, on_body, packed),
     )
