@@ -122,8 +122,8 @@ def packed_body(
     ready(step_bodies)
     to_patches = np.ascontiguousarray(to_patches)
     patches = packed.patches.record
-    # A face moves against its body.
-    rigid = int(not any(patches.lag))
+    # A face moves against its body; one patch has three equations anyway.
+    rigid = int(patches.count > 1 and not any(patches.lag))
     on_body: Any = StructBuffer(patches._replace(rigid=rigid, rows=to_patches))
     body = StructBuffer(RigidPatches(on_body.words, blank, per_mass))
     return PackedBody(
