@@ -8,7 +8,7 @@ import numpy as np
 
 from planarfriction._engine.codegen.definitions import bind
 from planarfriction._engine.compiler import entry
-from planarfriction._engine.compiler.calls import address_of
+from planarfriction._engine.compiler.calls import address_of, signature_of
 from planarfriction._engine.compiler.memory import (
     Doubles,
     Layout,
@@ -16,6 +16,7 @@ from planarfriction._engine.compiler.memory import (
     reader,
     row_of,
 )
+from planarfriction.errors import InvalidValueError
 
 
 class ChangeRows(NamedTuple):
@@ -99,6 +100,18 @@ addresses_at = reader(Addresses)
 
 CALLS = len(Addresses._fields)
 
+ARGUMENTS = ModelFunctions(
+    evaluate=5,
+    linearise=6,
+    factor=5,
+    eliminate=6,
+    back_substitute=6,
+    change=9,
+    solve_transposed=5,
+    pull_back=6,
+)
+"""Numbers of arguments, which compiled callers cannot check."""
+
 
 def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
     """Return the functions of a model, entry points `<name>_<template>`: templates that are bound to its argument."""
@@ -110,6 +123,12 @@ def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
     """Return the words of `Addresses` of compiled functions of a model, those from `change` on if asked for."""
     wanted = functions[: None if change else ModelFunctions._fields.index("change")]
+    for name, each, count in zip(
+        ModelFunctions._fields, wanted, ARGUMENTS, strict=False
+    ):
+        if each and len(signature_of(each)) != count:
+            rule = f"take {count} arguments (see ModelFunctions)"
+            raise InvalidValueError(name, rule, len(signature_of(each)))
     return row_of(
         Addresses(
             *(address_of(each) if each else 0 for each in wanted),
