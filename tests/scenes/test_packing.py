@@ -284,3 +284,19 @@ def test_pieces_that_no_run_would_end_are_refused():
         pf.FrictionError,
     ):
         pf.simulate(scene)
+
+
+class Misfit(pf.ReducedModelPublished):
+    """A model of one's own whose functions take other arguments than those with which they are called."""
+
+    def packed(self, loads, between=None):
+        found = super().packed(loads, between)
+        functions = found.functions._replace(linearise=found.functions.evaluate)
+        return found._replace(functions=functions)
+
+
+def test_functions_with_other_arguments_are_refused():
+    """Compiled callers would read and write elsewhere."""
+    contact = pf.Contact(Misfit(FIXED, LAW), 2.0)
+    with refused("linearise must take 6 arguments .* got 5"):
+        pf.simulate(pf.Scene(pf.Body(mass=0.1, inertia=1e-4), [contact], t_end=0.01))

@@ -8,7 +8,7 @@ import numpy as np
 
 from planarfriction._engine.codegen.definitions import bind
 from planarfriction._engine.compiler import entry
-from planarfriction._engine.compiler.calls import address_of, signature_of
+from planarfriction._engine.compiler.calls import address_of
 from planarfriction._engine.compiler.memory import (
     Doubles,
     Layout,
@@ -16,7 +16,6 @@ from planarfriction._engine.compiler.memory import (
     reader,
     row_of,
 )
-from planarfriction.errors import InvalidValueError
 
 
 class ChangeRows(NamedTuple):
@@ -123,12 +122,6 @@ def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
     """Return the words of `Addresses` of compiled functions of a model, those from `change` on if asked for."""
     wanted = functions[: None if change else ModelFunctions._fields.index("change")]
-    for name, each, count in zip(
-        ModelFunctions._fields, wanted, ARGUMENTS, strict=False
-    ):
-        if each and len(signature_of(each)) != count:
-            rule = f"take {count} arguments (see ModelFunctions)"
-            raise InvalidValueError(name, rule, len(signature_of(each)))
     return row_of(
         Addresses(
             *(address_of(each) if each else 0 for each in wanted),

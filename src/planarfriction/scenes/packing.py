@@ -9,8 +9,9 @@ import numpy as np
 
 from planarfriction._engine.body.body import Motion, System
 from planarfriction._engine.body.contacts import BODY, BODY_AXES, WORLD, Contacts
+from planarfriction._engine.compiler.calls import signature_of
 from planarfriction._engine.compiler.memory import places_of
-from planarfriction._engine.protocol import calls_of
+from planarfriction._engine.protocol import ARGUMENTS, ModelFunctions, calls_of
 from planarfriction._engine.records.packed import PackedModel
 from planarfriction._engine.records.partial_contact import STATES, following, under_edge
 from planarfriction.errors import InvalidValueError
@@ -30,6 +31,14 @@ BATCH = 4096
 
 MOST_PIECES = 10**12
 """Segments of a motion, each of which the solver has to stop at."""
+
+
+def _check(functions: ModelFunctions) -> None:
+    """Raise InvalidValueError for functions of a model with other arguments than those with which they are called."""
+    for name, each, count in zip(functions._fields, functions, ARGUMENTS, strict=True):
+        if each and len(signature_of(each)) != count:
+            rule = f"take {count} arguments (see ModelFunctions)"
+            raise InvalidValueError(name, rule, len(signature_of(each)))
 
 
 def packed_contact(
@@ -224,6 +233,8 @@ class SegmentBatches:
         """The model of each contact, as packed last."""
         records, row, pieces = self._pack()
         begin = time.perf_counter()
+        for each in self.models:
+            _check(each.functions)
         calls = [calls_of(each.functions, change=sensitivities) for each in self.models]
         self.loading = time.perf_counter() - begin
         """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
