@@ -7,6 +7,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import coupling, geometry
+from planarfriction._engine.coupled import bodies
 from planarfriction.errors import SolverError
 from planarfriction.sliding_body import BodyStep
 from tests.support.refusals import refused
@@ -292,6 +293,37 @@ def test_patches_of_a_host_on_a_support_that_turns():
     np.testing.assert_allclose(
         rows @ (end.twist - chord), step.twist.ravel(), atol=1e-9
     )
+
+
+def test_three_equations_of_a_body_give_the_newton_steps_of_all_patches():
+    """As many iterations as with the full system of a host, which a wrong slope would raise."""
+    body = four_feet([0.3, 0.0, -1.0, 2.0])
+    packed = body._packed
+    counts = body.patches._packed.layout.slices["iterations"]
+    response = 1e-3 / np.array([MASS, MASS, body.inertia])
+    rows = body._to_patches
+    twists = np.random.default_rng(0).normal(size=(8, 3)) * [0.05, 0.05, 1.0]
+    loads = np.array([0.5, 1.0, 0.2, 0.3])
+    taken = []
+    for twist in twists:
+        problem = np.empty(packed.scratch)
+        given = np.array([*twist, *np.zeros(6), 1e-3, 0.0, *loads])
+        end = np.empty(packed.states + bodies.MORE)
+        start = body.rest()
+        done = bodies.step_bodies(
+            packed.words, start, given, packed.records, problem, end
+        )
+        host = coupling.HostStep(
+            (rows @ twist).reshape(4, 3),
+            loads,
+            np.zeros((4, 3)),
+            rows * response @ rows.T,
+        )
+        step = body.patches.step(start, host, 1e-3)
+        assert done == 1
+        taken.append((problem[counts].item(), step.iterations))
+    alone, hosted = np.sum(taken, axis=0)
+    assert hosted - 2 <= alone <= hosted + 2
 
 
 def test_a_patch_that_follows_its_load():

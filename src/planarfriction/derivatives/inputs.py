@@ -23,7 +23,9 @@ _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
 
 _FLOAT = np.dtype(float)
+
 _NONE = np.empty(0)
+"""Rows that are not checked together with others."""
 
 LIGHTEST = 1e-9
 """Load [N] whose shape stands for the shape of a load that fades in, for the slope at no load."""

@@ -121,12 +121,11 @@ def entry(function: Any, compiler: Any = Entry) -> Any:
     return kept(compiled(function), SOURCES)
 
 
-wide_entry: Any = functools.partial(entry, compiler=Wide)
-"""Compile a function as `entry` does, with the longest vectors: for loops with long bodies and no remainder."""
-
-
 sequential_entry: Any = functools.partial(entry, compiler=Sequential)
 """Compile a function as `entry` does, in a third of the time: for one that has no loop over cells of its own."""
+
+wide_entry: Any = functools.partial(entry, compiler=Wide)
+"""Compile a function as `entry` does, with the longest vectors: for loops with long bodies and no remainder."""
 
 
 def callback(function: Any) -> Any:
