@@ -244,19 +244,29 @@ def _cuts(
     kept: Sequence[Operation], again: Mapping[str, Operation], block: Block, count: int
 ) -> list[int]:
     """Return where passes begin: about evenly by cost, where few numbers are handed on."""
-    costs = [each.operator.cost for each in kept]
-    reached = [sum(costs[:k]) / sum(costs) * count for k in range(len(kept))]
+    costs = list(itertools.accumulate((each.operator.cost for each in kept), initial=0))
+    reached = [each / costs[-1] * count for each in costs]
     made = {each.name: k for k, each in enumerate(kept)}
     last = [0] * len(kept)
     for k, each in enumerate([*kept, *_as_operations(block.results)]):
         for name in _reached(list(names_in(each)), again) & made.keys():
             last[made[name]] = k
-    handed = [sum(use >= end for use in last[:end]) for end in range(len(kept))]
+    handed = _living(last)
     ends = set()
     for middle in range(1, count if len(kept) > 1 else 1):
         near = [k for k in range(1, len(kept)) if abs(reached[k] - middle) < 0.25]
         ends.add(min(near or [1], key=handed.__getitem__))
     return [0, *sorted(ends), len(kept)]
+
+
+def _living(last: Sequence[int]) -> list[int]:
+    """Return how many numbers from before each place are read there or later; `last`: place that reads each last."""
+    changes = [0] * (max(last, default=0) + 2)
+    for made, read in enumerate(last):
+        if read > made:
+            changes[made + 1] += 1
+            changes[read + 1] -= 1
+    return list(itertools.accumulate(changes))
 
 
 def _places(parts: Sequence[Part]) -> tuple[dict[str, str], int]:
