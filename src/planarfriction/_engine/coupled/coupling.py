@@ -492,8 +492,9 @@ def _search(
         if not known:
             step_all_with_slopes(patches, p)
         write_load_slopes(patches, p)
-        if not _newton(patches, p, keep_loads, False):
-            _newton(patches, p, keep_loads, True)
+        for falling in range(2):
+            if _newton(patches, p, keep_loads, falling > 0):
+                break
         _go(patches, p, keep_loads, rest, careful)
         rest = False
         misfit = _misfit(patches, p)
@@ -512,24 +513,29 @@ def find(
     Return the misfit of the twists and loads, whose states and wrenches are written, and that which is accepted.
     """
     tolerance = xp.maximum(p.tolerance[0], rounding * prepare(patches, p))
-    best, current = _search(patches, p, tolerance, most, False)
     accepted = tolerance
-    if best > tolerance:
-        if not current:
-            step_all(patches, p)
-        accepted = xp.maximum(tolerance, PRECISION * _largest_speed(patches, p))
-        current = True
-    if best > accepted and again:
+    best = math.inf
+    current = False
+    taken = 0.0
+    for attempt in range(2):
+        steps = most if attempt == 0 else PATIENCE * most
+        misfit, known = _search(patches, p, tolerance, steps, attempt > 0)
+        p.iterations[0] += taken
+        current = known and misfit <= best
+        if misfit <= best:
+            best = misfit
+        else:
+            _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
+        if attempt == 0 and best > tolerance:
+            if not current:
+                step_all(patches, p)
+            accepted = xp.maximum(tolerance, PRECISION * _largest_speed(patches, p))
+            current = True
+        if best <= accepted or not again:
+            break
         taken = p.iterations[0]
-        first = best
         _copy(patches, p.twist, p.load, p.kept_twist, p.kept_load)
         clear(p.wrench, 3 * patches.count)
-        best, current = _search(patches, p, tolerance, PATIENCE * most, True)
-        p.iterations[0] += taken
-        if not best <= first:
-            best = first
-            current = False
-            _copy(patches, p.kept_twist, p.kept_load, p.twist, p.load)
     if not current:
         step_all(patches, p)
     return best, accepted
