@@ -320,7 +320,9 @@ def _missed_inside(
 
     The residual of the continuous extension, through the matrix of the step, is the share of one more stage there.
     """
-    looks = xp.minimum(_LOOKS, int(_turn(run, system, piece, since, step) / _ANGLE))
+    looks = xp.minimum(
+        _LOOKS, np.int64(_turn(run, system, piece, since, step) / _ANGLE)
+    )
     work = run.stages
     shift = 1.0 / (step * run.method.gamma)
     largest = 0.0

@@ -36,12 +36,12 @@ from planarfriction._engine.codegen.vectors import (
     put_all,
     three,
 )
+from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import entry, kernel, wide_entry
 from planarfriction._engine.compiler.memory import Doubles, Place, at
 from planarfriction._engine.protocol import (
     SLOPES,
     ModelFunctions,
-    StepFunctions,
 )
 
 RESULTS = LANES * (4 * DISC.size**2 + DISC.size)
@@ -68,7 +68,7 @@ def _in_place(
         out,
         contact.count,
     )
-    return rows, min(lanes, contact.count - first)
+    return rows, xp.minimum(lanes, contact.count - first)
 
 
 def _filled(numbers: int, size: int) -> Any:
@@ -89,7 +89,7 @@ def _filled(numbers: int, size: int) -> Any:
         block: Doubles,
     ) -> Any:
         n = contact.count
-        count = min(lanes, contact.count - first)
+        count = xp.minimum(lanes, contact.count - first)
         for m in range(numbers + size + 1):
             clear(at(block, RESULTS + m * LANES + count), lanes - count)
         for m in range(numbers):
@@ -132,7 +132,11 @@ def _through(
         )
         total = plus(total, 1.0, run(record.law, v, shared, rows, count))
         for m in range(copied):
-            copy(at(block, m * LANES), at(out, m * n + first), min(lanes, n - first))
+            copy(
+                at(block, m * LANES),
+                at(out, m * n + first),
+                xp.minimum(lanes, n - first),
+            )
     return total
 
 
@@ -166,7 +170,7 @@ def linearise(
     for first in range(0, n, lanes):
         rows, count = cell_rows(record, z, first, lanes, block, block)
         total = plus(total, 1.0, slope(record.law, twist, shared, rows, count))
-        some = min(lanes, n - first)
+        some = xp.minimum(lanes, n - first)
         for m in range(slopes):
             row = m if m < 2 * square else m + square  # behind the inverse
             copy(at(block, m * LANES), at(lin, row * n + first), some)
@@ -206,10 +210,10 @@ def jacobian(
 @functools.cache
 def functions_of_cells(
     size: int, turned: bool, sort: str
-) -> tuple[ModelFunctions, StepFunctions]:
+) -> tuple[ModelFunctions, CellSteps]:
     """Return the functions of contacts of a kind of cells (see `KINDS`); they are written on first use."""
     kind = KINDS[size, turned, sort]
-    return rates_of(kind, cells.read), steps_of(kind, cells.read)
+    return rates_of(kind, cells.read), CellSteps(kind, cells.read)
 
 
 def _model_of(kind: CellKind, read: Any) -> dict[str, Any]:
@@ -243,20 +247,37 @@ def rates_of(kind: CellKind, read: Any) -> ModelFunctions:
     )
 
 
-def steps_of(kind: CellKind, read: Any) -> StepFunctions:
-    """Return the steps of contacts of a kind of cells whose records `read` reads."""
-    model = _model_of(kind, read)
-    wrench = {"advance": step_passes(kind).run, "none": (0.0,) * 3}
-    slopes = {"advance": step_slope_passes(kind).run, "none": (0.0,) * SLOPES}
-    return StepFunctions(
-        bind(step, f"{kind.name}_step", entry, **model, **wrench),
-        bind(step, f"{kind.name}_slopes", wide_entry, **model, **slopes),
-        bind(
-            jacobian,
-            f"{kind.name}_jacobian",
-            wide_entry,
-            **model,
-            advance=jacobian_passes(kind).run,
-            size=kind.element.size,
-        ),
-    )
+class CellSteps:
+    """Steps of contacts of a kind of cells whose records `read` reads (see `protocol.StepFunctions`).
+
+    Each is written on first use: derivatives of a step take ten times as long to write as the step.
+    """
+
+    def __init__(self, kind: CellKind, read: Any) -> None:
+        self._kind = kind
+        self._model = _model_of(kind, read)
+
+    @functools.cached_property
+    def step(self) -> Any:
+        """See `protocol.StepFunctions`."""
+        advance = step_passes(self._kind).run
+        name = f"{self._kind.name}_step"
+        return bind(step, name, entry, **self._model, advance=advance, none=(0.0,) * 3)
+
+    @functools.cached_property
+    def slopes(self) -> Any:
+        """See `protocol.StepFunctions`."""
+        advance = step_slope_passes(self._kind).run
+        none = (0.0,) * SLOPES
+        name = f"{self._kind.name}_slopes"
+        return bind(step, name, wide_entry, **self._model, advance=advance, none=none)
+
+    @functools.cached_property
+    def jacobian(self) -> Any:
+        """See `protocol.StepFunctions`."""
+        advance = jacobian_passes(self._kind).run
+        size = self._kind.element.size
+        name = f"{self._kind.name}_jacobian"
+        return bind(
+            jacobian, name, wide_entry, **self._model, advance=advance, size=size
+        )

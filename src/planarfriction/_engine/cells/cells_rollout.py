@@ -36,6 +36,7 @@ from planarfriction._engine.codegen.vectors import (
     three,
     times,
 )
+from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import jit, kernel, wide_jit
 from planarfriction._engine.compiler.calls import pointer
 from planarfriction._engine.compiler.memory import Doubles, at
@@ -96,7 +97,7 @@ def _write(
     for k in range(blocks):
         block = at(w, k * numbers + field)
         first = k * lanes
-        for i in range(min(lanes, n - first)):
+        for i in range(xp.minimum(lanes, n - first)):
             for m in range(size):
                 block[m * LANES + i] = values[m * n + first + i]
 
@@ -110,7 +111,7 @@ def _read(
     for k in range(blocks):
         block = at(w, k * numbers + field)
         first = k * lanes
-        for i in range(min(lanes, n - first)):
+        for i in range(xp.minimum(lanes, n - first)):
             for m in range(size):
                 values[m * n + first + i] = block[m * LANES + i]
 

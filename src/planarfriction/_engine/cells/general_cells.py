@@ -30,6 +30,7 @@ from planarfriction._engine.codegen.vectors import (
     three,
     times,
 )
+from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, Place, arrays_at, at
 from planarfriction._engine.protocol import ROWS
@@ -144,7 +145,7 @@ def factor(
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     block = scratch(OF_DISCS)
     for first in range(0, n, LANES):
-        end = min(first + LANES, n)
+        end = xp.minimum(first + LANES, n)
         some = _factored(record, shift, lin, first, end, block, LANES, lever, bristle)
         total = plus(total, 1.0, some)
         for m in range(square):

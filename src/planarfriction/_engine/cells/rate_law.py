@@ -22,14 +22,14 @@ from typing import Any, NamedTuple
 
 from planarfriction._engine.bristles.law import traction as traction_of
 from planarfriction._engine.cells.cell_loops import CellKind, Element
-from planarfriction._engine.cells.cell_steps import rates_of, steps_of
+from planarfriction._engine.cells.cell_steps import CellSteps, rates_of
 from planarfriction._engine.cells.cells import LEVERS, Lever
 from planarfriction._engine.codegen.derivatives import forward
 from planarfriction._engine.codegen.vectors import Vector, norm, plus, times
 from planarfriction._engine.compiler import compiled_math as xp
 from planarfriction._engine.compiler import kernel
 from planarfriction._engine.compiler.memory import Doubles, reader
-from planarfriction._engine.protocol import ModelFunctions, StepFunctions
+from planarfriction._engine.protocol import ModelFunctions
 
 _SHARE = 1.0 - math.sqrt(0.5)
 """g [-]"""
@@ -113,7 +113,7 @@ class CellFunctions(NamedTuple):
     record: Any
     """Record of a contact: `law`, `count`, `cells`, `weights` as in `cells.CellsContact`."""
     rates: ModelFunctions
-    steps: StepFunctions
+    steps: CellSteps
 
 
 def cell_functions(element: Element, law: Any, lever: Lever) -> CellFunctions:
@@ -124,7 +124,7 @@ def cell_functions(element: Element, law: Any, lever: Lever) -> CellFunctions:
         element.name, element, lever, 5 if lever is LEVERS else 2, law=law, linear=False
     )
     read = reader(record)
-    return CellFunctions(record, rates_of(kind, read), steps_of(kind, read))
+    return CellFunctions(record, rates_of(kind, read), CellSteps(kind, read))
 
 
 def fingerprint(names: Sequence[str], *functions: Callable) -> str:

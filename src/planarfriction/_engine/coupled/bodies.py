@@ -122,7 +122,7 @@ def _step(
     put(at(end, 3), wrench)
     end[6] = p.residual[0]
     end[7] = p.converged[0]
-    return -1 if p.iterations[0] < 0.0 else int(p.converged[0])
+    return -1 if p.iterations[0] < 0.0 else np.int64(p.converged[0])
 
 
 @jit

@@ -553,7 +553,7 @@ def solve(patches_at: Place, problem_at: Place) -> None:
     follow(patches, p, problem_at)
     again = p.again[0] > 0.0
     hang(patches, p)
-    best, accepted = find(patches, p, ROUNDING, int(p.most[0]), again)
+    best, accepted = find(patches, p, ROUNDING, np.int64(p.most[0]), again)
     for i in range(3 * patches.count):
         p.wrench[i] = p.load[i // 3] * p.unit[i]
     for k in range(patches.count):

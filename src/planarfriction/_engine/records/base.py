@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction._engine.cells.cell_steps import CellSteps
 from planarfriction._engine.compiler.memory import StructBuffer
 from planarfriction._engine.coupled.steps import (
     PLAIN,
@@ -108,7 +109,7 @@ class CompiledModel:
 
     def __init__(
         self,
-        functions: StepFunctions,
+        functions: StepFunctions | CellSteps,
         state_shape: tuple[int, ...],
         square_shape: tuple[int, ...],
     ) -> None:

@@ -11,13 +11,13 @@ import numpy as np
 
 from planarfriction._engine.bristles.discs import KAPPA
 from planarfriction._engine.cells.cell_loops import LEANS, PAD, PLAIN
-from planarfriction._engine.cells.cell_steps import functions_of_cells
+from planarfriction._engine.cells.cell_steps import CellSteps, functions_of_cells
 from planarfriction._engine.cells.cells import CellsContact
 from planarfriction._engine.cells.general_cells import LINEAR, MATRICES, A, C, E, F
 from planarfriction._engine.cells.moment_pressure import tilted
 from planarfriction._engine.cells.rollouts import ShapesByLoad
 from planarfriction._engine.compiler.memory import places_of, rows_of, size_of
-from planarfriction._engine.protocol import ModelFunctions, StepFunctions
+from planarfriction._engine.protocol import ModelFunctions
 from planarfriction._engine.records import packed
 from planarfriction._engine.records.base import CompiledModel, StepJacobians
 from planarfriction._engine.records.packed import (
@@ -60,7 +60,7 @@ class CompiledDistributed(CompiledModel):
         cells = len(patch.positions)
         super().__init__(functions, (self.size, cells), (self.size, self.size, cells))
 
-    def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
+    def _functions(self) -> tuple[ModelFunctions, CellSteps]:
         return functions_of_cells(self.size, self.patch.anisotropic, self.sort)
 
     @property

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from planarfriction._engine.cells import cells
+from planarfriction._engine.cells.cell_steps import CellSteps
 from planarfriction._engine.cells.general_cells import MATRICES
-from planarfriction._engine.protocol import ModelFunctions, StepFunctions
+from planarfriction._engine.protocol import ModelFunctions
 from planarfriction._engine.records.base import CompiledModel
 from planarfriction._engine.records.distributed import CompiledDistributed
 from planarfriction.errors import InvalidValueError
@@ -43,7 +44,7 @@ class CompiledRateCells(CompiledDistributed):
 
     held = CompiledModel.held
 
-    def _functions(self) -> tuple[ModelFunctions, StepFunctions]:
+    def _functions(self) -> tuple[ModelFunctions, CellSteps]:
         self._lever = cells.LEVERS if self.patch.anisotropic else cells.POSITIONS
         return self.law.functions(self._lever)[1:]
 
