@@ -52,8 +52,12 @@ _NEEDLESS = {
     "NoPythonSupportedFeatureValidation",
     "DumpParforDiagnostics",
     "IRProcessing",
+    "IRLegalization",
 }
-"""Passes of Numba for features that inner functions lack: closures, `with`, expressions of arrays, parallel loops."""
+"""Passes of Numba for features that inner functions lack: closures, `with`, expressions of arrays, parallel loops.
+
+The last one notes where variables end, to release what they hold: nothing here.
+"""
 
 
 _REFUSE = ctypes.cast(ctypes.pythonapi.PyErr_BadArgument, ctypes.c_void_p).value
