@@ -216,6 +216,12 @@ def identify_lugre(
             (each for each in candidates if each.score.model == best.score.model),
             key=lambda each: (each.uncertainty.rejected, each.cost(sigma)),
         )
+        if not best.fit.near:
+            best.fit.problem.far = np.inf
+            fit = refine(best.fit)
+            better = Candidate(fit, uncertainty(fit))
+            candidates = [better if each is best else each for each in candidates]
+            best = better
         found = _identification(
             best, candidates, [*dict.fromkeys(skipped)], leads[0].starts
         )
