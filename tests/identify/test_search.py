@@ -40,7 +40,9 @@ def test_a_search_ends_where_a_promised_gain_is_not_there(promised):
     assert len(tried) <= 4
 
 
-@pytest.mark.parametrize(("far", "share"), [(np.inf, SHARE), (LEFT**2, SHARE), (0.0, FAR)])
+@pytest.mark.parametrize(
+    ("far", "share"), [(np.inf, SHARE), (LEFT**2, SHARE), (0.0, FAR)]
+)
 def test_a_search_ends_early_only_where_it_ends_far_from_the_data(far, share):
     """Derivatives twice too steep: each try halves the distance. Half of 3^2 is left, and the start is above 3^2."""
     residuals = lambda x: (np.array([x[0] - 1.0, LEFT]), np.array([[2.0], [0.0]]))
