@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planarfriction.identify.search import Descent, _stiffnesses
+from planarfriction.identify.search import FAR, Descent, _stiffnesses
 
 SHARE, LEFT = 1e-6, 3.0
 ANYWHERE = np.array([-np.inf]), np.array([np.inf])
@@ -38,6 +38,19 @@ def test_a_search_ends_where_a_promised_gain_is_not_there(promised):
     assert abs(descent.x[0] - 1.0) <= 2.0 * LEFT * promised
     assert 0.5 * LEFT**2 <= descent.cost <= 0.5 * LEFT**2 * (1.0 + 10.0 * SHARE)
     assert len(tried) <= 4
+
+
+@pytest.mark.parametrize(
+    ("far", "share"), [(np.inf, SHARE), (LEFT**2, SHARE), (0.0, FAR)]
+)
+def test_a_search_ends_early_only_where_it_ends_far_from_the_data(far, share):
+    """Derivatives twice too steep: each try halves the distance. Half of 3^2 is left, and the start is above 3^2."""
+    residuals = lambda x: (np.array([x[0] - 1.0, LEFT]), np.array([[2.0], [0.0]]))
+    descent = Descent(residuals, np.array([10.0]), SHARE, far)
+    descent.run(ANYWHERE)
+    # the last try gained three times what is left, and less than the share
+    left = descent.cost / (0.5 * LEFT**2) - 1.0
+    assert share / 100.0 < left < share / 2.9
 
 
 def test_bristles_to_try_bend_fully_after_a_tenth_of_a_step_to_a_tenth_of_all():

@@ -8,7 +8,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import PARAMETERS, parameters_of, rollout
-from planarfriction.identify import FitOptions, Log, differentiated
+from planarfriction.identify import FitOptions, Log, differentiated, search
 from planarfriction.identify.logs import columns_of
 from planarfriction.identify.parameters import (
     Coordinates,
@@ -455,3 +455,26 @@ def test_cells_begin_where_discs_ended_far_from_the_data_too(log):
     for model, starts in (("reduced", "of 2"), ("distributed", "of 1")):
         searches = [each for each in texts if each.startswith(f"{model}: start")]
         assert starts in searches[0]
+
+
+def test_what_no_model_explains_ends_as_if_all_searches_went_to_their_ends(
+    log, monkeypatch
+):
+    """Searches that are far from the data end early, and the chosen one goes on: its estimates are the same."""
+    strip = pf.ContactPatch.rectangle(0.03, 0.003, cells=9)
+    options = {"model": "reduced", "elasto_plastic": 0.9}
+    runs = []
+    for share in (10.0 * search.FAR, 0.0):
+        monkeypatch.setattr(search, "FAR", share)
+        texts = []
+        found = identify(noisy(log, 0), strip, progress=texts.append, **options)
+        runs.append((found, sum("evaluation" in each for each in texts)))
+    (early, few), (late, many) = runs
+    assert early.scores[0].reduced_chi2 > NEAR
+    assert few < 0.8 * many
+    off = np.abs(early.values - late.values) / late.standard_errors
+    assert off.max() < 0.1
+    assert early.verdicts[0].reason.startswith("reduced with")
+    assert [each.parameter for each in early.verdicts] == [
+        each.parameter for each in late.verdicts
+    ]

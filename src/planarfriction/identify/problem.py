@@ -38,7 +38,7 @@ from planarfriction.identify.simulators import (
     Prediction,
     PublishedSimulator,
 )
-from planarfriction.identify.uncertainty import covariance, finite
+from planarfriction.identify.uncertainty import NEAR, covariance, finite
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
@@ -163,6 +163,8 @@ class LeastSquaresProblem:
     """Names of the parameters of the contact, `[F]`."""
     law: LuGre
     """Law that holds the values of parameters that are not estimated."""
+    far = np.inf
+    """Cost above which a search is far from the data."""
     least_change = 0.0
     """Least relative change of the cost for which a search goes on."""
     steps = 1
@@ -275,6 +277,7 @@ class LogProblem(LeastSquaresProblem):
         self.channels = np.array([log.channels for log in logs])[self._log]
         pad = None if self.kind.own_radius else self.pad
         self.simulator = self.kind(self.fixed_patch, self.law, options.surface, pad)
+        self.far = 0.5 * NEAR * self.numbers
         self.steps = options.refine or 1
         self.predictions = self._predictions(self.steps)
         self._shown: Any = None

@@ -29,6 +29,9 @@ FINE = 1e-3
 """Change of the cost below which a search ends: a change of an estimate by 0.04
 standard errors."""
 
+FAR = 1e-3
+"""Change of the cost, as a share, below which a search ends that is far from the data."""
+
 ROUNDS = 6
 """Most rounds of noise and finer steps."""
 
@@ -120,13 +123,15 @@ class _SettledError(Exception):
 class Descent:
     """Search from one start, and the best point that it has found.
 
-    It ends where a try changes the cost by less than `share` of it, up or down. `least_squares` alone continues until
-    its steps vanish, if derivatives that are kept from nearby promise a gain that is not there.
+    It ends where a try changes the cost by less than `share` of it, up or down, or above `far` by less than `FAR` of
+    it. `least_squares` alone continues until its steps vanish, if derivatives that are kept from nearby promise a gain
+    that is not there.
     """
 
     residuals: Callable[[np.ndarray], Linear]
     x: np.ndarray
     share: float
+    far: float = np.inf
     cost: Any = np.inf
     _last: Any = None
 
@@ -150,7 +155,8 @@ class Descent:
     def _residual(self, x: np.ndarray) -> np.ndarray:
         self._last = condensed(*self.residuals(x))
         cost = 0.5 * float(self._last[0] @ self._last[0])
-        settled = abs(cost - self.cost) < self.share * cost
+        share = self.share if cost < self.far else FAR
+        settled = abs(cost - self.cost) < share * cost
         if cost < self.cost:
             self.x = x.copy()
             self.cost = cost
@@ -188,7 +194,7 @@ def _best(
         return residuals(x)
 
     for point in points:
-        found.append(Descent(told, point, share))
+        found.append(Descent(told, point, share, problem.far))
         found[-1].run(bounds)
     best = min(found, key=lambda each: each.cost)
     agreeing = sum(each.cost <= best.cost * (1.0 + SAME_COST) for each in found)

@@ -217,9 +217,21 @@ def identify_lugre(
             key=lambda each: (each.uncertainty.rejected, each.cost(sigma)),
         )
         found = _identification(
-            best, candidates, [*dict.fromkeys(skipped)], leads[0].starts
+            *_finished(best, candidates), [*dict.fromkeys(skipped)], leads[0].starts
         )
     return with_findings(found, whole, findings)
+
+
+def _finished(
+    best: Candidate, candidates: list[Candidate]
+) -> tuple[Candidate, list[Candidate]]:
+    """Return the best candidate at the end of its search, which ended early far from the data, and all candidates."""
+    if best.fit.near:
+        return best, candidates
+    best.fit.problem.far = np.inf
+    fit = refine(best.fit)
+    last = Candidate(fit, uncertainty(fit))
+    return last, [last if each is best else each for each in candidates]
 
 
 def _report_first(fit: Fit) -> None:

@@ -83,6 +83,7 @@ class Friction:
         self._said: set[str | None] = set()
         self._memory = memory(patches, m.nv, m.nuserdata)
         self._used: list[bool] = []
+        self._last: Any = (object(),)
         weakref.finalize(self, _say_unused, self._used)
 
     def _check(self, m: Any) -> None:
@@ -260,28 +261,39 @@ class Friction:
         Raises `InvalidValueError` for data of another model, for options of the model that have been changed to what
         does not fit, before the step, and for a state that is not finite.
         """
-        m = d.model
-        if m is not self.m and not loops.is_served(self._row, m._address):
-            raise InvalidValueError(
-                "d",
-                "be data of the model of the patches, or of a copy",
-                "data of another model",
-            )
-        if d.time != d.userdata[self._memory.next]:
+        last = self._last
+        if d is not last[0]:
+            last = self._last = self._found(d)
+        _, m, numbers, places = last
+        if d.time != numbers[self._memory.next]:
             self._say_alone(d)
-        self._used[:] = [True]
         mujoco.mj_step1(m, d)
-        silent = loops.plan_step(self._row, m._address, d._address)
-        iterations = 0.0 if silent else d.userdata[self._memory.iterations]
+        if loops.plan_step(*places):
+            mujoco.mj_step2(m, d)
+            return
+        iterations = numbers[self._memory.iterations]
         if iterations == loops.UNFIT:
             self._check(m)
         mujoco.mj_step2(m, d)
-        line = None if silent else self.misplaced(d)
+        line = self.misplaced(d)
         if line is not None and line not in self._said:
             self._said.add(line)
             warnings.warn(line, stacklevel=2)
         if iterations < 0.0:
             raise InvalidValueError("state", "be finite", "a number that is not")
+
+    def _found(self, d: Any) -> tuple[Any, ...]:
+        """Return data with their model, their numbers and the addresses that a step takes: the dear part of a step."""
+        m = d.model
+        host = place_of(self._row)
+        if m is not self.m and not loops.is_served(host, m._address):
+            raise InvalidValueError(
+                "d",
+                "be data of the model of the patches, or of a copy",
+                "data of another model",
+            )
+        self._used[:] = [True]
+        return d, m, d.userdata, (host, m._address, d._address)
 
     @contextmanager
     def install(self) -> Iterator[Friction]:

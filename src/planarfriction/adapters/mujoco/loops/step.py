@@ -18,7 +18,6 @@ from planarfriction._engine.compiler.calls import (
     c_address_of,
     call,
     call_c,
-    pointer,
     shared_word,
 )
 from planarfriction._engine.compiler.memory import (
@@ -347,19 +346,19 @@ def control(m, d):
 
 @jit
 def plan_step(host, m, d):
-    """Call `plan` from Python with the row of a `Host` and the addresses of model and data.
+    """Call `plan` from Python with the addresses of a `Host`, of model and data.
 
     Return False if the step has something to say: it has no friction, or a patch is misplaced.
     """
     own = read(host)
-    call(own.plan, (pointer(host), m, d))
+    call(own.plan, (host, m, d))
     kept = arrays_at(own.memory, integers(d + own.data.userdata)[0])
     return kept.iterations[0] >= 0.0 and kept.misplaced[0] == 0.0
 
 
 @jit
 def is_served(host, m):
-    """Return True if the row of a `Host` serves the model at an address."""
+    """Return True if the `Host` at an address serves the model at another."""
     return serves(read(host), m)
 
 
@@ -371,5 +370,5 @@ def control_address() -> int:
 def compile_ahead() -> None:
     """Compile what steps inside MuJoCo take."""
     address_of(plan), control_address()
-    plan_step.compile((types.float64[::1], types.int64, types.int64))
-    is_served.compile((types.float64[::1], types.int64))
+    plan_step.compile((types.int64, types.int64, types.int64))
+    is_served.compile((types.int64, types.int64))
