@@ -197,7 +197,6 @@ def test_the_compliance_is_part_of_the_model(front):
         with pytest.raises(RuntimeError, match="compliance"):
             hard.load_state_dict(ours.state_dict())
         return
-    jax = front.library
     # Softer by some thousandths, as by the slope by the compliance.
     step = lambda c: ours.replace(compliance=c).step(
         ours.rest(), np.array([1e-3, 0.0, 0.1]), 1.0, DT
