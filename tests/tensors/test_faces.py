@@ -237,6 +237,30 @@ def test_steps_of_pytorch_go_through_its_transformations():
     assert all(raw.grad.isfinite() for raw in model.parameters())
 
 
+def test_jax_compiles_nothing_in_a_second_call(caplog):
+    """Also outside of `jit`, where a loop that is made anew in each call would be compiled in each."""
+    jax = pytest.importorskip("jax")
+    import planarfriction.jax as pj
+
+    few = pf.ContactPatch.disc(RADIUS, cells=2)
+    plain = pj.DistributedModel(few, PLAIN)
+    soft = pj.DistributedModel(few, PLAIN, pad=SOFT)
+    v = np.ones(3)
+    calls = [
+        lambda: soft.step(soft.rest(), v, 1.0, DT),
+        lambda: plain.step(plain.rest(), v, 1.0, DT, moments=np.zeros(2)),
+        lambda: pj.rollout(plain, None, v[None], 1.0, DT, method="eager"),
+    ]
+    for call in calls:
+        call()
+    with jax.log_compiles():
+        for call in calls:
+            call()
+        assert "Compiling" not in caplog.text
+        jax.jit(lambda: 1.0)()
+    assert "Compiling" in caplog.text
+
+
 def test_loops_of_jax_keep_their_conditions():
     """Side by side, a loop whose condition is rounded differently inside and outside of its body never ends."""
     jax = pytest.importorskip("jax")
