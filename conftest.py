@@ -11,9 +11,10 @@ from hypothesis.internal.conjecture import providers
 
 from planarfriction import families
 
-os.environ.setdefault(
-    "JAX_DISABLE_MOST_OPTIMIZATIONS", "1"
-)  # most of what its tests take is compilation
+# Most of what tests of JAX take is compilation: without most passes, and without code that computes an operand again in
+# each kernel that reads it.
+os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_use_fusion_emitters=false")
 
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("random", derandomize=False)

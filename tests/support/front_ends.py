@@ -35,9 +35,12 @@ class Torch:
         return self.library.func.grad(function)
 
     def slopes(self, function, *values):
-        """Return derivatives of `function(z, v, f)` for a batch, by all three."""
+        """Return derivatives of a function for a batch, by all its arguments."""
         func = self.library.func
-        return func.vmap(func.jacrev(function, (0, 1, 2)))(*values)
+        return func.vmap(func.jacrev(function, tuple(range(len(values)))))(*values)
+
+    def forget(self):
+        """Forget what was traced: nothing was."""
 
     def traced(self, function, value):
         """Call a function so that it cannot look at its value."""
@@ -80,9 +83,14 @@ class Jax:
         return self.library.jit(self.library.grad(function))
 
     def slopes(self, function, *values):
-        """Return derivatives of `function(z, v, f)` for a batch, by all three."""
+        """Return derivatives of a function for a batch, by all its arguments."""
         jax = self.library
-        return jax.jit(jax.vmap(jax.jacrev(function, (0, 1, 2))))(*values)
+        every = tuple(range(len(values)))
+        return jax.jit(jax.vmap(jax.jacrev(function, every)))(*values)
+
+    def forget(self):
+        """Forget what was traced, with the constants that it was traced with."""
+        self.library.clear_caches()
 
     def traced(self, function, value):
         """Call a function so that it cannot look at its value."""

@@ -133,8 +133,10 @@ def test_rollouts_are_steps_whose_slopes_are_differences(front):
 
     at = front.arrays(z, v, f)
     assert abs(front.plain(power(*at)) / numpy(z, v, f) - 1.0) < 1e-9
-    slopes = front.slopes(power, *(each[None] for each in at))
-    for i, (slope, value) in enumerate(zip(slopes, (z, v, f), strict=True)):
+    values = LAW.numbers._asdict()
+    vector = front.array([values[name] for name in ours.names])
+    slopes = front.slopes(power, *(each[None] for each in (*at, vector)))
+    for i, (slope, value) in enumerate(zip(slopes[:3], (z, v, f), strict=True)):
         step = 1e-6 * rng.normal(size=value.shape) * np.abs(value).max()
         both = [
             [each + side * step if j == i else each for j, each in enumerate((z, v, f))]
@@ -142,10 +144,7 @@ def test_rollouts_are_steps_whose_slopes_are_differences(front):
         ]
         more, less = (numpy(*each) for each in both)
         assert abs((front.plain(slope)[0] * step).sum() / (more - less) - 1.0) < 1e-6
-    values = LAW.numbers._asdict()
-    vector = front.array([values[name] for name in ours.names])
-    found = front.plain(front.grad(lambda p: power(*at, p))(vector))
-    by = dict(zip(ours.names, found, strict=True))
+    by = dict(zip(ours.names, front.plain(slopes[3])[0], strict=True))
     ends = [
         numpy(
             z,
@@ -168,7 +167,9 @@ def test_a_face_that_is_not_found_leaves_numbers(front, monkeypatch):
     model, ours = pair(front, "half-space, discs")
     z, v, f = samples(model)
     monkeypatch.setattr(faces, "TRIES", 1)
+    front.forget()
     new, wrench = (front.plain(each) for each in ours.step(*front.arrays(z, v, f), DT))
+    front.forget()
     wanted, _ = model.step(z, v, f, DT)
     assert (
         np.isfinite(wrench).all()
@@ -196,13 +197,12 @@ def test_the_compliance_is_part_of_the_model(front):
         with pytest.raises(RuntimeError, match="compliance"):
             hard.load_state_dict(ours.state_dict())
         return
-    jax = front.library
     # Softer by some thousandths, as by the slope by the compliance.
     step = lambda c: ours.replace(compliance=c).step(
         ours.rest(), np.array([1e-3, 0.0, 0.1]), 1.0, DT
     )[1][0]
     soft = ours.compliance
-    slope = float((jax.grad(step)(soft) * soft).sum())
+    slope = float((front.grad(step)(soft) * soft).sum())
     more, less = (float(step((1.0 + side) * soft)) for side in (1e-5, -1e-5))
     assert slope == pytest.approx((more - less) / 2e-5, rel=1e-6)
 
@@ -235,6 +235,30 @@ def test_steps_of_pytorch_go_through_its_transformations():
     torch.testing.assert_close(change, backwards.sum(-1), rtol=1e-10, atol=1e-10)
     step(*given)[1].square().sum().backward()
     assert all(raw.grad.isfinite() for raw in model.parameters())
+
+
+def test_jax_compiles_nothing_in_a_second_call(caplog):
+    """Also outside of `jit`, where a loop that is made anew in each call would be compiled in each."""
+    jax = pytest.importorskip("jax")
+    import planarfriction.jax as pj
+
+    few = pf.ContactPatch.disc(RADIUS, cells=2)
+    plain = pj.DistributedModel(few, PLAIN)
+    soft = pj.DistributedModel(few, PLAIN, pad=SOFT)
+    v = np.ones(3)
+    calls = [
+        lambda: soft.step(soft.rest(), v, 1.0, DT),
+        lambda: plain.step(plain.rest(), v, 1.0, DT, moments=np.zeros(2)),
+        lambda: pj.rollout(plain, None, v[None], 1.0, DT, method="eager"),
+    ]
+    for call in calls:
+        call()
+    with jax.log_compiles():
+        for call in calls:
+            call()
+        assert "Compiling" not in caplog.text
+        jax.jit(lambda: 1.0)()
+    assert "Compiling" in caplog.text
 
 
 def test_loops_of_jax_keep_their_conditions():

@@ -80,10 +80,11 @@ class FrictionPytree(TensorModel):
             jnp.result_type(self.parameters.sigma_0),
         )
 
+    @jax.jit
     def rollout(
         self, state, twist, normal_force, dt, *, parameters: Any = None
     ) -> tuple[jax.Array, jax.Array]:
-        """Return the last state and the wrenches `[..., T, 3]` of steps, each an operation of JAX, in `lax.scan`."""
+        """Return the last state and the wrenches `[..., T, 3]` of steps by operations of JAX, compiled once."""
 
         def one(z, held):
             twist, load = held

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import jax
@@ -111,6 +112,7 @@ class _Tilt(NamedTuple):
         return self.pressure(plane) > 0.0
 
 
+@jax.jit
 def pressing(u, v, share, x, y, narrow) -> jax.Array:
     """Return the cells that press, bool `[..., N]` (see `Namespace.pressing`)."""
     one = jnp.ones_like(u)
@@ -141,6 +143,22 @@ def _until(body: Any, start: Any, most: int) -> Any:
 def _repeat(body: Any, state: Any, times: int) -> Any:
     _, results = jax.lax.scan(lambda last, _: body(last), state, None, times)
     return jax.tree.map(lambda each: each[-1], results)
+
+
+def _compiled(function: Any, record: Any) -> Any:
+    """Return `Namespace.compiled`."""
+    leaves, structure = jax.tree.flatten(record)
+    arrays = [each for each in leaves if hasattr(each, "dtype")]
+    plain = tuple(None if hasattr(each, "dtype") else each for each in leaves)
+    return _run(function, structure, plain, arrays)
+
+
+@functools.partial(jax.jit, static_argnums=(0, 1, 2))
+def _run(function: Any, structure: Any, plain: tuple[Any, ...], arrays: list) -> Any:
+    """Return the result for a record of leaves that are plain, arrays where these are None."""
+    others = iter(arrays)
+    leaves = [next(others) if each is None else each for each in plain]
+    return function(xp, jax.tree.unflatten(structure, leaves))
 
 
 def _slopes(function: Any, x: jax.Array, units: jax.Array) -> jax.Array:
@@ -210,6 +228,7 @@ xp = Namespace(
     pressing=pressing,
     until=_until,
     repeat=_repeat,
+    compiled=_compiled,
     slopes=_slopes,
     to_numpy=lambda value: np.asarray(value) if isinstance(value, jax.Array) else value,
     from_numpy=lambda array, like: jnp.asarray(array, like.dtype),

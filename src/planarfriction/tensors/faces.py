@@ -84,6 +84,10 @@ class Face(NamedTuple):
 
 def evaluate(xp: Any, at: Face) -> tuple[Any, Any]:
     """Return the rate of the state and the wrench, of a face at `dt = 0`."""
+    return xp.compiled(_evaluate, at)
+
+
+def _evaluate(xp: Any, at: Face) -> tuple[Any, Any]:
     face, _, _ = at.stuck(xp)
     by = distributed.drive(xp, at.law, at.shape, face)
     rate, pull = distributed.evaluate(
@@ -96,6 +100,10 @@ def evaluate(xp: Any, at: Face) -> tuple[Any, Any]:
 
 def step(xp: Any, at: Face) -> tuple[Any, Any]:
     """Return the state and the wrench after a step."""
+    return xp.compiled(_step, at)
+
+
+def _step(xp: Any, at: Face) -> tuple[Any, Any]:
     held = _constant(xp, at)
     face, found = _search(xp, held)
     one = _eye(xp, face)

@@ -48,6 +48,8 @@ class Namespace:
       bool `[..., N]`, by the rule of `cells.moment_pressure` in its scaled coordinates; without derivatives
     - `until(body, start, most)`: the last state of `done, state = body(state)`, which runs until `done` or `most` times
     - `repeat(body, state, times)`: the last result of `state, result = body(state)`
+    - `compiled(function, record)`: `function(xp, record)`, in JAX traced and compiled once for all records whose arrays
+      are alike and whose other parts are equal: loops of operations one by one would be compiled in each call
     - `slopes(function, x, units)`: the derivatives of a function of vectors `[..., 3]`, each of a component of its
       value, `[3, ..., 3]`; `units` are unit vectors in the same order
     - `to_numpy(value)`, where anything but an array of the library stays; `from_numpy(array, like)`, a copy with the

@@ -160,6 +160,7 @@ xp = Namespace(
     pressing=_Pressing.apply,
     until=_until,
     repeat=_repeat,
+    compiled=lambda function, record: function(xp, record),
     slopes=_slopes,
     to_numpy=lambda value: (
         value.detach().cpu().numpy() if isinstance(value, Tensor) else value
