@@ -221,8 +221,10 @@ def test_loops_and_calls_end(name):
     searches = re.findall(
         r"(?:find|search)_of_coupling\(p, (?:tolerance, )?([^,]+), [^;{]*\);", code
     )
-    assert searches and all(
-        re.fullmatch(r"\d+|most|\(\d+ \* most\)", each) for each in searches
+    assert searches and all(re.fullmatch(r"\d+|most|steps", each) for each in searches)
+    assert all(
+        re.fullmatch(r"\(\w+ \? most : \(\d+ \* most\)\)", each)
+        for each in re.findall(r"\bsteps = ([^;]+);", code)
     )
     counted = "|".join(re.findall(r"(\w+)\([^()]*, int count\)", code)) or "none"
     for call in re.findall(rf"^ +(?:{counted})\((.*)\);", code, re.MULTILINE):
