@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import importlib.util
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import threading
 import warnings
@@ -232,6 +234,22 @@ def test_what_was_compiled_before_is_read_where_nothing_can_be_written(
     monkeypatch.setattr(machine_code, "replacing", refuse)
     monkeypatch.setattr(machine_code, "_make", refuse)
     assert was_read_again(sources)
+
+
+def test_a_process_that_compiles_nothing_does_not_load_what_compiles(sources):
+    code = "import own_loops, sys; print(own_loops.outer(3.0), 'numba.np.linalg' in sys.modules)"
+    run = functools.partial(
+        subprocess.run,
+        [sys.executable, "-c", code],
+        cwd=sources,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert [run().stdout.split() for _ in range(2)] == [
+        ["7.0", "True"],
+        ["7.0", "False"],
+    ]
 
 
 def test_sources_that_change_under_a_running_process_leave_nothing_stale(sources):

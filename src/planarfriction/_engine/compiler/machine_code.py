@@ -24,6 +24,7 @@ from numba.core import config
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
@@ -140,7 +141,9 @@ class MachineCode(NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Read the function for a signature; None if its file is missing, of another origin or damaged."""
-        target_context.refresh()
+        # All that machine code takes of Numba is the counting of references. What compilation takes is loaded with the
+        # first one: half of what a process does before its first step.
+        rtsys.initialize(target_context)
         arguments, _ = normalize_signature(sig)
         name, origin = self._file(arguments, target_context.codegen())
         return _read(
